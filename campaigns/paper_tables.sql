@@ -86,7 +86,7 @@ SELECT s.*,
      AND instr(v.faults, '|') = 0 AND v.faults <> s.fault
      -- What the floor finds is no fault.
      AND v.faults NOT IN ('travel_deviation', 'shut_flow', 'excess_flow',
-                          'x_stuck', 'f_stuck')) AS wrong
+                          'x_stuck', 'f_stuck', 'low_flow')) AS wrong
 FROM scenario s;
 
 .print

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <utility>
 
+#include "diagnosis/fault_catalogue.h"
+
 namespace fdi {
 namespace {
 
@@ -237,7 +239,7 @@ void Episode::Step(const Sample& sample, const ObserverBank& bank,
   // A fault isolated by this sample takes precedence over the findings of the
   // floor, so NameFloor() comes after Isolate().
   if (findings.settled) {
-    Isolate(verdict);
+    Isolate(sample, findings, verdict);
     JudgeUnknown(verdict);
   }
   NameFloor(verdict);
@@ -297,8 +299,9 @@ void Episode::Open(std::int64_t stamp_ns, Verdict& verdict) {
 // Sets the factors of the floor's findings beside those of the faults.
 void Episode::ApplyFloorFindings(const Findings& findings,
                                  Verdict& verdict) const {
-  const std::size_t first = models_->faults.size() - Floor::kTests;
-  for (std::size_t i = 0; floor_names_ != 0 && i < Floor::kTests; ++i) {
+  const auto count = static_cast<std::size_t>(std::popcount(floor_names_));
+  const std::size_t first = models_->faults.size() - count;
+  for (std::size_t i = 0; i < count; ++i) {
     const bool found = (findings.floor >> (first + i) & 1U) != 0;
     verdict.fault_factors[first + i] = found ? 1.0 : 0.0;
     verdict.strengths[first + i] = found ? findings.sizes[i] : 0.0;
@@ -374,7 +377,46 @@ void Episode::Name(FaultSet faults, Verdict& verdict) {
        verdict.stamp_ns, verdict);
 }
 
-void Episode::Isolate(Verdict& verdict) {
+// Too little flow behind a rod that follows is more likely lost in the line
+// than in the valve, so it stands beside a fault of valve or sensor. A flow
+// transmitter stands alone while the command stays where it was: the loop would
+// answer a loss of flow.
+FaultSet Episode::LossBeside(FaultSet set, FaultSet floor,
+                             const Sample& sample) const {
+  const int index = FaultIndex(*models_, kLowFlow);
+  const FaultSet loss = index < 0 ? 0 : floor & FaultSet{1} << index;
+  if (loss == 0) {
+    return 0;
+  }
+  bool of_process = true;
+  bool of_meter = models_->validity.cv.Contains(sample[Signal::kCv]);
+  for (std::size_t i = 0; i < models_->faults.size(); ++i) {
+    if (Has(set & ~floor_names_, i)) {
+      const FaultFacts& facts = FaultFactsOf(models_->faults[i]);
+      of_process =
+          of_process && facts.acts_on == ActsOn::kInputs && !facts.transmitter;
+      of_meter = of_meter && facts.acts_on == ActsOn::kFlowReading;
+    }
+  }
+  return of_process || of_meter ? 0 : loss;
+}
+
+// Before t_k, and whether the line has lost its flow once there is a name. The
+// floor takes its time: what it is about to find holds an early name back.
+void Episode::NameEarly(const Sample& sample, FaultSet beginning,
+                        Verdict& verdict) {
+  const FaultSet proven = Proven(verdict);
+  const bool early = (proven & ~verdict.isolated) != 0;
+  const FaultSet name = early ? WithGroups(proven, verdict) : verdict.isolated;
+  const FaultSet loss = LossBeside(name, floor_ | beginning, sample);
+  if ((early && (loss & ~floor_) == 0) || (loss & floor_ & ~name) != 0) {
+    early_ = early_ || early;
+    Name(name | loss, verdict);
+  }
+}
+
+void Episode::Isolate(const Sample& sample, const Findings& findings,
+                      Verdict& verdict) {
   const double threshold = models_->decision.isolation_threshold;
   // Before any return, so that the window is full when a hold ends or the valve
   // no longer looks normal.
@@ -386,11 +428,7 @@ void Episode::Isolate(Verdict& verdict) {
     return;
   }
   if (supported == 0) {
-    if (const FaultSet proven = Proven(verdict);
-        (proven & ~verdict.isolated) != 0) {
-      early_ = true;
-      Name(WithGroups(proven, verdict), verdict);
-    }
+    NameEarly(sample, findings.beginning, verdict);
     return;
   }
   supported = WithGroups(supported, verdict);
@@ -399,6 +437,7 @@ void Episode::Isolate(Verdict& verdict) {
   if (models_->floor && std::popcount(supported) > kMaxFaultSetSize) {
     supported = floor_;
   }
+  supported |= LossBeside(supported, floor_, sample);
   // The first fault replaces findings of the floor at once, and the first set
   // of equation (6) a name that came before it.
   const bool early = std::exchange(early_, false);

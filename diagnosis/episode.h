@@ -113,8 +113,9 @@ class ClearingWindow {
 struct Findings {
   std::optional<std::int64_t> detected;  ///< Stamp of a new detection.
   bool abnormal{false};                  ///< Some limit is exceeded at present.
-  FaultSet stuck{0};  ///< Faults of stuck transmitters: certain.
-  FaultSet floor{0};  ///< Findings of the floor.
+  FaultSet stuck{0};      ///< Faults of stuck transmitters: certain.
+  FaultSet floor{0};      ///< Findings of the floor.
+  FaultSet beginning{0};  ///< Those that some more such samples would make.
   std::array<double, Floor::kTests> sizes{};  ///< Their sizes.
   bool settled{true};                         ///< The observers have settled.
 };
@@ -146,7 +147,10 @@ class Episode {
   void ApplyEvidence(Verdict& verdict) const;
   void Open(std::int64_t stamp_ns, Verdict& verdict);
   FaultSet Proven(const Verdict& verdict);
-  void Isolate(Verdict& verdict);
+  FaultSet LossBeside(FaultSet set, FaultSet floor, const Sample& sample) const;
+  void NameEarly(const Sample& sample, FaultSet beginning, Verdict& verdict);
+  void Isolate(const Sample& sample, const Findings& findings,
+               Verdict& verdict);
   void Name(FaultSet faults, Verdict& verdict);
   void NameFloor(Verdict& verdict);
   void ApplyFloorFindings(const Findings& findings, Verdict& verdict) const;

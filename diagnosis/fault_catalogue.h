@@ -162,22 +162,33 @@ inline constexpr FaultFacts kFaultCatalogue[] = {
      .hides = Signal::kP2},
 };
 
-/// Findings of the floor (diagnosis/floor.h): implausible readings, whatever
-/// the cause. Their numbers begin at kFirstFinding, to leave room for more
-/// faults.
+/// Findings of the floor (diagnosis/floor.h), which are implausible readings,
+/// whatever the cause, then those of the audit of a loop
+/// (diagnosis/loop_watch.h). Their numbers begin at kFirstFinding, to leave
+/// room for more faults.
 inline constexpr FaultFacts kFindingCatalogue[] = {
     {"travel_deviation", "rod does not follow the command", "", true},
     {"shut_flow", "flow with the valve shut", "", false},
     {"excess_flow", "more flow than the opening can pass", "", false},
     {"x_stuck", "position reading stuck", "", false},
     {"f_stuck", "flow reading stuck", "", false},
+    {.name = "low_flow",
+     .description = "less flow than the opening passes",
+     .acts_on = ActsOn::kFlow,
+     .visible_in = MaskOf(Signal::kF)},
+    {"stiction", "the valve sticks", "", false},
+    {"no_response", "flow or rod does not answer the command", "", false},
+    {"reading_frozen", "the loop's reading repeats", "", false},
+    {"output_saturated", "command at an end of its range", "", false},
+    {"oscillation_tuning", "the controller makes an oscillation", "", false},
+    {"oscillation_external", "an oscillation from outside the loop", "", false},
 };
 
 /// The actuator faults of the DAMADICS benchmark are 1..kFaultCount.
 inline constexpr int kFaultCount = 19;
 /// All faults, also known to the simulator, are 1..kLastFault.
 inline constexpr int kLastFault = static_cast<int>(std::size(kFaultCatalogue));
-/// The findings of the floor are kFirstFinding..kLastFinding.
+/// All findings are kFirstFinding..kLastFinding.
 inline constexpr int kFirstFinding = 201;
 inline constexpr int kLastFinding =
     kFirstFinding + static_cast<int>(std::size(kFindingCatalogue)) - 1;
@@ -192,18 +203,35 @@ inline constexpr int kShutFlow = 202;
 inline constexpr int kExcessFlow = 203;
 inline constexpr int kPositionStuck = 204;
 inline constexpr int kFlowStuck = 205;
+inline constexpr int kLowFlow = 206;
+/// Those of the floor end here, and those of the audit follow.
+inline constexpr int kLastFloorFinding = kLowFlow;
+inline constexpr int kFirstLoopFinding = 207;
+inline constexpr int kStiction = kFirstLoopFinding;
+inline constexpr int kNoResponse = 208;
+inline constexpr int kReadingFrozen = 209;
+inline constexpr int kOutputSaturated = 210;
+inline constexpr int kOscillationTuning = 211;
+inline constexpr int kOscillationExternal = 212;
 static_assert(kFaultCatalogue[kDiaphragmPerforation - 1].name == "f10" &&
               kFaultCatalogue[kSupplyDrop - 1].name == "f16" &&
               kFaultCatalogue[kTemperatureTransmitterFault - 1].name == "t1" &&
               kFaultCatalogue[kOutletPressureTransmitterFault - 1].name ==
                   "p2" &&
-              kFlowStuck == kLastFinding);
+              kFindingCatalogue[kLowFlow - kFirstFinding].name == "low_flow" &&
+              kFindingCatalogue[kStiction - kFirstFinding].name == "stiction" &&
+              kOscillationExternal == kLastFinding);
 
 constexpr bool IsFault(int number) {
   return number >= 1 && number <= kLastFault;
 }
 constexpr bool IsFinding(int number) {
   return number >= kFirstFinding && number <= kLastFinding;
+}
+
+/// What the audit of a loop finds.
+constexpr bool IsLoopFinding(int number) {
+  return number >= kFirstLoopFinding && number <= kLastFinding;
 }
 
 /// The numbers of all faults, then of all findings.

@@ -15,6 +15,7 @@ constexpr double kShut = 98.0;       // of CV and X [%]
 constexpr double kStop = 2.0;        // from an end of the travel [%]
 constexpr int kBreakaway = 5;        // samples that a rod may stay at rest
 constexpr int kStuckSamples = 10;    // for the position; twice as many for F
+constexpr double kLeastDp = 0.5;     // of the usual pressure drop
 constexpr double kFlowBorder = 0.9;  // of the largest flow: not saturated
 
 }  // namespace
@@ -64,9 +65,16 @@ double FlowAt(const FloorLimits& floor, double x, double dp) {
   return floor.flow_gain * FlowShapeAt(floor, x) * std::sqrt(std::max(dp, 0.0));
 }
 
+double LeastFlowAt(const FloorLimits& floor, double x, double dp) {
+  const double share = std::clamp(dp / floor.dp_level, 0.0, 1.0);
+  return std::min(FlowAt(floor, x + 0.5 * floor.deviation, dp),
+                  floor.flow_high * std::sqrt(share));
+}
+
 Floor::Floor(const ModelSet& models)
     : limits_(models.floor ? &*models.floor : nullptr),
-      first_(models.faults.size() - (models.floor ? kTests : 0)) {
+      first_(models.faults.size() -
+             static_cast<std::size_t>(FindingCount(models))) {
   if (limits_ != nullptr) {
     rod_.emplace(*limits_);
   }
@@ -78,19 +86,21 @@ void Floor::Restart() {
   position_ = {};
   flow_ = {};
   findings_ = 0;
+  beginning_ = 0;
 }
 
 void Floor::Push(const Sample& sample) {
   if (limits_ == nullptr) {
     return;
   }
+  const bool has_x = sample.Has(Signal::kX);
   if (sample.mode != ValveMode::kAuto || !sample.Has(Signal::kCv) ||
-      !sample.Has(Signal::kX)) {
+      !(has_x || sample.Has(Signal::kF))) {
     Restart();
     return;
   }
   if (!follows_) {
-    rod_->Restart(sample[Signal::kX]);
+    rod_->Restart(sample[has_x ? Signal::kX : Signal::kCv]);
     follows_ = true;
   }
   rod_->Step(sample[Signal::kCv]);
@@ -98,14 +108,19 @@ void Floor::Push(const Sample& sample) {
   if ((uncertain & (MaskOf(Signal::kCv) | MaskOf(Signal::kX))) != 0) {
     return;
   }
-  PushTravel(sample);
+  if (has_x) {
+    PushTravel(sample);
+  }
   if (limits_->flow_gain > 0.0 && sample.Has(Signal::kF) &&
       (uncertain & MaskOf(Signal::kF)) == 0) {
     PushFlow(sample);
   }
   findings_ = 0;
+  beginning_ = 0;
   for (std::size_t i = 0; i < kTests; ++i) {
-    findings_ |= tests_[i].found ? FaultSet{1} << (first_ + i) : 0;
+    const FaultSet bit = FaultSet{1} << (first_ + i);
+    findings_ |= tests_[i].found ? bit : 0;
+    beginning_ |= !tests_[i].found && tests_[i].length > 0 ? bit : 0;
   }
 }
 
@@ -160,28 +175,48 @@ void Floor::PushTravel(const Sample& sample) {
         limits_->stuck_travel, true, sample, position_);
 }
 
-double Floor::Expected(double x, const Sample& sample) const {
-  return FlowAt(*limits_, x,
-                sample.Has(Signal::kP1) && sample.Has(Signal::kP2)
-                    ? sample[Signal::kP1] - sample[Signal::kP2]
-                    : limits_->dp_level);
+double Floor::DpOf(const Sample& sample) const {
+  return sample.Has(Signal::kP1) && sample.Has(Signal::kP2)
+             ? sample[Signal::kP1] - sample[Signal::kP2]
+             : limits_->dp_level;
+}
+
+// A valve in control that has lost its pressure has lost its flow with it, and
+// that is a finding. One that stands wide open without pressure is parked.
+double Floor::LeastFlow(double x, const Sample& sample) const {
+  const double least_dp =
+      sample[Signal::kCv] > kStop ? kLeastDp * limits_->dp_level : 0.0;
+  return limits_->flow_share *
+             LeastFlowAt(*limits_, x, std::max(DpOf(sample), least_dp)) -
+         limits_->flow_margin * limits_->flow_high;
 }
 
 void Floor::PushFlow(const Sample& sample) {
-  const double x = sample[Signal::kX];
+  // Without a position the rod is where the flow is largest and smallest.
+  const bool has_x = sample.Has(Signal::kX);
+  const double x = has_x ? sample[Signal::kX] : rod_->most_open();
+  const double least_open = has_x ? x : rod_->least_open();
   const double flow = sample[Signal::kF];
+  const double dp = DpOf(sample);
   const double margin = limits_->flow_margin * limits_->flow_high;
   const bool shut = x >= kShut && sample[Signal::kCv] >= kShut;
   Count(kShutFlow, shut && flow > margin, flow / limits_->flow_high,
         limits_->flow_samples, sample.stamp_ns);
-  const double most =
-      limits_->flow_factor * Expected(x - 0.5 * limits_->deviation, sample) +
-      margin;
+  const double most = limits_->flow_factor *
+                          FlowAt(*limits_, x - 0.5 * limits_->deviation, dp) +
+                      margin;
   Count(kExcessFlow, !shut && flow > most, (flow - most) / limits_->flow_high,
         limits_->flow_samples, sample.stamp_ns);
+  const double least = LeastFlow(least_open, sample);
+  const bool follows = std::abs(rod_->Beyond(x)) <= limits_->deviation;
+  Count(kLowFlow, limits_->flow_share > 0.0 && !shut && follows && flow < least,
+        (least - flow) / limits_->flow_high, limits_->flow_samples,
+        sample.stamp_ns);
   const bool within = flow > margin && flow < kFlowBorder * limits_->flow_high;
-  const double expected = Expected(x, sample);
-  Watch(kFlowStuck, flow, {expected, expected}, margin, within, sample, flow_);
+  const double expected = FlowAt(*limits_, x, dp);
+  Watch(kFlowStuck, flow,
+        {expected, has_x ? expected : FlowAt(*limits_, least_open, dp)}, margin,
+        within, sample, flow_);
 }
 
 std::optional<std::int64_t> Floor::stamp_ns() const {

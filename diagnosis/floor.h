@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <optional>
@@ -26,6 +27,8 @@ class RodBand {
 
   double quick() const { return quick_; }
   double slow() const { return slow_; }
+  double most_open() const { return std::min(quick_, slow_); }
+  double least_open() const { return std::max(quick_, slow_); }
   /// Distance of `x` from the range [%], positive above.
   double Beyond(double x) const;
 
@@ -43,6 +46,11 @@ double FlowShapeAt(const FloorLimits& floor, double x);
 /// F(X, P1 − P2) of the floor; `dp` may be negative.
 double FlowAt(const FloorLimits& floor, double x, double dp);
 
+/// What the opening passes at least, before the share of the floor: F(X +
+/// deviation/2, dp), but no more than the record has shown, with less pressure
+/// less. An opening beyond the record passes what the widest one there did.
+double LeastFlowAt(const FloorLimits& floor, double x, double dp);
+
 /// Wide limits that always apply in AUTO (FloorLimits): at every command,
 /// inside and outside the trained region, from the first sample on.
 ///
@@ -51,6 +59,10 @@ double FlowAt(const FloorLimits& floor, double x, double dp);
 ///     excess_flow       F > c F(X − deviation/2, P1 − P2) + m F_high
 ///     x_stuck           X repeats, to the bit, while the rod should travel
 ///     f_stuck           F likewise, while F(X, P1 − P2) changes
+///     low_flow          F < s LeastFlowAt(X, P1 − P2) − m F_high, X follows
+///
+/// Without X, the flow is tested against the range that the rod may have, and
+/// the two tests of X find nothing.
 ///
 /// They show that something is wrong, but not what: they name an episode until
 /// a fault is isolated.
@@ -68,11 +80,13 @@ class Floor {
 
   /// The current findings; always empty without a floor.
   FaultSet findings() const { return findings_; }
+  /// What is beyond its limit, but not for long enough yet.
+  FaultSet beginning() const { return beginning_; }
   /// Stamp of the first sample of the earliest current finding.
   std::optional<std::int64_t> stamp_ns() const;
   /// How far a finding is from its model, as a signed share of the span.
   double size(std::size_t finding) const { return tests_[finding].size; }
-  static constexpr std::size_t kTests = 5;
+  static constexpr std::size_t kTests = 6;
 
  private:
   struct Test {  // consecutive samples beyond a limit
@@ -91,7 +105,8 @@ class Floor {
     Expectations highest{};
   };
 
-  double Expected(double x, const Sample& sample) const;
+  double DpOf(const Sample& sample) const;
+  double LeastFlow(double x, const Sample& sample) const;
   void Count(int finding, bool beyond, double size, int needed,
              std::int64_t stamp_ns);
   void Watch(int finding, double reading, Expectations expected, double most,
@@ -107,6 +122,7 @@ class Floor {
   Repeat position_;
   Repeat flow_;
   FaultSet findings_{0};
+  FaultSet beginning_{0};
 };
 
 }  // namespace fdi

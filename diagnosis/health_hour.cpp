@@ -42,6 +42,7 @@ void HealthHour::Add(const HealthHour& part) {
   normal_factor += part.normal_factor;
   travel += part.travel;
   reversals += part.reversals;
+  counts.Add(part.counts);
   for (std::size_t b = 0; b < bins.size(); ++b) {
     if (bins[b].empty()) {
       bins[b] = part.bins[b];

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "diagnosis/loop/valve_counters.h"
 #include "diagnosis/sample.h"
 
 namespace fdi {
@@ -70,6 +71,7 @@ struct HealthHour {
   std::int64_t normal_factor{0};  ///< Σ d_0/kShare over live_samples.
   std::int64_t travel{0};         ///< [kTravel]
   std::int64_t reversals{0};
+  loop::ValveCounts counts;
   std::vector<HealthChannel> channels;
   /// By bin of CV, then by channel; an empty bin has no samples.
   std::array<std::vector<ResidualSums>, kCommandBins> bins;

@@ -166,6 +166,8 @@ struct FloorLimits {
   double flow_factor{1.5};  ///< Flow limit: this factor times F(X),
   double flow_margin{0.1};  ///< plus this share of the largest flow.
   int flow_samples{10};     ///< Consecutive samples for a finding.
+  /// Flow below this share of F(X) is too little; 0: not tested (older sets).
+  double flow_share{0.0};
 
   friend bool operator==(const FloorLimits&, const FloorLimits&) = default;
 };
@@ -206,6 +208,9 @@ using FaultSet = std::uint64_t;
 constexpr bool Has(FaultSet faults, std::size_t bit) {
   return (faults >> bit & 1U) != 0;
 }
+
+/// How many findings its floor has; 0 without a floor.
+int FindingCount(const ModelSet& models);
 
 /// Appends the findings of the floor, if there is one, to the faults.
 void AddFindings(ModelSet& models);

@@ -1,6 +1,7 @@
 #include "diagnosis/valve_engine.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -18,10 +19,38 @@
 namespace fdi {
 namespace {
 
+// Pa, mbar, bar and MPa in kPa, and a decimal point in another place.
+constexpr std::array kPressureFactors{0.001, 0.01, 0.1, 10.0, 100.0, 1000.0};
+constexpr double kFarOff = 3.0;  // from the usual readings, as a factor
+constexpr double kZeroCelsiusK = 273.15;
+
+// True if a pressure or temperature is not what the set was trained on, but
+// would be in another unit. A transmitter that fails hardly ever ends there,
+// but medium that gets hot (f7) may: T1 only where a stream `begins`.
+bool IsInOtherUnit(const ModelSet& models, Signal signal, double value,
+                   bool begins) {
+  const ValidityRegion& region = models.validity;
+  if (signal == Signal::kT1) {
+    return begins && !region.t1.Contains(value) &&
+           region.t1.Contains(value - kZeroCelsiusK);
+  }
+  if (signal != Signal::kP1 && signal != Signal::kP2) {
+    return false;
+  }
+  const SignalRange& usual = signal == Signal::kP1 ? region.p1 : region.p2;
+  const bool far =
+      value * kFarOff < usual.minimum || value > kFarOff * usual.maximum;
+  return usual.minimum > 0.0 && far &&
+         std::ranges::any_of(kPressureFactors, [&](double factor) {
+           return usual.Contains(value * factor);
+         });
+}
+
 // The first reason why a signal of `required` is unusable in `sample`, or
-// kAccepted; signals that are not present are no reason.
+// kAccepted; signals that are not present are no reason. Of an open episode no
+// pressure or temperature is: it may pass any value.
 Intake CheckValues(const ModelSet& models, SignalMask required,
-                   const Sample& sample) {
+                   const Sample& sample, bool episode_open, bool begins) {
   if ((required & MaskOf(Signal::kF)) != 0 && sample.Has(Signal::kF) &&
       sample.flow_unit != models.flow_unit) {
     return Intake::kUnit;
@@ -40,6 +69,10 @@ Intake CheckValues(const ModelSet& models, SignalMask required,
     }
     if (!PlausibleRange(signal).Contains(sample.values[i])) {
       return Intake::kRange;
+    }
+    if (!episode_open &&
+        IsInOtherUnit(models, signal, sample.values[i], begins)) {
+      return Intake::kUnit;
     }
   }
   return Intake::kAccepted;
@@ -154,7 +187,8 @@ const Verdict& ValveEngine::Impl::Step(const Sample& sample) {
     return verdict_;
   }
   const Intake values =
-      CheckValues(models(), diagnosis_->plan->required(), sample);
+      CheckValues(models(), diagnosis_->plan->required(), sample,
+                  episode_open(), needs_initialisation_ || placement.gap);
   if (values != Intake::kAccepted) {
     Reject(values);
     return verdict_;
@@ -269,6 +303,7 @@ void ValveEngine::Impl::Decide(const Sample& sample) {
   Findings findings;
   findings.settled = diagnosis_->coverage.settled();
   findings.floor = floor.findings();
+  findings.beginning = floor.beginning();
   findings.abnormal = findings.floor != 0;
   findings.detected = floor.stamp_ns();
   for (std::size_t i = 0; i < Floor::kTests; ++i) {

@@ -76,7 +76,17 @@ std::string_view EndReasonName(EndReason reason) {
 }
 
 std::string_view LayerName(Layer layer) {
-  return NameOf(layer, std::array<std::string_view, 2>{"observers", "physics"});
+  return NameOf(
+      layer, std::array<std::string_view, 3>{"observers", "physics", "audit"});
+}
+
+Layer ParseLayer(std::string_view name) {
+  for (const Layer layer : {Layer::kPhysics, Layer::kAudit}) {
+    if (name == LayerName(layer)) {
+      return layer;
+    }
+  }
+  return Layer::kObservers;
 }
 
 std::uint64_t EpisodeId(std::string_view valve_id, std::uint64_t source_id,

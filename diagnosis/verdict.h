@@ -21,7 +21,8 @@ enum class Intake : std::uint8_t {
   kBadQuality,  ///< A required signal has quality BAD.
   kNotFinite,   ///< A required signal is NaN or infinite.
   kRange,       ///< A required signal is implausible.
-  kUnit,        ///< Flow in another unit than the model set's.
+  kUnit,        ///< In another unit than the model set's: F, or by its size
+                ///< P1, P2 or T1.
   kPeriod,      ///< Interval is not the model set's period.
 };
 inline constexpr int kIntakeCount = 9;
@@ -104,6 +105,7 @@ enum class EndReason : std::uint8_t {
 enum class Layer : std::uint8_t {
   kObservers,  ///< The engine: observers and limits.
   kPhysics,    ///< A simulation of the valve (second look).
+  kAudit,      ///< The audit of the loop, without a model.
 };
 
 /// A transition of an episode.
@@ -161,6 +163,8 @@ std::string CoverageReasonsName(CoverageReasons reasons);
 std::string_view TransitionName(TransitionKind kind);  ///< "DETECTED", ...
 std::string_view EndReasonName(EndReason reason);      ///< "cleared", ...
 std::string_view LayerName(Layer layer);               ///< "observers", ...
+/// The inverse; what it does not know counts as by observers.
+Layer ParseLayer(std::string_view name);
 
 /// 64-bit FNV-1a over valve, source and detection stamp: recording an episode
 /// twice yields the same id.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <map>
 #include <set>
 #include <sstream>
 #include <utility>
@@ -9,11 +10,12 @@
 
 #include <arpa/inet.h>
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
-#include <ifaddrs.h>
 #include <netinet/in.h>
 
 #include "base/error.h"
+#include "base/passing_error.h"
 #include "base/time_units.h"
+#include "idl/interface_watch.h"
 #include "idl/participant_impl.h"
 #include "idl/security/keys.h"
 #if FDI_FAST_DDS == 2
@@ -63,44 +65,28 @@ std::vector<std::string> Addresses(const std::string& interfaces) {
   return addresses;
 }
 
-std::set<std::string> LocalAddresses() {
-  std::set<std::string> addresses;
-  ifaddrs* list = nullptr;
-  if (getifaddrs(&list) != 0) {
-    return addresses;
-  }
-  for (const ifaddrs* each = list; each != nullptr; each = each->ifa_next) {
-    if (each->ifa_addr != nullptr && each->ifa_addr->sa_family == AF_INET) {
-      sockaddr_in address{};
-      std::copy_n(reinterpret_cast<const char*>(each->ifa_addr), sizeof address,
-                  reinterpret_cast<char*>(&address));
-      std::array<char, INET_ADDRSTRLEN> text{};
-      if (inet_ntop(AF_INET, &address.sin_addr, text.data(), text.size()) !=
-          nullptr) {
-        addresses.insert(text.data());
-      }
-    }
-  }
-  freeifaddrs(list);
-  return addresses;
-}
-
 void ValidateInterfaces(const std::string& interfaces) {
   if (interfaces == "all") {
     return;
   }
-  const std::set<std::string> local = LocalAddresses();
+  const std::map<std::string, unsigned> local = LocalAddresses();
   const std::vector<std::string> addresses = Addresses(interfaces);
   for (const std::string& address : addresses) {
     if (!local.contains(address)) {
       std::string known;
-      for (const std::string& each : local) {
+      for (const auto& [each, index] : local) {
         known += " " + each;
       }
-      throw ConfigError("--interface: '" + address +
-                        "' is no IPv4 address of this machine, accepted are "
-                        "all or, comma separated," +
-                        known);
+      in_addr ignored{};
+      const std::string what = "--interface: '" + address +
+                               "' is no IPv4 address of this machine, accepted "
+                               "are all or, comma separated," +
+                               known;
+      // An address may come after us at boot; what is none will not.
+      if (inet_pton(AF_INET, address.c_str(), &ignored) == 1) {
+        throw PassingError(what);
+      }
+      throw ConfigError(what);
     }
   }
   if (addresses.empty()) {
@@ -227,6 +213,9 @@ void SetTransports(const DdsOptions& options, dds::DomainParticipantQos& qos) {
     auto udp = std::make_shared<UDPv4TransportDescriptor>();
     udp->receiveBufferSize = kReceiveBufferBytes;
     udp->sendBufferSize = kSendBufferBytes;
+    // Of a peer that a profile names without a port, so many participants are
+    // called: what fits a domain and host. The library's default is 4.
+    udp->maxInitialPeersRange = 120;
     if (options.interfaces != "all") {
       udp->interfaceWhiteList = Addresses(options.interfaces);
     }
@@ -383,6 +372,9 @@ Participant::Impl::Impl(const DdsOptions& options, LogSink log,
       profiles_(options.qos_file.empty() ? ProfileFile()
                                          : ProfileFile(options.qos_file)) {
   SetUpLibraryOnce();
+  if (options_.transport != "shm") {
+    interfaces_.emplace(options_.interfaces, log_);
+  }
   const dds::DomainParticipantQos qos =
       MakeQos(options_, profiles_, datagrams_, log_, name);
   // The participant is active at once: its callbacks may come before `handle_`
@@ -396,6 +388,7 @@ Participant::Impl::Impl(const DdsOptions& options, LogSink log,
 }
 
 Participant::Impl::~Impl() {
+  interfaces_.reset();  // Before the sockets close: their numbers are reused.
   handle_->set_listener(nullptr);
   // A Participant outlives its endpoints, so only topics are left. They go
   // first: the library does not delete a participant that contains entities.

@@ -31,7 +31,8 @@ struct DdsOptions {
   int max_valves{2000};  ///< 1..100000; further valves are refused.
 };
 
-/// @throws ConfigError naming the option, its value and the accepted ones.
+/// @throws ConfigError naming the option, its value and the accepted ones;
+///   PassingError if the machine does not have the address (yet).
 void Validate(const DdsOptions& options);
 
 /// A DDS participant; active from construction on, discovered by its peers
@@ -43,7 +44,8 @@ class Participant {
  public:
   /// @param name shown by tools that list participants, e.g. "fdi-monitor".
   /// @throws ConfigError on bad options or a QoS file that is missing or wrong,
-  ///   or a key that CheckKey() refuses.
+  ///   or a key that CheckKey() refuses; PassingError for an address that the
+  ///   machine does not have, or a key that is not valid yet.
   /// @throws TransportError
   explicit Participant(const DdsOptions& options, LogSink log = {},
                        const std::string& name = "fdi");

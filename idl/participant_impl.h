@@ -9,6 +9,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -18,6 +19,7 @@
 #include <fastdds/dds/topic/TypeSupport.hpp>
 
 #include "idl/fast_dds.h"
+#include "idl/interface_watch.h"
 #include "idl/participant.h"
 #include "idl/profile_file.h"
 #include "idl/qos.h"
@@ -169,6 +171,7 @@ class Participant::Impl : private dds::DomainParticipantListener {
   std::mutex topics_mutex_;  // Separate: held during library calls.
   std::map<std::string, dds::Topic*> topics_;
   dds::DomainParticipant* handle_{nullptr};
+  std::optional<InterfaceWatch> interfaces_;
 };
 
 }  // namespace fdi::idl

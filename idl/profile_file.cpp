@@ -1,15 +1,18 @@
 #include "idl/profile_file.h"
 
 #include <algorithm>
+#include <cerrno>
 #include <filesystem>
 #include <mutex>
 #include <string_view>
+#include <system_error>
 #include <vector>
 
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
 #include <tinyxml2.h>
 
 #include "base/error.h"
+#include "base/passing_error.h"
 #include "idl/participant_impl.h"
 #include "idl/qos.h"
 
@@ -170,7 +173,12 @@ void LoadOnce(const std::string& path) {
 
 ProfileFile::ProfileFile(const std::string& path) {
   tinyxml2::XMLDocument document;
+  errno = 0;
   if (document.LoadFile(path.c_str()) != tinyxml2::XML_SUCCESS) {
+    if (MayPass(errno)) {
+      throw PassingError("QoS file '" + path + "': cannot be read: " +
+                         std::generic_category().message(errno));
+    }
     throw ConfigError("QoS file '" + path + "': " + document.ErrorStr());
   }
   const tinyxml2::XMLElement* root = document.RootElement();

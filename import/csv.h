@@ -98,6 +98,12 @@ struct Resampling {
   double limit_s{10.0};  ///< Limit for holding and interpolation.
 };
 
+/// F of a gas, stated at standard conditions and converted to t/h.
+struct GasFlow {
+  std::string unit;                ///< As written in the map: "Nm3/h".
+  double molar_mass_kg_kmol{0.0};  ///< It was converted by.
+};
+
 /// Content of `--map tags.toml`, `--zone` and `--resample`. Signals that are
 /// not mapped are still found by their names in the CSV contract.
 struct ColumnMap {
@@ -124,6 +130,7 @@ struct ColumnMap {
   std::vector<ColumnMapping> columns;
   std::string mode_column;            ///< Empty: mode or auto, if there is one.
   std::optional<FlowUnit> flow_unit;  ///< Needed if the flow is mapped.
+  std::optional<GasFlow> gas_flow;
   std::optional<Resampling> resampling;
 };
 
@@ -340,8 +347,6 @@ void ForEachRow(const std::vector<std::string_view>& lines, CsvReader& reader,
 
 /// Median of the steps of `times_s`, of two middle ones the shorter.
 double MedianStep(const std::vector<double>& times_s);
-/// A usual period within 5 % of `period_s`, else `period_s`.
-double UsualPeriod(double period_s);
 
 /// Writes the CSV contract's columns for the signals that occur; mode if it is
 /// not AUTO throughout; fault and fault_strength if the truth is known. Numbers

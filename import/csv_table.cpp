@@ -9,6 +9,7 @@
 #include "base/correlation.h"
 #include "base/error.h"
 #include "base/log.h"
+#include "base/usual_period.h"
 #include "import/csv.h"
 #include "import/layout.h"
 
@@ -70,30 +71,12 @@ void ForEachRow(const std::vector<std::string_view>& lines, CsvReader& reader,
   }
 }
 
-// Of two middle steps the shorter one: a gap must not become the period of a
-// short table.
 double MedianStep(const std::vector<double>& times_s) {
   std::vector<double> steps;
   for (std::size_t k = 1; k < times_s.size(); ++k) {
     steps.push_back(times_s[k] - times_s[k - 1]);
   }
-  if (steps.empty()) {
-    return 0.0;
-  }
-  const auto middle =
-      steps.begin() + static_cast<std::ptrdiff_t>((steps.size() - 1) / 2);
-  std::nth_element(steps.begin(), middle, steps.end());
-  return *middle;
-}
-
-double UsualPeriod(double period_s) {
-  for (const double usual : {0.1, 0.2, 0.25, 0.5, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0,
-                             10.0, 12.0, 15.0, 20.0, 30.0, 60.0, 120.0}) {
-    if (std::abs(period_s - usual) < 0.05 * usual) {
-      return usual;
-    }
-  }
-  return period_s;
+  return ShorterMedian(std::move(steps));
 }
 
 namespace {
@@ -752,8 +735,8 @@ void TableReader::CheckMotion() {
   if ((signals & MaskOf(Signal::kX)) == 0) {
     note(
         "no position (X): CV and F show that something is wrong, not whether "
-        "it is the rod, the trim or the flow transmitter, and onboarding "
-        "needs X. Map the position transmitter as [signal.X] if there is one");
+        "it is the rod, the trim or the flow transmitter. Map the position "
+        "transmitter as [signal.X] if there is one");
   }
   if ((signals & MaskOf(Signal::kF)) == 0) {
     note(
@@ -761,9 +744,10 @@ void TableReader::CheckMotion() {
         "(blocked, worn, leaking). Map the flow as [signal.F] if there is one");
   }
   if (period_s_ >= 5.0 && !options().map.resampling) {
-    note("a slow record: one row in " + NumberText(period_s_) +
-         " s, the models want one per second. --resample 1s:linear fills in up "
-         "to 10 s; of a slower record only what stands still can be judged");
+    note(
+        "a slow record: one row in " + NumberText(period_s_) +
+        " s. Up to 10 s --resample 1s:linear fills in; of a slower record only "
+        "what lasts is judged, not how the rod moves in between");
   }
   NoteSplitRange();
 }

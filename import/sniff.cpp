@@ -12,6 +12,7 @@
 
 #include "base/correlation.h"
 #include "base/error.h"
+#include "base/usual_period.h"
 #include "import/layout.h"
 #include "import/tag_map.h"
 
@@ -580,12 +581,13 @@ void SignalGuess::GuessName(SniffedColumn& column, const std::string& part) {
     return;
   }
   if (IsGasUnit(unit)) {
-    Say(column, "a flow of gas at standard conditions, which is not converted");
+    Say(column, "a flow of gas at standard conditions, which needs molar_mass");
     found_.findings.push_back(
         column.name +
-        " is a flow of gas at standard conditions, which is not converted: F "
-        "is left out. Export t/h for a type of that gas; CV and X still show "
-        "what the rod does, as --signals CV,X");
+        " is a flow of gas at standard conditions, which becomes t/h by the "
+        "molar mass: state [signal.F] with column, unit and molar_mass = 28.96 "
+        "(air; kg/kmol), and onboard with a --type of that gas. Without it F "
+        "is left out; CV and X still show what the rod does");
     return;
   }
   const NameGuess guess = RoleOf(UnitIn(part).rest, column.about);

@@ -74,8 +74,32 @@ constexpr UnitEntry kSignalUnits[] = {
     {"kg/min", Quantity::kFlow, {0.06, 0.0, kMass}},
     {"t/d", Quantity::kFlow, {1.0 / 24.0, 0.0, kMass}},
     {"lb/h", Quantity::kFlow, {0.45359237e-3, 0.0, kMass}},
+    {"klb/h", Quantity::kFlow, {0.45359237, 0.0, kMass}},
+    {"lb/min", Quantity::kFlow, {60.0 * 0.45359237e-3, 0.0, kMass}},
+    {"bbl/d", Quantity::kFlow, {0.158987294928 / 24.0, 0.0, kVolume}},
     {"1", Quantity::kNumber, {1.0, 0.0, kVolume}},
 };
+
+// Flows of gas in m3/h at 0 degC and 101.325 kPa. Sm3 are those at 15 degC,
+// cubic feet those at 60 degF and 14.696 psi, as is usual for each.
+constexpr double kNormalPerSm3 = 273.15 / 288.15;
+constexpr double kNormalPerScf =
+    0.028316846592 * 273.15 / (273.15 + 140.0 / 9.0);
+constexpr std::pair<std::string_view, double> kGasUnits[] = {
+    {"nm3/h", 1.0},
+    {"nm3/min", 60.0},
+    {"nm3/s", 3600.0},
+    {"nm3/d", 1.0 / 24.0},
+    {"knm3/h", 1000.0},
+    {"sm3/h", kNormalPerSm3},
+    {"nl/min", 0.06},
+    {"nl/h", 1e-3},
+    {"sl/min", 0.06},
+    {"slpm", 0.06},
+    {"scfm", 60.0 * kNormalPerScf},
+    {"scfh", kNormalPerScf},
+    {"mscfh", 1e3 * kNormalPerScf},
+    {"mmscfd", 1e6 / 24.0 * kNormalPerScf}};
 
 // Normalises a unit: "bar (g)" to "barg", "m³/h" to "m3/h", "°C" to "degC".
 std::string Plain(std::string_view name) {
@@ -102,6 +126,34 @@ std::string Plain(std::string_view name) {
   return plain;
 }
 
+// Of a unit of gas at standard conditions, to m3/h at 0 degC.
+std::optional<double> NormalVolume(std::string_view name) {
+  const std::string plain = PlainText(Plain(name));
+  for (const auto& [unit, normal] : kGasUnits) {
+    if (unit == plain) {
+      return normal;
+    }
+  }
+  return std::nullopt;
+}
+
+// W = M Q0 / V0 with the volume V0 of a kmol at 0 degC and 101.325 kPa, to t/h.
+UnitConversion GasConversion(TomlReader& table, const std::string& name,
+                             ColumnMap& map) {
+  constexpr double kMolarVolume = 22.413970;  // m3/kmol
+  const auto molar_mass = table.Number("molar_mass", 1.0, 500.0);
+  if (!molar_mass) {
+    table.Refuse("unit",
+                 "'" + name +
+                     "' is a flow of gas at standard conditions, which becomes "
+                     "t/h by the molar mass: molar_mass = 28.96 (air), 18.02 "
+                     "(steam), 44.01 (CO2) kg/kmol. For a liquid the unit is "
+                     "another one; likeliest is m3/h");
+  }
+  map.gas_flow = GasFlow{name, *molar_mass};
+  return {*NormalVolume(name) * *molar_mass / kMolarVolume * 1e-3, 0.0, kMass};
+}
+
 void ReadUnit(TomlReader& table, Signal signal, ColumnMap& map,
               ColumnMapping& mapping) {
   const bool flow = signal == Signal::kF;
@@ -111,16 +163,13 @@ void ReadUnit(TomlReader& table, Signal signal, ColumnMap& map,
       flow                     ? ""
       : signal == Signal::kCvi ? "1"
                                : std::string(SignalUnit(signal)));
-  const auto unit = FindUnit(signal, name == "mA" && percent ? "%" : name);
+  const auto unit =
+      flow && IsGasUnit(name)
+          ? std::optional(GasConversion(table, name, map))
+          : FindUnit(signal, name == "mA" && percent ? "%" : name);
   if (!unit) {
-    table.Refuse("unit",
-                 (IsGasUnit(name) ? "'" + name +
-                                        "' is a flow of gas at standard "
-                                        "conditions, which is not converted: "
-                                        "export t/h, or leave [signal.F] out; "
-                                        "CV and X still show what the rod does"
-                                  : "unknown unit '" + name + "'") +
-                     "; accepted are" + UnitNames(signal));
+    table.Refuse("unit", "unknown unit '" + name + "'; accepted are" +
+                             UnitNames(signal));
   }
   // raw and span are two points of a line, reading = offset + scale · cell:
   //
@@ -337,11 +386,28 @@ bool IsUnit(std::string_view name) {
 }
 
 bool IsGasUnit(std::string_view name) {
-  const std::string plain = PlainText(Plain(name));
-  constexpr std::string_view kUnits[] = {
-      "nm3/h", "nm3/min", "nm3/s", "nm3/d", "knm3/h", "sm3/h", "nl/min",
-      "nl/h",  "sl/min",  "slpm",  "scfm",  "scfh",   "mscfh", "mmscfd"};
-  return std::ranges::find(kUnits, plain) != std::end(kUnits);
+  return NormalVolume(name).has_value();
+}
+
+void CheckGasFlow(const ColumnMap& map, double molar_mass_kg_kmol) {
+  if (!map.gas_flow) {
+    return;
+  }
+  const GasFlow& gas = *map.gas_flow;
+  if (molar_mass_kg_kmol == 0.0) {
+    throw ConfigError(
+        "F is mapped in " + gas.unit +
+        ", a flow of gas at standard conditions, and the valve's medium is a "
+        "liquid. Likeliest: the unit is m3/h, or the valve needs the --type of "
+        "its gas or steam (fdi-store types; docs/model.md)");
+  }
+  constexpr double kAlike = 0.02;
+  if (std::abs(gas.molar_mass_kg_kmol / molar_mass_kg_kmol - 1.0) > kAlike) {
+    throw ConfigError(
+        "F is mapped in " + gas.unit + " with molar_mass = " +
+        NumberText(gas.molar_mass_kg_kmol) + ", and the valve's medium has " +
+        NumberText(molar_mass_kg_kmol) + " kg/kmol: state the same in both");
+  }
 }
 
 std::string_view TimeUnitName(const TimeUnit& unit) {

@@ -47,6 +47,12 @@ bool IsUnit(std::string_view name);
 /// Whether `name` is a flow of gas at standard conditions: Nm3/h, scfm, ...
 bool IsGasUnit(std::string_view name);
 
+/// Whether a map that states F as a gas at standard conditions suits the medium
+/// of the valve.
+/// @param molar_mass_kg_kmol of the medium; 0: a liquid.
+/// @throws ConfigError naming the likeliest cause.
+void CheckGasFlow(const ColumnMap& map, double molar_mass_kg_kmol);
+
 /// The name of a unit of time in a map: "s", "unix ms", "filetime", "serial".
 std::string_view TimeUnitName(const TimeUnit& unit);
 

@@ -75,6 +75,12 @@ constexpr std::array<CounterInfo, kCounterCount> kInfos{{
     {"", "fdi_history_records_set_aside_total",
      "Records that history.db did not take for their own sake, left out after "
      "three tries"},
+    {"", "fdi_travel_strokes_total",
+     "Travel of all valves in full strokes, as of the last checkpoint"},
+    {"", "fdi_reversals_total",
+     "Changes of direction of all valves, as of the last checkpoint"},
+    {"", "fdi_slip_jumps_total",
+     "Jumps of rods that stuck and let go, as of the last checkpoint"},
 }};
 static_assert(!kInfos.back().help.empty(), "a counter has no description");
 

@@ -46,6 +46,9 @@ enum class Counter : std::uint8_t {
   kPartFailures,
   kEventsRefused,
   kRecordsSetAside,
+  kStrokes,
+  kReversals,
+  kSlipJumps,
   kCount_
 };
 inline constexpr std::size_t kCounterCount =

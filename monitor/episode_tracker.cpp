@@ -212,6 +212,8 @@ void EpisodeTracker::Advance(const Sample& sample, const Verdict& engine,
     RecordGap(sample, engine, models, outlet);
     TryRecovery(sample, models, outlet);
     TellIfAlone(sample.stamp_ns, outlet);
+    source_id_ = sample.source_id;
+    seq_ = sample.seq;
   }
 }
 
@@ -232,12 +234,11 @@ void EpisodeTracker::Step(const Sample& sample, const Verdict& verdict,
   }
   // before_s bounds what precedes a detection. Of an open episode nothing may
   // be dropped before it is written, which takes points_per_write samples.
-  trace_.set_span_ns(open_ && open_->tracing
+  // What an audit rests on is longer, and given to Remember() when it counts.
+  trace_.set_span_ns((open_ && open_->tracing) || models->channels.empty()
                          ? std::numeric_limits<std::int64_t>::max()
                          : Ns(options_.before_s));
   trace_.Push(sample, verdict, channels, faults);
-  source_id_ = sample.source_id;
-  seq_ = sample.seq;
   for (const Transition& transition : verdict.Transitions()) {
     Take(transition, verdict, models, outlet);
   }
@@ -249,6 +250,18 @@ void EpisodeTracker::Step(const Sample& sample, const Verdict& verdict,
         trace_.size() >= static_cast<std::size_t>(options_.points_per_write)) {
       WriteTrace(complete, outlet);
     }
+  }
+}
+
+void EpisodeTracker::Remember(const std::vector<Sample>& samples,
+                              const ModelSet& models) {
+  trace_.set_span_ns(std::numeric_limits<std::int64_t>::max());
+  Verdict normal;
+  normal.quality = Quality::kLive;
+  normal.normal_factor = 1.0;
+  for (const Sample& sample : samples) {
+    trace_.Push(sample, normal, static_cast<int>(models.channels.size()),
+                static_cast<int>(models.faults.size()));
   }
 }
 
@@ -308,7 +321,8 @@ void EpisodeTracker::TryRecovery(const Sample& sample, const ModelSet& models,
     CloseRecovered(EndReason::kModelChanged, sample.stamp_ns, outlet);
   } else if (recovered_->source_id != sample.source_id ||
              sample.stamp_ns - first_stamp_ns_ >
-                 (standby_ ? 2 : 1) * window_ns_) {  // The leader ends it first.
+                 (standby_ ? 2 : 1) *
+                     window_ns_) {  // The leader ends it first.
     CloseRecovered(EndReason::kUnknown, sample.stamp_ns, outlet);
   }
 }

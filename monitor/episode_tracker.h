@@ -84,6 +84,9 @@ class EpisodeTracker {
             const std::shared_ptr<const ModelSet>& models,
             EpisodeOutlet& outlet);
 
+  /// Instants of before the first Step(), oldest first, for the evidence alone.
+  void Remember(const std::vector<Sample>& samples, const ModelSet& models);
+
   /// What a second look made of the open episode, but for its id.
   void Take(std::optional<EpisodeLook> look, EpisodeOutlet& outlet);
 

@@ -7,6 +7,7 @@
 #include "base/time_units.h"
 #include "diagnosis/quality_count.h"
 #include "monitor/checkpoint.h"
+#include "monitor/counters.h"
 
 namespace fdi::monitor {
 namespace {
@@ -105,6 +106,7 @@ void HealthBook::Add(const Sample& sample, const Verdict& verdict,
       At(key, sample, models, verdict.intake == Intake::kAccepted);
   const std::int64_t period_ms = std::llround(period_s * 1e3);
   hour.seen_ms += period_ms;
+  AddCounts(sample, period_s, hour);
   AddStroke(sample, period_ms, hour);
   if (models != nullptr && verdict.quality == Quality::kLive &&
       hour.SameKey(key)) {
@@ -140,6 +142,21 @@ HealthHour& HealthBook::At(const HealthHour& key, const Sample& sample,
   return begun;
 }
 
+// Nothing is compared over a gap or with what another source said.
+void HealthBook::AddCounts(const Sample& sample, double period_s,
+                           HealthHour& hour) {
+  constexpr double kGapPeriods = 3.0;
+  const std::int64_t moved_ns =
+      sample.stamp_ns - std::exchange(stamp_ns_, sample.stamp_ns);
+  if (moved_ns <= 0 || sample.source_id != source_id_ ||
+      static_cast<double>(moved_ns) > kGapPeriods * period_s * 1e9) {
+    counters_.Restart();
+  }
+  counters_.Push({Reading(sample, Signal::kCv), Reading(sample, Signal::kX),
+                  period_s, sample.mode == ValveMode::kAuto},
+                 hour.counts);
+}
+
 void HealthBook::AddStroke(const Sample& sample, std::int64_t period_ms,
                            HealthHour& hour) {
   const double x = Reading(sample, Signal::kX);
@@ -171,15 +188,33 @@ void HealthBooks::OnVerdict(const std::string& valve_id, const Sample& sample,
   }
 }
 
+void HealthBooks::Drain(const std::string& valve_id, HealthBook& book,
+                        std::vector<HealthHour>& hours) {
+  const std::size_t known = hours.size();
+  book.DrainInto(valve_id, hours);
+  constexpr auto kStroke =
+      static_cast<std::int64_t>(HealthHour::kFullStroke / HealthHour::kTravel);
+  for (std::size_t i = known; i < hours.size(); ++i) {
+    travel_ += hours[i].travel;
+    counters_.Add(Counter::kReversals,
+                  static_cast<std::uint64_t>(hours[i].reversals));
+    counters_.Add(Counter::kSlipJumps,
+                  static_cast<std::uint64_t>(hours[i].counts.slips));
+  }
+  counters_.Add(Counter::kStrokes,
+                static_cast<std::uint64_t>(travel_ / kStroke));
+  travel_ %= kStroke;
+}
+
 void HealthBooks::OnRemoved(const std::string& valve_id, Checkpoint& last) {
-  books_[valve_id].DrainInto(valve_id, last.health);
+  Drain(valve_id, books_[valve_id], last.health);
   books_.erase(valve_id);
 }
 
 void HealthBooks::TakeCheckpoint(Checkpoint& checkpoint, bool urgent) {
   for (auto& [valve_id, book] : books_) {
     if (!urgent || IsFilling(book.rows())) {
-      book.DrainInto(valve_id, checkpoint.health);
+      Drain(valve_id, book, checkpoint.health);
     }
   }
 }

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "diagnosis/health_hour.h"
+#include "diagnosis/loop/valve_counters.h"
 #include "diagnosis/model_set.h"
 #include "diagnosis/verdict.h"
 #include "monitor/sinks.h"
@@ -56,8 +57,12 @@ class HealthBook {
   void AddStroke(const Sample& sample, std::int64_t period_ms,
                  HealthHour& hour);
 
+  void AddCounts(const Sample& sample, double period_s, HealthHour& hour);
+
   std::vector<HealthHour> hours_;
   StrokeCount stroke_;
+  loop::ValveCounters counters_;
+  std::int64_t stamp_ns_{0};
   std::uint64_t source_id_{0};
   bool by_command_{false};  // The position is CV for want of X.
 };
@@ -65,6 +70,9 @@ class HealthBook {
 /// Gathers the health of all valves.
 class HealthBooks : public ValveListener {
  public:
+  /// @param counters take the totals of all valves; outlives this.
+  explicit HealthBooks(Counters& counters) : counters_(counters) {}
+
   std::string_view name() const override { return "health"; }
   void OnVerdict(const std::string& valve_id, const Sample& sample,
                  const ValveOutcome& outcome) override;
@@ -72,6 +80,11 @@ class HealthBooks : public ValveListener {
   void TakeCheckpoint(Checkpoint& checkpoint, bool urgent) override;
 
  private:
+  void Drain(const std::string& valve_id, HealthBook& book,
+             std::vector<HealthHour>& hours);
+
+  Counters& counters_;
+  std::int64_t travel_{0};  // Not yet a whole stroke [HealthHour::kTravel].
   std::unordered_map<std::string, HealthBook> books_;
 };
 

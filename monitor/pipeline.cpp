@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "base/printable.h"
+#include "diagnosis/loop_watch.h"
 #include "diagnosis/quality_count.h"
 #include "diagnosis/records/valve_glob.h"
 #include "monitor/guard.h"
@@ -92,7 +93,9 @@ Pipeline::Pipeline(PipelineOptions options, PipelineSinks sinks,
       journal_(sinks.history, sinks.events, context, options_.journal),
       looks_(options_.second_look
                  ? std::make_unique<LookWorker>(LookReportOf(context_))
-                 : nullptr) {}
+                 : nullptr),
+      audits_(options_.loop_audit ? std::make_unique<AuditWorker>() : nullptr) {
+}
 
 Pipeline::~Pipeline() {
   try {
@@ -138,6 +141,9 @@ void Pipeline::Start(const std::vector<OpenEpisode>& open,
   journal_.Start();
   if (looks_) {
     looks_->Start();
+  }
+  if (audits_) {
+    audits_->Start();
   }
 }
 
@@ -192,6 +198,9 @@ void Pipeline::Stop() {
   });
   if (looks_) {
     errors.Try([this] { looks_->Stop(); });
+  }
+  if (audits_) {
+    errors.Try([this] { audits_->Stop(); });
   }
   errors.Try([this] { journal_.Stop(); });
   errors.Rethrow();
@@ -318,7 +327,7 @@ Pipeline::Valve& Pipeline::AddValve(std::string_view valve_id) {
                 (parts ? NameOf(parts->plan->models()) : "none"));
   auto valve = std::make_unique<Valve>(
       Valve{ValveMonitor(id, parts, options_.trace, looks_.get(),
-                         options_.severities),
+                         options_.severities, audits_.get()),
             reserved_.erase(id) > 0});
   valve->monitor.HoldIsolation(resolver_->IsolationHeld(id));
   valve->monitor.StandBy(standby_, journal_);
@@ -412,6 +421,8 @@ void Pipeline::Adopt(FaultEvent event) {
   // they would mean other faults, but an end is an end.
   if (parts && parts->plan->models().content_hash == event.model_hash) {
     event.models = parts->plan->shared_models();
+  } else if (!parts && AuditModels(event.model_hash) != nullptr) {
+    event.models = AuditModels(event.model_hash);
   } else if (event.transition.kind != TransitionKind::kClosed) {
     log_.Line(LogLevel::kInfo,
               "event_not_adopted valve=" + LogValue(event.valve_id) +
@@ -450,7 +461,7 @@ void Pipeline::StandBy(bool standby) {
   AwaitRecovery();
 }
 
-void Pipeline::Count(const Valve& valve, const Sample& sample,
+void Pipeline::Count(Valve& valve, const Sample& sample,
                      const ValveOutcome& outcome) {
   const Verdict& verdict = outcome.verdict;
   counters_.Add(outcome.models != nullptr ? Counter::kDiagnosed
@@ -468,6 +479,13 @@ void Pipeline::Count(const Valve& valve, const Sample& sample,
   const bool unjudged =
       verdict.quality == Quality::kBadInput && outcome.missing != 0;
   if (verdict.intake == Intake::kAccepted && !unjudged) {
+    const SignalMask missing = outcome.models ? outcome.missing : SignalMask{0};
+    if (std::exchange(valve.missing, missing) != missing && missing != 0) {
+      log_.Report(LogId::kPartlyJudged, "valve_partly_judged", [&] {
+        return "valve=" + LogValue(valve.monitor.id()) +
+               " missing=" + SignalNames(outcome.missing);
+      });
+    }
     return;
   }
   log_.Report(

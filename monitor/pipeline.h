@@ -18,6 +18,7 @@
 #include "monitor/counters.h"
 #include "monitor/heartbeat.h"
 #include "monitor/journal.h"
+#include "monitor/names/audit_worker.h"
 #include "monitor/names/look_worker.h"
 #include "monitor/sinks.h"
 #include "monitor/throttled_log.h"
@@ -41,6 +42,7 @@ struct PipelineOptions {
   std::chrono::milliseconds checkpoint_period{60'000};
   JournalOptions journal;
   bool second_look{true};  ///< By simulation, for model sets with physics.
+  bool loop_audit{true};   ///< Of valves without a model set.
   /// By which episodes get their severity; without bands all are medium.
   std::shared_ptr<const SeverityCatalogue> severities{
       std::make_shared<const SeverityCatalogue>()};
@@ -76,7 +78,8 @@ struct ValveCensus {
 ///     diagnosis thread: OnSample() -> engine -> decision vectors
 ///                                    |-> Journal: history thread, publisher
 ///                                    |-> ValveListener, one after the other
-///                                    \-> LookWorker, which answers later
+///                                    \-> LookWorker, AuditWorker, which
+///                                        answer later
 ///
 /// Built idle; Start() starts the threads of these parts. All calls come from
 /// the diagnosis thread, Start() and Stop() while it does not run, except where
@@ -146,7 +149,8 @@ class Pipeline {
 
   /// A thread ended with an exception, which Stop() throws.
   bool failed() const {
-    return journal_.failed() || (looks_ && looks_->failed());
+    return journal_.failed() || (looks_ && looks_->failed()) ||
+           (audits_ && audits_->failed());
   }
   ValveCensus census() const;                    ///< As of the last Poll().
   std::vector<std::string> valve_names() const;  ///< Of all valves seen.
@@ -164,6 +168,7 @@ class Pipeline {
     // Limits at the bound of their drift: two for each channel.
     std::bitset<std::size_t{2} * kMaxChannels> drift_full{};
     double drift_used{0.0};  // The largest share of a bound.
+    SignalMask missing{0};   // Of an accepted sample; said when it changes.
   };
   struct Hash {
     using is_transparent = void;
@@ -180,8 +185,7 @@ class Pipeline {
   bool IsEvictable(const Valve& valve) const;
   Valve& AddValve(std::string_view valve_id);
   bool Resolve(const std::string& valve_id, std::optional<EngineParts>& parts);
-  void Count(const Valve& valve, const Sample& sample,
-             const ValveOutcome& outcome);
+  void Count(Valve& valve, const Sample& sample, const ValveOutcome& outcome);
   void Publish(const Valve& valve, const ValveOutcome& outcome);
   void Recover(const std::vector<OpenEpisode>& episodes);
   EpisodeTracker& Recovered(const std::string& valve_id);
@@ -205,7 +209,8 @@ class Pipeline {
   Counters& counters_;
   ThrottledLog& log_;
   Journal journal_;
-  std::unique_ptr<LookWorker> looks_;  // Null: no second looks.
+  std::unique_ptr<LookWorker> looks_;    // Null: no second looks.
+  std::unique_ptr<AuditWorker> audits_;  // Null: no audits.
   std::vector<ValveListener*> listeners_;
   std::vector<std::unique_ptr<ValveListener>> owned_;  // Of listeners_.
   EnginePlans plans_;

@@ -34,6 +34,7 @@ enum class LogId : std::uint8_t {
   kMissingSignal = 116,  ///< sample_rejected reason=missing_signal
   kOverShare = 117,      ///< sample_rejected reason=over_share
   kDriftAtBound = 118,   ///< drift_at_bound
+  kPartlyJudged = 119,   ///< valve_partly_judged
   kUnsent = 121,         ///< publication_failed
   kUnpersisted = 122,    ///< event_unpersisted
   kPersistence = 123,    ///< persistence_degraded

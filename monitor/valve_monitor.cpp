@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <span>
 #include <utility>
 
 namespace fdi::monitor {
@@ -26,19 +26,20 @@ std::shared_ptr<const ModelSet> ModelsOf(
 ValveMonitor::ValveMonitor(const std::string& id,
                            const std::optional<EngineParts>& parts,
                            const TraceOptions& options, LookWorker* looks,
-                           std::shared_ptr<const SeverityCatalogue> severities)
+                           std::shared_ptr<const SeverityCatalogue> severities,
+                           AuditWorker* audits)
     : id_(id),
       models_(ModelsOf(parts)),
       required_(parts ? parts->plan->required() : 0),
       looks_(looks),
       severities_(std::move(severities)),
-      tracker_(id, options) {
+      tracker_(id, options),
+      audits_(audits),
+      judge_(id_, audits, severities_) {
   if (parts) {
     engine_.emplace(*parts);
   }
   NameEpisodes();
-  unassigned_.quality = Quality::kUnassigned;
-  unassigned_.residuals.fill(std::numeric_limits<double>::quiet_NaN());
 }
 
 void ValveMonitor::NameEpisodes() {
@@ -46,7 +47,7 @@ void ValveMonitor::NameEpisodes() {
   if (looks_ != nullptr && models_ != nullptr) {
     physics = looks_->PhysicsOf(*models_);
   }
-  names_ = models_ ? std::make_unique<EpisodeNames>(
+  names_ = engine_ ? std::make_unique<EpisodeNames>(
                          id_, models_, std::move(physics), looks_, severities_)
                    : nullptr;
 }
@@ -70,7 +71,7 @@ void ValveMonitor::Adopt(const FaultEvent& event, EpisodeOutlet& outlet) {
 bool ValveMonitor::RestartsEngine(const Sample& sample) const {
   const std::int64_t moved = sample.stamp_ns - stamp_ns_;
   const std::int64_t longest =
-      models_ ? std::llround(kStalePeriods * models_->sample_period_s * 1e9)
+      engine_ ? std::llround(kStalePeriods * models_->sample_period_s * 1e9)
               : kMaxPeriodNs;
   return sample.source_id != source_id_ || sample.epoch != epoch_ ||
          moved <= 0 || moved > longest;
@@ -109,14 +110,7 @@ ValveOutcome ValveMonitor::Step(const Sample& sample, std::uint64_t writer,
   ended_ = false;
   const bool swapped = std::exchange(swapped_, false);
   if (!engine_) {
-    writer_ = writer;
-    MeasurePeriod(sample.stamp_ns);
-    unassigned_.stamp_ns = sample.stamp_ns;
-    unassigned_.source_id = sample.source_id;
-    unassigned_.seq = sample.seq;
-    RecordPosition(sample);
-    coverage_.Add(sample.stamp_ns, Quality::kUnassigned);
-    return {unassigned_, nullptr, swapped, isolation_held_, 0, period_s()};
+    return StepLoop(sample, writer, swapped, outlet);
   }
   RestoreOnce(sample.source_id);
   if (tracker_.Outlasts()) {
@@ -155,13 +149,45 @@ ValveOutcome ValveMonitor::Step(const Sample& sample, std::uint64_t writer,
           missing, period_s(),    &engine};
 }
 
+ValveOutcome ValveMonitor::StepLoop(const Sample& sample, std::uint64_t writer,
+                                    bool swapped, EpisodeOutlet& outlet) {
+  writer_ = writer;
+  MeasurePeriod(sample.stamp_ns);
+  const Verdict& verdict = judge_.Step(sample, period_s());
+  const LoopWatch& watch = judge_.watch();
+  answer_ = &verdict;
+  swapped = swapped || models_ != watch.models();
+  models_ = watch.models();
+  if (!CountsAsTime(verdict)) {
+    return {verdict, models_.get(), swapped, isolation_held_, 0, period_s()};
+  }
+  RecordPosition(sample);
+  coverage_.Add(sample.stamp_ns, verdict.quality);
+  if (models_) {
+    tracker_.Advance(sample, verdict, *models_, outlet);
+  }
+  // The evidence of an episode is the window; then a point now and again. At
+  // all samples it would take more memory than everything else of a loop.
+  const std::span<const Transition> told = verdict.Transitions();
+  if (!told.empty() && told.front().kind == TransitionKind::kDetected) {
+    tracker_.Remember(watch.Points(), *models_);
+  }
+  if (!told.empty() || (watch.episode_open() && watch.at_point())) {
+    tracker_.Step(LoopWatch::Reduced(sample), verdict, models_, outlet);
+  }
+  if (watch.found_normal() && tracker_.recovering() == nullptr) {
+    outlet.OnNormal(id_, verdict.stamp_ns);
+  }
+  return {verdict, models_.get(), swapped, isolation_held_, 0, period_s()};
+}
+
 // The shorter one of the last two intervals: a gap is no period.
 void ValveMonitor::MeasurePeriod(std::int64_t stamp_ns) {
-  if (unassigned_.stamp_ns == 0 || stamp_ns <= unassigned_.stamp_ns) {
+  if (stamp_ns_ == 0 || stamp_ns <= stamp_ns_) {
     return;
   }
   const std::int64_t interval_ns =
-      std::clamp(stamp_ns - unassigned_.stamp_ns, kMinPeriodNs, kMaxPeriodNs);
+      std::clamp(stamp_ns - stamp_ns_, kMinPeriodNs, kMaxPeriodNs);
   unassigned_period_ns_ =
       std::min(interval_ns, unassigned_interval_ns_.value_or(interval_ns));
   unassigned_interval_ns_ = interval_ns;
@@ -211,7 +237,7 @@ void ValveMonitor::ReadDrift(std::vector<FollowedDrift>& drift) const {
 }
 
 double ValveMonitor::period_s() const {
-  return models_ ? models_->sample_period_s
+  return engine_ ? models_->sample_period_s
                  : static_cast<double>(unassigned_period_ns_) / 1e9;
 }
 
@@ -230,8 +256,9 @@ bool ValveMonitor::Adopt(const std::optional<EngineParts>& parts,
                          EpisodeOutlet& outlet) {
   std::shared_ptr<const ModelSet> models = ModelsOf(parts);
   // A hash of 0 identifies nothing: the set does not come from a store.
-  if (models == models_ || (models && models_ && models->content_hash != 0 &&
-                            models->content_hash == models_->content_hash)) {
+  if ((!models && !engine_) || (models && models == models_) ||
+      (models && models_ && models->content_hash != 0 &&
+       models->content_hash == models_->content_hash)) {
     return false;
   }
   if (parts && engine_) {
@@ -240,15 +267,17 @@ bool ValveMonitor::Adopt(const std::optional<EngineParts>& parts,
       End(*closed, outlet);
     }
   } else if (parts) {
+    Close(EndReason::kModelChanged, outlet);
     engine_.emplace(*parts);
     engine_->HoldIsolation(isolation_held_);
   } else {
     Close(EndReason::kModelChanged, outlet);
     engine_.reset();
     // The period is measured anew, beginning with that of the old set.
-    unassigned_period_ns_ = std::llround(period_s() * 1e9);
+    unassigned_period_ns_ = std::llround(models_->sample_period_s * 1e9);
     unassigned_interval_ns_.reset();
-    unassigned_.stamp_ns = 0;
+    stamp_ns_ = 0;
+    judge_ = LoopJudge(id_, audits_, severities_);
   }
   // The old set has to last until here: the end of the episode is recorded with
   // it. answer_ may point into names_, which is replaced.
@@ -307,11 +336,9 @@ void ValveMonitor::ExpireRecovery(std::int64_t now_ns, EpisodeOutlet& outlet) {
 }
 
 void ValveMonitor::Close(EndReason reason, EpisodeOutlet& outlet) {
-  if (!engine_) {
-    return;
-  }
   normal_samples_ = 0;
-  const std::optional<Transition> closed = engine_->EndEpisode(reason);
+  const std::optional<Transition> closed =
+      engine_ ? engine_->EndEpisode(reason) : judge_.End(reason);
   // It may be the verdict of names_, which still shows the episode.
   answer_ = nullptr;
   if (closed) {
@@ -320,7 +347,7 @@ void ValveMonitor::Close(EndReason reason, EpisodeOutlet& outlet) {
 }
 
 void ValveMonitor::End(const Transition& closed, EpisodeOutlet& outlet) {
-  tracker_.End(names_->End(closed), models_, outlet);
+  tracker_.End(names_ ? names_->End(closed) : closed, models_, outlet);
 }
 
 }  // namespace fdi::monitor

@@ -13,12 +13,14 @@
 #include "monitor/checkpoint.h"
 #include "monitor/episode_tracker.h"
 #include "monitor/names/episode_names.h"
+#include "monitor/names/loop_judge.h"
 #include "monitor/sinks.h"
 
 namespace fdi::monitor {
 
 /// One valve of the plant: its engine, its episodes and their names, its clock.
-/// A valve without a model set is listed, and its quality is UNASSIGNED.
+/// A valve without a model set is judged by the audit of its loop (LoopJudge),
+/// with the set of AuditModels(); until it is, its quality is UNASSIGNED.
 ///
 /// One thread at a time.
 class ValveMonitor {
@@ -29,10 +31,12 @@ class ValveMonitor {
   /// @param looks performs second looks if the model set has physics, and
   ///   outlives this; null: none.
   /// @param severities by which episodes get their priority.
+  /// @param audits of the loop without a model set; outlives this; null: none.
   ValveMonitor(const std::string& id, const std::optional<EngineParts>& parts,
                const TraceOptions& options, LookWorker* looks = nullptr,
                std::shared_ptr<const SeverityCatalogue> severities =
-                   std::make_shared<const SeverityCatalogue>());
+                   std::make_shared<const SeverityCatalogue>(),
+               AuditWorker* audits = nullptr);
 
   /// Call before the first Step().
   void Recover(const OpenEpisode& episode) { tracker_.Recover(episode); }
@@ -97,16 +101,21 @@ class ValveMonitor {
   }
 
   const std::string& id() const { return id_; }
+  /// Also that of the audit; null: nothing judges the valve.
   const ModelSet* models() const { return models_.get(); }
   /// A sample has been received.
   bool seen() const { return seen_; }
   /// The verdict on the last sample.
   const Verdict& verdict() const {
-    return answer_ ? *answer_ : engine_ ? engine_->verdict() : unassigned_;
+    return answer_   ? *answer_
+           : engine_ ? engine_->verdict()
+                     : judge_.watch().verdict();
   }
   bool stale() const { return stale_; }
   bool ended() const { return ended_; }
-  bool episode_open() const { return engine_ && engine_->episode_open(); }
+  bool episode_open() const {
+    return engine_ ? engine_->episode_open() : judge_.watch().episode_open();
+  }
   /// An episode of an earlier session or another monitor may go on here.
   bool recovering() const { return tracker_.recovering() != nullptr; }
   /// How far its limits have followed a drift, by channel of models().
@@ -116,6 +125,8 @@ class ValveMonitor {
  private:
   static constexpr double kMaxRestartTokens = 200.0;
 
+  ValveOutcome StepLoop(const Sample& sample, std::uint64_t writer,
+                        bool swapped, EpisodeOutlet& outlet);
   bool RestartsEngine(const Sample& sample) const;
   void RecordPosition(const Sample& sample);
   void MeasurePeriod(std::int64_t stamp_ns);
@@ -135,11 +146,12 @@ class ValveMonitor {
   std::unique_ptr<EpisodeNames> names_;  // Null: no model set.
   const Verdict* answer_{nullptr};       // On the last sample.
   EpisodeTracker tracker_;
-  Verdict unassigned_;
+  AuditWorker* audits_;
+  LoopJudge judge_;  // While there is no engine.
   CoverageBook coverage_;
   std::optional<Accumulator> saved_;
   std::uint64_t source_id_{0};
-  std::int64_t stamp_ns_{0};
+  std::int64_t stamp_ns_{0};  // Of the last sample in order.
   bool isolation_held_{false};
   // Normal samples since nothing was open here, up to what a valve needs to be
   // normal again.

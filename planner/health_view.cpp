@@ -62,7 +62,36 @@ Json ChannelJson(const HealthHour& hour, std::size_t c) {
       {"bins", std::move(bins)}};
 }
 
-Json HourJson(const HealthHour& hour) {
+// In full strokes.
+Json Strokes(std::int64_t travel) {
+  return SixDigits(static_cast<double>(travel) * HealthHour::kTravel /
+                   HealthHour::kFullStroke);
+}
+
+// The figures, and the status that follows from them and from what was
+// isolated.
+void AddFigures(const HealthHour& hour, const report::FaultTexts& texts,
+                Json& json) {
+  std::optional<report::NamurClass> status;
+  Json exceeded = Json::array();
+  for (std::size_t i = 0; i < loop::kFigureCount; ++i) {
+    const auto figure = static_cast<loop::Figure>(i);
+    const std::string name(loop::FigureName(figure));
+    const auto value = loop::FigureOf(figure, hour.counts, hour.seen_ms);
+    json[name] = value ? SixDigits(*value) : Json();
+    if (const auto& text = texts.Of(figure); value && text.Exceeded(*value)) {
+      exceeded.push_back(name);
+      status = std::max(status, std::optional(text.namur));
+    }
+  }
+  for (const StrengthSums& sums : hour.strengths) {
+    status = std::max(status, std::optional(texts.Of(sums.fault).namur));
+  }
+  json["exceeded"] = std::move(exceeded);
+  json["status"] = std::string(report::StatusName(status));
+}
+
+Json HourJson(const HealthHour& hour, const report::FaultTexts& texts) {
   Json channels = Json::array();
   for (std::size_t c = 0; c < hour.channels.size(); ++c) {
     channels.push_back(ChannelJson(hour, c));
@@ -83,15 +112,19 @@ Json HourJson(const HealthHour& hour) {
             {"seen_h", Hours(hour.seen_ms)},
             {"live_h", Hours(hour.live_ms)},
             {"alarm_h", Hours(hour.alarm_ms)},
+            {"auto_h", Hours(hour.counts.auto_ms)},
             {"open_h", Hours(hour.open_ms)},
             {"shut_h", Hours(hour.shut_ms)},
             {"d0", SixDigits(normal_factor * HealthHour::kShare)},
-            {"travel_strokes",
-             SixDigits(static_cast<double>(hour.travel) * HealthHour::kTravel /
-                       HealthHour::kFullStroke)},
+            {"travel_strokes", Strokes(hour.travel)},
+            {"path_strokes", Strokes(hour.counts.path)},
             {"reversals", hour.reversals},
+            {"slip_jumps", hour.counts.slips},
+            {"turns", hour.counts.turns},
+            {"steps", hour.counts.steps},
             {"channels", std::move(channels)},
             {"strengths", std::move(strengths)}};
+  AddFigures(hour, texts, json);
   if (!hour.monitor.empty()) {
     json.update({{"host", hour.host}, {"monitor", hour.monitor}});
   }
@@ -173,10 +206,11 @@ Json TrendsJson(std::span<const LimitTrend> trends) {
   return list;
 }
 
-Json HealthHoursJson(std::span<const HealthHour> hours) {
+Json HealthHoursJson(std::span<const HealthHour> hours,
+                     const report::FaultTexts& texts) {
   Json list = Json::array();
   for (const HealthHour& hour : hours) {
-    list.push_back(HourJson(hour));
+    list.push_back(HourJson(hour, texts));
   }
   return list;
 }

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "planner/health_series.h"
+#include "report/fault_texts.h"
 #include "report/json_output.h"
 
 namespace fdi::planner {
@@ -31,13 +32,18 @@ std::vector<LimitTrend> TrendsOf(std::span<const HealthHour> hours,
 report::Json TrendsJson(std::span<const LimitTrend> trends);
 
 /// Hours of one valve: [{"hour_utc", "epoch", "model_hash", "seen_h",
-/// "live_h", "alarm_h", "open_h", "shut_h", "d0", "travel_strokes",
-/// "reversals", "channels": [{"signal", "unit", "mean", "rms", "percent",
-/// "bins": [{"cv_from", "cv_to", "samples", "mean", "rms"}]}], "strengths":
+/// "live_h", "alarm_h", "auto_h", "open_h", "shut_h", "d0", "travel_strokes",
+/// "path_strokes", "reversals", "slip_jumps", "turns", "steps", "at_limit",
+/// "slip_jump", ... (loop::Figure), "exceeded": [figures beyond a limit of
+/// `texts`], "status": "good" or the gravest class in NAMUR NE 107 of these and
+/// of the faults isolated, "channels": [{"signal", "unit", "mean", "rms",
+/// "percent", "bins": [{"cv_from", "cv_to", "samples", "mean", "rms"}]}],
+/// "strengths":
 /// [{"fault", "strength", "samples"}]}]. `percent` is the mean in % of what the
 /// normal model expects. Null where nothing was judged. Hours of the plant's
 /// history also have "host" and "monitor".
-report::Json HealthHoursJson(std::span<const HealthHour> hours);
+report::Json HealthHoursJson(std::span<const HealthHour> hours,
+                             const report::FaultTexts& texts);
 
 /// Merges the hours of each day, separately for each model set and epoch.
 std::vector<HealthHour> DaysOf(std::span<const HealthHour> hours);

@@ -25,10 +25,6 @@ constexpr double kOtherReasons = 0.25;
 constexpr double kRepetition = 0.1;
 constexpr double kMaxRepetition = 2.0;
 
-double Points(Severity severity) {
-  return std::ldexp(1.0, static_cast<int>(severity));  // 1, 2, 4, 8
-}
-
 template <typename Reason>
 void SortByWeight(std::vector<Reason>& reasons, const WorkOptions& options) {
   std::ranges::stable_sort(reasons, [&](const Reason& a, const Reason& b) {
@@ -292,10 +288,16 @@ std::string RowText(const WorkRow& row) {
 
 }  // namespace
 
+double SeverityPoints(Severity severity) {
+  return std::ldexp(1.0, static_cast<int>(severity));
+}
+
+double ConfidenceOf(const FaultReason& reason) {
+  return reason.confirmed ? 1.0
+                          : std::clamp(reason.factor, 0.0, 1.0) * reason.trust;
+}
+
 double WeightOf(const FaultReason& reason, const WorkOptions& options) {
-  const double confidence =
-      reason.confirmed ? 1.0
-                       : std::clamp(reason.factor, 0.0, 1.0) * reason.trust;
   const double days =
       reason.ended_ns
           ? std::max(0.0,
@@ -307,13 +309,13 @@ double WeightOf(const FaultReason& reason, const WorkOptions& options) {
   // An end ahead of now_ns counts as now.
   const double repetition = std::min(
       kMaxRepetition, 1.0 + kRepetition * std::max(0, reason.episodes - 1));
-  return Points(reason.words.severity) * confidence *
+  return SeverityPoints(reason.words.severity) * ConfidenceOf(reason) *
          std::exp2(-days / options.half_life_days) * repetition;
 }
 
 double WeightOf(const LimitTrend& reason, const WorkOptions& options) {
   using Answer = HealthForecast::Answer;
-  const double points = Points(Severity::kHigh);
+  const double points = SeverityPoints(Severity::kHigh);
   if (reason.forecast.answer == Answer::kReached) {
     return points;
   }

@@ -76,6 +76,11 @@ struct WorkOptions {
 std::vector<WorkRow> RankWork(std::vector<ValveWork> valves,
                               const WorkOptions& options);
 
+/// S: low 1, medium 2, high 4, critical 8.
+double SeverityPoints(Severity severity);
+/// C, 0..1.
+double ConfidenceOf(const FaultReason& reason);
+
 /// S · C · U · R
 double WeightOf(const FaultReason& reason, const WorkOptions& options);
 double WeightOf(const LimitTrend& trend, const WorkOptions& options);

@@ -1,13 +1,17 @@
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
+#include "base/log.h"
 #include "storage/history/history.h"
 
 struct pg_conn;
@@ -28,6 +32,8 @@ class PlantRows {
 
   /// The statement succeeded, or waits for COPY data.
   bool good() const;
+  bool TakesData() const;
+  bool IsNull() const;
   int size() const;
   int columns() const;
   /// The column is double precision.
@@ -44,8 +50,26 @@ class PlantRows {
   std::unique_ptr<pg_result, void (*)(pg_result*)> result_;
 };
 
+/// How long to wait for a server that nobody here controls. What is over its
+/// limit, or stopped, throws PlantError, after which the connection is closed.
+struct PlantLimits {
+  /// For each host of the URL, unless its connect_timeout is shorter.
+  std::chrono::milliseconds connect{10'000};
+  std::chrono::milliseconds lock{30'000};  ///< For what others have locked.
+  /// For the answer to one statement.
+  std::chrono::milliseconds statement{120'000};
+  std::stop_token stop{};
+  /// Gets a line, plant_waits, in a wait that takes longer than kPlantPatience;
+  /// may be null.
+  LogSink log{};
+};
+inline constexpr std::chrono::milliseconds kPlantPatience{3000};
+
 /// A connection to the PostgreSQL database that holds the plant's history, in
-/// its schema `fdi`. One thread at a time.
+/// its schema `fdi`. It may lead through a pooler that gives each transaction
+/// to another session of the server (PgBouncer's pool_mode = transaction): no
+/// setting, temporary table or lock outlives a transaction. One thread at a
+/// time.
 class PlantDatabase {
  public:
   using Parameters = std::vector<std::optional<std::string>>;
@@ -54,18 +78,21 @@ class PlantDatabase {
   ///   postgresql://user@host/plant; a password is better in ~/.pgpass.
   /// @throws PlantError, also for a schema that is not there or of another
   ///   version than this program's, naming both.
-  explicit PlantDatabase(const std::string& url);
+  explicit PlantDatabase(const std::string& url, PlantLimits limits = {});
   ~PlantDatabase();
   PlantDatabase(PlantDatabase&&) noexcept;
 
   /// Makes the schema, or brings one of an earlier version to this one, and the
   /// roles fdi_writer and fdi_reader; all or nothing. Twice is once.
   /// @throws PlantError
-  static PlantDatabase Init(const std::string& url);
+  static PlantDatabase Init(const std::string& url, PlantLimits limits = {});
 
   /// Runs one statement, with parameters $1, $2, ... as text.
   /// @throws PlantError
   PlantRows Run(std::string_view sql, const Parameters& parameters = {});
+  /// Likewise, in a transaction of its own that only reads, with `fdi` in the
+  /// search path.
+  PlantRows Read(std::string_view sql, const Parameters& parameters = {});
   /// Runs several statements separated by semicolons.
   void RunScript(std::string_view sql);
   /// COPY `target` FROM STDIN (FORMAT binary) of `bytes`.
@@ -75,13 +102,27 @@ class PlantDatabase {
   const std::string& name() const { return name_; }
   /// Tells one plant from another, whatever its address.
   const std::string& plant_id() const { return plant_id_; }
+  const PlantLimits& limits() const { return limits_; }
+  void SayTo(LogSink log) { limits_.log = std::move(log); }
+  /// All statements together have to be answered by then.
+  void FinishBy(std::chrono::steady_clock::time_point end) { finish_by_ = end; }
 
  private:
+  using Clock = std::chrono::steady_clock;
   struct Unchecked {};
-  PlantDatabase(const std::string& url, Unchecked);
+  struct Wait;
+  PlantDatabase(const std::string& url, PlantLimits limits, Unchecked);
+  void Connect(const std::string& url);
   void CheckVersion();
+  Wait BeginWait(const char* what, std::chrono::milliseconds limit) const;
+  void WaitFor(Wait& wait, short events);
+  void Flush(Wait& wait);
+  PlantRows TakeResult(Wait& wait);
+  PlantRows TakeResults(Wait& wait);
   [[noreturn]] void Fail(const char* reason) const;
 
+  PlantLimits limits_;
+  std::optional<Clock::time_point> finish_by_;
   std::unique_ptr<pg_conn, void (*)(pg_conn*)> connection_;
   std::string name_;
   std::string plant_id_;
@@ -95,19 +136,23 @@ struct PlantPruned {
   std::optional<std::int64_t> to_ns;    ///< and of the newest.
 };
 
-/// Deletes episodes that ended before `before_ns`, are acknowledged and bear no
-/// label, with their events and evidence, 5000 a transaction; for the owner of
-/// the schema. @throws PlantError
+/// The last sign of life of any monitor; 0: none. @throws PlantError
+std::int64_t NewestInPlant(PlantDatabase& plant);
+/// Deletes episodes that ended, and arrived, before `before_ns`, are
+/// acknowledged and bear no label, with their events and evidence, 5000 a
+/// transaction; for the owner of the schema. @throws PlantError
 PlantPruned PrunePlantEpisodes(PlantDatabase& plant, std::int64_t before_ns,
                                bool dry_run);
 /// Deletes hours of health that ended before `before_ns`.
 PlantPruned PrunePlantHealth(PlantDatabase& plant, std::int64_t before_ns,
                              bool dry_run);
 
-/// BEGIN; rolls back unless committed.
+/// BEGIN, with the limits of the connection as settings of this transaction;
+/// rolls back unless committed.
 class PlantTransaction {
  public:
-  explicit PlantTransaction(PlantDatabase& plant);
+  enum class Kind { kWriting, kReading };
+  explicit PlantTransaction(PlantDatabase& plant, Kind kind = Kind::kWriting);
   ~PlantTransaction();
   PlantTransaction(const PlantTransaction&) = delete;
   PlantTransaction& operator=(const PlantTransaction&) = delete;

@@ -2,14 +2,20 @@
 
 #include <algorithm>
 #include <cctype>
+#include <charconv>
+#include <cmath>
 #include <cstdlib>
 #include <functional>
 #include <iterator>
+#include <map>
 #include <set>
 #include <tuple>
 #include <type_traits>
 #include <utility>
 
+#include "base/printable.h"
+#include "base/stamps.h"
+#include "base/time_units.h"
 #include "diagnosis/fault_catalogue.h"
 #include "diagnosis/records/valve_glob.h"
 #include "plant/sql.h"
@@ -21,12 +27,21 @@ namespace fdi::storage {
 namespace sql = plant_sql;
 namespace {
 
-// ---- Values from PostgreSQL's text; NULL as Statement::Read() takes it.
+// ---- Values from PostgreSQL's text; NULL as Statement::Read() takes it. The
+// schema checks what is written, but who owns it can lift its checks: a value
+// that cannot be throws DataError, and Judged() leaves out its row.
+[[noreturn]] void RefuseValue(const std::string& text, const char* what) {
+  throw DataError("'" + Printable(text) + "' is " + what);
+}
+
 void Parse(const std::optional<std::string>& text, std::string& field) {
   field = text.value_or("");
 }
 void Parse(const std::optional<std::string>& text, double& field) {
   field = text ? std::strtod(text->c_str(), nullptr) : 0.0;
+  if (!std::isfinite(field)) {
+    RefuseValue(*text, "not finite");
+  }
 }
 void Parse(const std::optional<std::string>& text,
            std::vector<std::string>& names) {
@@ -39,12 +54,20 @@ void Parse(const std::optional<std::string>& text, T& field) {
     int i = 0;
     while (EnumText<T>::name(static_cast<T>(i)) != text) {
       if (++i > static_cast<int>(EnumText<T>::last)) {
-        RefuseName(text.value_or(""));
+        RefuseValue(text.value_or(""), "unknown");
       }
     }
     field = static_cast<T>(i);
   } else {
-    field = static_cast<T>(text ? std::atoll(text->c_str()) : 0);
+    std::int64_t value = 0;  // Hashes use all bits, and the sign for the first.
+    if (text) {
+      const char* const end = text->data() + text->size();
+      const auto [stop, error] = std::from_chars(text->data(), end, value);
+      if (stop != end || error != std::errc{}) {
+        RefuseValue(*text, "no whole number of 64 bits");
+      }
+    }
+    field = static_cast<T>(value);
   }
 }
 template <typename T>
@@ -55,25 +78,52 @@ void Parse(const std::optional<std::string>& text, std::optional<T>& field) {
   }
 }
 
+// Parse() of the column `name`. A stamp has a name that ends with _ns.
+template <typename T>
+void ParseColumn(std::string_view name, const std::optional<std::string>& text,
+                 T& field) {
+  try {
+    Parse(text, field);
+    if constexpr (std::is_same_v<T, std::int64_t> ||
+                  std::is_same_v<T, std::optional<std::int64_t>>) {
+      const std::optional<std::int64_t> value = field;
+      if (name.ends_with("_ns") && value && !IsStamp(*value)) {
+        RefuseValue(*text, "outside the years 1900 to 2149");
+      }
+    }
+  } catch (const DataError& error) {
+    throw DataError(std::string(name) + " " + error.what());
+  }
+}
+
 template <typename Record>
 Record RecordAt(const PlantRows& rows, int row) {
   Record record;
   std::apply(
       [&](const auto&... field) {
         int column = 0;
-        (Parse(rows.Text(row, column++), field(record)), ...);
+        (ParseColumn(field.name, rows.Text(row, column++), field(record)), ...);
       },
       kFieldsOf<Record>);
   return record;
 }
 
-template <typename Record>
-std::vector<Record> Records(const PlantRows& rows) {
-  std::vector<Record> records;
+// What `read` makes of each row; @returns how many it refuses, by reason.
+template <typename Record, typename Read>
+std::map<std::string, std::int64_t> ReadRows(const PlantRows& rows,
+                                             std::vector<Record>& records,
+                                             const Read& read) {
+  std::map<std::string, std::int64_t> refused;
   for (int r = 0; r < rows.size(); ++r) {
-    records.push_back(RecordAt<Record>(rows, r));
+    try {
+      records.push_back(read(r));
+    } catch (const DataError& error) {
+      ++refused[error.what()];
+    } catch (const ConfigError& error) {  // An unknown name of a fault.
+      ++refused[error.what()];
+    }
   }
-  return records;
+  return refused;
 }
 
 // ---- Statements.
@@ -126,11 +176,69 @@ bool IsGlob(const std::string& valve) {
   return valve != "*" && valve.find_first_of("*?[") != std::string::npos;
 }
 
+EpisodeLook LookOf(std::uint64_t episode_id, const PlantRows& header,
+                   const PlantRows& faults, const PlantRows& simulated) {
+  EpisodeLook look;
+  look.episode_id = episode_id;
+  ParseColumn("first_ns", header.Text(0, 0), look.first_ns);
+  ParseColumn("period", header.Text(0, 1), look.period_ns);
+  ParseColumn("misfit", header.Text(0, 2), look.misfit);
+  if (look.period_ns <= 0 || look.period_ns > kNsPerDay) {
+    RefuseValue(std::to_string(look.period_ns), "no period");
+  }
+  for (int r = 0; r < faults.size(); ++r) {
+    LookFault& f = look.faults.emplace_back();
+    f.fault = RequireFault(faults.Text(r, 0).value_or(""));
+    ParseColumn("strength", faults.Text(r, 1), f.strength);
+    ParseColumn("lowest", faults.Text(r, 2), f.lowest);
+    ParseColumn("highest", faults.Text(r, 3), f.highest);
+    ParseColumn("begins_ns", faults.Text(r, 4), f.begins_ns);
+    ParseColumn("growing", faults.Text(r, 5), f.growing);
+  }
+  for (int r = 0; r < simulated.size(); ++r) {
+    ParseColumn("x_pct", simulated.Text(r, 0), look.x_pct.emplace_back());
+    ParseColumn("flow", simulated.Text(r, 1), look.flow.emplace_back());
+  }
+  return look;
+}
+
 }  // namespace
 
-PlantReader::PlantReader(const std::string& url, std::string monitor)
-    : plant_(url), monitor_(std::move(monitor)) {
-  plant_.Run("SET search_path = fdi, pg_catalog");
+template <typename Record, typename Read>
+std::vector<Record> PlantReader::Judged(const char* what, const PlantRows& rows,
+                                        const Read& read) {
+  std::vector<Record> records;
+  for (const auto& [reason, count] : ReadRows(rows, records, read)) {
+    LeaveOut(count, std::string(what) + ": " + reason);
+  }
+  return records;
+}
+
+template <typename Record>
+std::vector<Record> PlantReader::Judged(const char* what,
+                                        const PlantRows& rows) {
+  return Judged<Record>(what, rows,
+                        [&rows](int r) { return RecordAt<Record>(rows, r); });
+}
+
+PlantReader::PlantReader(const std::string& url, std::string monitor,
+                         PlantLimits limits)
+    : plant_(url, std::move(limits)), monitor_(std::move(monitor)) {}
+
+PlantReader::~PlantReader() {
+  if (const std::string note = TakeNote(); log_ && !note.empty()) {
+    log_(LogLevel::kWarning,
+         EventLine("plant_rows_left_out", {{"reason", note}}));
+  }
+}
+
+void PlantReader::SayTo(LogSink log) {
+  log_ = std::move(log);
+  plant_.SayTo(log_);
+}
+
+void PlantReader::FinishWithin(std::chrono::milliseconds time) {
+  plant_.FinishBy(std::chrono::steady_clock::now() + time);
 }
 
 // Runs `sql` with its {episodes} or {valve}, the condition of the filter.
@@ -153,7 +261,7 @@ PlantRows PlantReader::Query(std::string_view sql,
   const std::string valve = IsGlob(filter.valve_glob)
                                 ? "valve_id ~ $1"
                                 : "($1 = '*' OR valve_id = $1)";
-  return plant_.Run(
+  return plant_.Read(
       Replaced(Replaced(std::string(sql), "{episodes}", episodes), "{valve}",
                valve),
       {IsGlob(filter.valve_glob) ? RegexOf(filter.valve_glob)
@@ -166,7 +274,7 @@ PlantRows PlantReader::Query(std::string_view sql,
 PlantRows PlantReader::QueryEpisode(std::string_view sql,
                                     std::uint64_t episode_id,
                                     const char* order) {
-  return plant_.Run(
+  return plant_.Read(
       std::string(sql) + " " + std::string(sql::of_episode) + order,
       {EpisodeIdText(episode_id), monitor_});
 }
@@ -177,26 +285,51 @@ std::vector<Episode> PlantReader::List(const EpisodeFilter& filter) {
 
 std::vector<Episode> PlantReader::ListWhere(const std::string& more,
                                             const EpisodeFilter& filter) {
-  std::string list(sql::plant_list);
-  list = Replaced(list, "{limit}",
-                  filter.limit > 0 ? std::to_string(filter.limit) : "ALL");
-  const PlantRows rows =
-      Query(Replaced(list, "{episodes}", "{episodes}" + more), filter);
-  auto episodes = Records<Episode>(rows);
-  for (int r = 0; r < rows.size(); ++r) {
-    Episode& episode = episodes[static_cast<std::size_t>(r)];
-    episode.id = ParseEpisodeId(episode.episode_id).value_or(0);
-    episode.host = rows.Text(r, rows.columns() - 2).value_or("");
-    episode.monitor = rows.Text(r, rows.columns() - 1).value_or("");
+  const std::string list =
+      Replaced(std::string(sql::plant_list), "{episodes}", "{episodes}" + more);
+  // Rows that are left out count for the limit: more are asked for until there
+  // are enough good ones.
+  for (std::int64_t limit = filter.limit;; limit *= 2) {
+    const PlantRows rows = Query(
+        Replaced(list, "{limit}", limit > 0 ? std::to_string(limit) : "ALL"),
+        filter);
+    std::vector<Episode> episodes;
+    const auto refused = ReadRows(rows, episodes, [&rows](int r) {
+      auto episode = RecordAt<Episode>(rows, r);
+      const auto id = ParseEpisodeId(episode.episode_id);
+      if (!id) {
+        RefuseValue(episode.episode_id, "no episode_id");
+      }
+      episode.id = *id;
+      episode.host = rows.Text(r, rows.columns() - 2).value_or("");
+      episode.monitor = rows.Text(r, rows.columns() - 1).value_or("");
+      return episode;
+    });
+    const std::int64_t too_many = std::ssize(episodes) - filter.limit;
+    if (limit <= 0 || too_many >= 0 || rows.size() < limit) {
+      for (const auto& [reason, count] : refused) {
+        LeaveOut(count, "episode: " + reason);
+      }
+      if (limit > 0 && too_many > 0) {  // They are the oldest.
+        episodes.erase(episodes.begin(), episodes.begin() + too_many);
+      }
+      return episodes;
+    }
   }
-  return episodes;
 }
 
 Episode PlantReader::Show(std::string_view id) {
+  if (id == "last") {
+    EpisodeFilter newest;
+    newest.limit = 1;
+    const std::vector<Episode> last = List(newest);
+    if (last.empty()) {
+      throw NotFoundError("episode 'last' is not in " + plant_.name());
+    }
+    return Show(last.front().episode_id);
+  }
   const PlantRows found =
-      id == "last"
-          ? plant_.Run(sql::plant_newest, {monitor_})
-          : plant_.Run(sql::plant_by_prefix, {std::string(id), monitor_});
+      plant_.Read(sql::plant_by_prefix, {std::string(id), monitor_});
   const auto only = found.size() == 1
                         ? ParseEpisodeId(found.Text(0, 0).value_or(""))
                         : std::nullopt;
@@ -207,14 +340,18 @@ Episode PlantReader::Show(std::string_view id) {
         plant_.name());
   }
   // In the text of the statement, because it was made from the number.
-  return ListWhere(" AND e.episode_id = '" + EpisodeIdText(*only) + "'", {})
-      .at(0);
+  const std::vector<Episode> shown =
+      ListWhere(" AND e.episode_id = '" + EpisodeIdText(*only) + "'", {});
+  if (shown.empty()) {
+    throw DataError(plant_.name() + ": " + TakeNote());
+  }
+  return shown.front();
 }
 
 std::vector<HistoryEntry> PlantReader::Events(std::uint64_t episode_id) {
-  return Records<HistoryEntry>(
-      QueryEpisode(SelectSql<HistoryEntry>("FROM episode_event WHERE"),
-                   episode_id, " ORDER BY event_id"));
+  return Judged<HistoryEntry>(
+      "event", QueryEpisode(SelectSql<HistoryEntry>("FROM episode_event WHERE"),
+                            episode_id, " ORDER BY event_id"));
 }
 
 std::optional<EpisodeLook> PlantReader::Look(std::uint64_t episode_id) {
@@ -222,81 +359,90 @@ std::optional<EpisodeLook> PlantReader::Look(std::uint64_t episode_id) {
   if (header.size() == 0) {
     return std::nullopt;
   }
-  EpisodeLook look;
-  look.episode_id = episode_id;
-  Parse(header.Text(0, 0), look.first_ns);
-  Parse(header.Text(0, 1), look.period_ns);
-  Parse(header.Text(0, 2), look.misfit);
   const PlantRows rows =
       QueryEpisode(sql::plant_look_faults, episode_id, " ORDER BY rank");
-  for (int r = 0; r < rows.size(); ++r) {
-    LookFault& f = look.faults.emplace_back();
-    f.fault = RequireFault(rows.Text(r, 0).value_or(""));
-    Parse(rows.Text(r, 1), f.strength);
-    Parse(rows.Text(r, 2), f.lowest);
-    Parse(rows.Text(r, 3), f.highest);
-    Parse(rows.Text(r, 4), f.begins_ns);
-    Parse(rows.Text(r, 5), f.growing);
-  }
   const PlantRows simulated =
       QueryEpisode(sql::plant_look_rows, episode_id, " ORDER BY row");
-  for (int r = 0; r < simulated.size(); ++r) {
-    Parse(simulated.Text(r, 0), look.x_pct.emplace_back());
-    Parse(simulated.Text(r, 1), look.flow.emplace_back());
-  }
-  return look;
+  // A look with a part left out would say something else.
+  const auto looks = Judged<EpisodeLook>(
+      "second look", header,
+      [&](int /*row*/) { return LookOf(episode_id, header, rows, simulated); });
+  return looks.empty() ? std::nullopt : std::optional(looks.front());
 }
 
 std::vector<StrengthPoint> PlantReader::Strengths(std::uint64_t episode_id) {
   const PlantRows rows = QueryEpisode(sql::plant_strengths, episode_id,
                                       " ORDER BY stamp_ns, fault");
-  std::vector<StrengthPoint> points;
-  for (int r = 0; r < rows.size(); ++r) {
-    StrengthPoint& p = points.emplace_back();
+  return Judged<StrengthPoint>("strength", rows, [&](int r) {
+    StrengthPoint p;
     p.episode_id = episode_id;
     p.fault = RequireFault(rows.Text(r, 0).value_or(""));
-    Parse(rows.Text(r, 1), p.stamp_ns);
-    Parse(rows.Text(r, 2), p.strength);
-    Parse(rows.Text(r, 3), p.lowest);
-    Parse(rows.Text(r, 4), p.highest);
-    p.layer = rows.Text(r, 5) == LayerName(Layer::kPhysics) ? Layer::kPhysics
-                                                            : Layer::kObservers;
-  }
-  return points;
+    ParseColumn("stamp_ns", rows.Text(r, 1), p.stamp_ns);
+    ParseColumn("strength", rows.Text(r, 2), p.strength);
+    ParseColumn("lowest", rows.Text(r, 3), p.lowest);
+    ParseColumn("highest", rows.Text(r, 4), p.highest);
+    p.layer = ParseLayer(rows.Text(r, 5).value_or(""));
+    return p;
+  });
 }
 
 std::vector<TracePoint> PlantReader::Trace(std::uint64_t episode_id) {
   const PlantRows rows =
       QueryEpisode(sql::plant_trace, episode_id, " ORDER BY chunk");
+  const std::string name =
+      plant_.name() + ": trace of " + EpisodeIdText(episode_id);
+  const auto chunks =
+      Judged<std::vector<TracePoint>>("evidence", rows, [&](int r) {
+        TraceChunk chunk;
+        Parse(rows.Text(r, 0), chunk.samples.codec);
+        Parse(rows.Text(r, 1), chunk.samples.crc);
+        Parse(rows.Text(r, 2), chunk.samples.count);
+        chunk.samples.bytes = rows.Bytes(r, 3);
+        Parse(rows.Text(r, 4), chunk.vector_crc);
+        chunk.vectors = rows.Bytes(r, 5);
+        return DecodeTrace(chunk, name);
+      });
   std::vector<TracePoint> trace;
-  for (int r = 0; r < rows.size(); ++r) {
-    TraceChunk chunk;
-    Parse(rows.Text(r, 0), chunk.samples.codec);
-    Parse(rows.Text(r, 1), chunk.samples.crc);
-    Parse(rows.Text(r, 2), chunk.samples.count);
-    chunk.samples.bytes = rows.Bytes(r, 3);
-    Parse(rows.Text(r, 4), chunk.vector_crc);
-    chunk.vectors = rows.Bytes(r, 5);
-    auto part = DecodeTrace(
-        chunk, plant_.name() + ": trace of " + EpisodeIdText(episode_id));
-    std::ranges::move(part, std::back_inserter(trace));
+  for (const auto& chunk : chunks) {
+    trace.insert(trace.end(), chunk.begin(), chunk.end());
   }
   return trace;
 }
 
+// Rows that their sums leave out are counted by a query of their own.
+void PlantReader::CountUnsound(const char* what, std::string_view sql,
+                               std::string_view sound,
+                               const EpisodeFilter& filter) {
+  const std::int64_t rows =
+      Query(Replaced(std::string(sql), "{sound}", sound), filter).Int64(0, 0);
+  if (rows > 0) {
+    LeaveOut(rows, std::string(what) + ": a number is out of its range");
+  }
+}
+
 std::vector<EpisodeStatistics> PlantReader::Statistics(
     const EpisodeFilter& filter) {
-  return Records<EpisodeStatistics>(Query(sql::plant_statistics, filter));
+  CountUnsound("episode", sql::plant_unsound, sql::plant_sound, filter);
+  return Judged<EpisodeStatistics>(
+      "statistics", Query(Replaced(std::string(sql::plant_statistics),
+                                   "{sound}", sql::plant_sound),
+                          filter));
 }
 
 std::vector<DataGap> PlantReader::Gaps(const EpisodeFilter& filter) {
-  return Records<DataGap>(Query(
-      Replaced(std::string(sql::plant_gaps), "{columns}", ColumnsOf<DataGap>()),
-      filter));
+  return Judged<DataGap>(
+      "data gap", Query(Replaced(std::string(sql::plant_gaps), "{columns}",
+                                 ColumnsOf<DataGap>()),
+                        filter));
 }
 
 std::vector<CoverageTime> PlantReader::Coverage(const EpisodeFilter& filter) {
-  return Records<CoverageTime>(Query(sql::plant_coverage, filter));
+  CountUnsound("hours by quality", sql::plant_unsound_days,
+               sql::plant_sound_day, filter);
+  return Judged<CoverageTime>("hours by quality",
+                              Query(Replaced(std::string(sql::plant_coverage),
+                                             "{sound}", sql::plant_sound_day),
+                                    filter));
 }
 
 std::vector<Alarm> PlantReader::AlarmList(std::int64_t now_ns,
@@ -337,32 +483,36 @@ std::vector<Shelf> PlantReader::Shelves(
   const auto at = in_force_at_ns
                       ? std::optional(std::to_string(*in_force_at_ns))
                       : std::nullopt;
-  return Records<Shelf>(
-      plant_.Run(SelectSql<Shelf>(sql::plant_shelves), {at, monitor_}));
+  return Judged<Shelf>(
+      "shelf",
+      plant_.Read(SelectSql<Shelf>(sql::plant_shelves), {at, monitor_}));
 }
 
 std::vector<HealthHour> PlantReader::Health(const HealthFilter& filter) {
   const PlantRows rows =
-      plant_.Run(sql::plant_health,
-                 {filter.valve_id, std::to_string(HourFrom(filter.since_ns)),
-                  std::to_string(HourFrom(filter.until_ns)), monitor_});
-  std::vector<HealthHour> hours(static_cast<std::size_t>(rows.size()));
-  for (int r = 0; r < rows.size(); ++r) {
-    HealthHour& hour = hours[static_cast<std::size_t>(r)];
+      plant_.Read(sql::plant_health,
+                  {filter.valve_id, std::to_string(HourFrom(filter.since_ns)),
+                   std::to_string(HourFrom(filter.until_ns)), monitor_});
+  return Judged<HealthHour>("hour of health", rows, [&](int r) {
+    HealthHour hour;
     hour.valve_id = filter.valve_id;
-    Parse(rows.Text(r, 0), hour.hour);
-    Parse(rows.Text(r, 1), hour.model_hash);
-    Parse(rows.Text(r, 2), hour.epoch);
-    Parse(rows.Text(r, 3), hour.live_ms);
+    ParseColumn("hour", rows.Text(r, 0), hour.hour);
+    ParseColumn("model_hash", rows.Text(r, 1), hour.model_hash);
+    ParseColumn("epoch", rows.Text(r, 2), hour.epoch);
+    ParseColumn("live_ms", rows.Text(r, 3), hour.live_ms);
+    if (hour.hour < kFirstStampNs / kNsPerHour ||
+        hour.hour > kLastStampNs / kNsPerHour) {
+      RefuseValue(std::to_string(hour.hour), "no hour");
+    }
     UnpackHealth(rows.Bytes(r, 4), hour);
     Parse(rows.Text(r, 5), hour.host);
     Parse(rows.Text(r, 6), hour.monitor);
-  }
-  return hours;
+    return hour;
+  });
 }
 
 std::vector<std::string> PlantReader::HealthValves(const std::string& glob) {
-  const PlantRows rows = plant_.Run(sql::plant_health_valves, {RegexOf(glob)});
+  const PlantRows rows = plant_.Read(sql::plant_health_valves, {RegexOf(glob)});
   std::vector<std::string> valves;
   for (int r = 0; r < rows.size(); ++r) {
     valves.push_back(rows.Text(r, 0).value_or(""));
@@ -370,9 +520,43 @@ std::vector<std::string> PlantReader::HealthValves(const std::string& glob) {
   return valves;
 }
 
+std::vector<CommonCause> PlantReader::OpenCauses() {
+  const PlantRows rows = plant_.Read(sql::plant_open_causes);
+  std::vector<CommonCause> causes;
+  std::string last;  // Monitor and cause.
+  for (int r = 0; r < rows.size(); ++r) {
+    const std::string cause_id = rows.Text(r, 1).value_or("");
+    const std::string key = rows.Text(r, 0).value_or("") + ' ' + cause_id;
+    if (std::exchange(last, key) != key) {
+      CommonCause& cause = causes.emplace_back();
+      cause.cause_id = cause_id;
+      cause.group = rows.Text(r, 2).value_or("");
+      cause.opened_ns = rows.Int64(r, 3);
+    }
+    CauseMember& member = causes.back().members.emplace_back();
+    member.episode_id = rows.Text(r, 4).value_or("");
+    member.valve_id = rows.Text(r, 5).value_or("");
+    member.fault = rows.Text(r, 6).value_or("");
+    member.isolated_ns = rows.Int64(r, 7);
+    Parse(rows.Text(r, 8), member.ended_ns);
+  }
+  return causes;
+}
+
+std::map<std::string, std::int64_t> PlantReader::SeenValves(
+    std::int64_t since_ns) {
+  const PlantRows rows =
+      plant_.Read(sql::plant_seen, {std::to_string(since_ns / kNsPerHour)});
+  std::map<std::string, std::int64_t> seen;
+  for (int r = 0; r < rows.size(); ++r) {
+    seen[rows.Text(r, 0).value_or("")] = rows.Int64(r, 1) * kNsPerHour;
+  }
+  return seen;
+}
+
 // Each shipping sets its time.
 std::string PlantReader::Version() {
-  return plant_.Run("SELECT sum(shipped_ns) FROM monitor")
+  return plant_.Read("SELECT sum(shipped_ns) FROM monitor")
       .Text(0, 0)
       .value_or("");
 }
@@ -388,8 +572,8 @@ AlarmStatistics PlantReader::AlarmFigures(const EpisodeFilter& filter,
       Query(Replaced(std::string(sql::plant_spans), "{since}",
                      "'" + std::to_string(filter.since_ns) + "'::bigint"),
             any);
-  return ComputeAlarmStatistics(Records<AlarmSpan>(spans), filter.since_ns,
-                                filter.until_ns, now_ns);
+  return ComputeAlarmStatistics(Judged<AlarmSpan>("episode", spans),
+                                filter.since_ns, filter.until_ns, now_ns);
 }
 
 }  // namespace fdi::storage

@@ -1,13 +1,15 @@
 #pragma once
 
+#include <chrono>
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "plant/plant_database.h"
-#include "storage/history/history.h"
+#include "storage/history/foreign_history.h"
 
 namespace fdi::storage {
 
@@ -15,10 +17,17 @@ namespace fdi::storage {
 /// that several monitors have, Show(), Events(), Look(), Trace() and
 /// AlarmList() give that of the first by host and name; of an hour of a valve,
 /// Health() the one with the longest LIVE time.
-class PlantReader : public History {
+///
+/// Everybody with an account can write there, so each row is judged when it is
+/// read: one that cannot be (a stamp outside the years 1900 to 2149, an unknown
+/// unit or fault, a number that is not finite, damaged bytes) is left out and
+/// counted for TakeNote(), and all others are shown.
+class PlantReader : public ForeignHistory {
  public:
   /// @param monitor a name; empty: all. @throws PlantError as PlantDatabase.
-  explicit PlantReader(const std::string& url, std::string monitor = {});
+  explicit PlantReader(const std::string& url, std::string monitor = {},
+                       PlantLimits limits = {});
+  ~PlantReader() override;
 
   std::vector<Episode> List(const EpisodeFilter& filter) override;
   Episode Show(std::string_view id) override;
@@ -38,9 +47,22 @@ class PlantReader : public History {
       std::optional<std::int64_t> in_force_at_ns) override;
   std::vector<HealthHour> Health(const HealthFilter& filter) override;
   std::vector<std::string> HealthValves(const std::string& glob) override;
+  std::vector<CommonCause> OpenCauses() override;
   std::string Version() override;
+  void FinishWithin(std::chrono::milliseconds time) override;
+  void SayTo(LogSink log) override;
+  /// The valves that some monitor has seen since then, each with the last hour
+  /// of which anything is stored, as its beginning [ns].
+  std::map<std::string, std::int64_t> SeenValves(std::int64_t since_ns);
 
  private:
+  template <typename Record, typename Read>
+  std::vector<Record> Judged(const char* what, const PlantRows& rows,
+                             const Read& read);
+  template <typename Record>
+  std::vector<Record> Judged(const char* what, const PlantRows& rows);
+  void CountUnsound(const char* what, std::string_view sql,
+                    std::string_view sound, const EpisodeFilter& filter);
   std::vector<Episode> ListWhere(const std::string& more,
                                  const EpisodeFilter& filter);
   PlantRows Query(std::string_view sql, const EpisodeFilter& filter);
@@ -49,6 +71,7 @@ class PlantReader : public History {
 
   PlantDatabase plant_;
   std::string monitor_;
+  LogSink log_;
 };
 
 }  // namespace fdi::storage

@@ -53,6 +53,7 @@ INSERT INTO batch
 SELECT 'gap', '', gap_id FROM data_gap
 UNION ALL SELECT 'shelf', '', shelf_id FROM shelf
 UNION ALL SELECT 'session', '', session_id FROM monitor_session
+UNION ALL SELECT 'cause', cause_id, 0 FROM common_cause
 -- name: episode
 SELECT e.episode_id, e.valve_id, e.source_id, e.detected_ns, e.isolated_ns,
   e.cleared_ns, e.ended_ns, e.end_reason, e.fault, e.fault_bits, e.peak_factor,
@@ -108,11 +109,11 @@ FROM batch c CROSS JOIN health_hour h
   ON h.valve_id = c.key AND h.hour = c.part
 WHERE c.item = 'hour'
 -- name: data_gap
-SELECT g.gap_id, g.valve_id, g.from_ns, g.to_ns, g.reason, g.session_id
+SELECT g.from_ns, g.to_ns, g.reason, g.valve_id, g.gap_id, g.session_id
 FROM batch c CROSS JOIN data_gap g ON g.gap_id = c.part
 WHERE c.item = 'gap'
 -- name: shelf
-SELECT s.shelf_id, s.valve_id, s.fault, s.from_ns, s.until_ns, s.who,
+SELECT s.shelf_id, s.valve_id, s.from_ns, s.fault, s.until_ns, s.who,
   s.comment, s.origin, s.ended_ns, s.ended_by, s.ended_origin
 FROM batch c CROSS JOIN shelf s ON s.shelf_id = c.part
 WHERE c.item = 'shelf'
@@ -120,6 +121,17 @@ WHERE c.item = 'shelf'
 SELECT s.session_id, s.start_ns, s.alive_ns, s.stop_ns, s.clean, s.software
 FROM batch c CROSS JOIN monitor_session s ON s.session_id = c.part
 WHERE c.item = 'session'
+-- name: common_cause
+SELECT s.cause_id, s.group_name, s.opened_ns, s.ended_ns
+FROM batch c CROSS JOIN common_cause s ON s.cause_id = c.key
+WHERE c.item = 'cause'
+-- name: common_cause_member
+SELECT s.cause_id, s.episode_id, s.valve_id, s.fault, s.isolated_ns
+FROM batch c CROSS JOIN common_cause_member s ON s.cause_id = c.key
+WHERE c.item = 'cause'
+-- All of them, with every batch: they are few, and change with a session.
+-- name: fault_name
+SELECT fault, name FROM fault_name
 -- Episodes that went to another monitor with their valve, and when.
 -- name: moved
 SELECT key, part FROM batch WHERE item = 'moved'
@@ -168,6 +180,29 @@ INSERT INTO fdi.monitor (history_id, host, monitor) VALUES ($1, $2, $3)
 ON CONFLICT (history_id) DO UPDATE
 SET host = EXCLUDED.host, monitor = EXCLUDED.monitor
 RETURNING monitor_id
+-- What the schema accepts, by table, for the rows on their way.
+-- name: checks
+SELECT c.relname, string_agg(
+  '(' || pg_get_expr(k.conbin, k.conrelid) || ')', ' AND ')
+FROM pg_constraint k JOIN pg_class c ON c.oid = k.conrelid
+WHERE k.contype = 'c' AND k.connamespace = 'fdi'::regnamespace
+GROUP BY c.relname
+-- What is open in a plant, of which a restored history may know nothing.
+-- name: open_episodes
+SELECT episode_id FROM fdi.episode
+WHERE monitor_id = $1 AND end_reason IS NULL
+-- name: open_shelves
+SELECT shelf_id, valve_id, from_ns FROM fdi.shelf
+WHERE monitor_id = $1 AND ended_ns IS NULL AND until_ns > $2
+-- name: end_lost_shelf
+UPDATE fdi.shelf SET ended_ns = greatest($2, from_ns),
+  ended_by = 'fdi-store ship', ended_origin = 'history.db was restored'
+WHERE monitor_id = $1 AND shelf_id = $3 AND valve_id = $4 AND from_ns = $5
+-- name: end_lost_episode
+UPDATE fdi.episode SET ended_ns = greatest($2, detected_ns),
+  end_reason = 'unknown', fault = coalesce(fault, 'unknown'),
+  unconfirmed_ns = NULL
+WHERE monitor_id = $1 AND episode_id = $3
 -- name: lock_monitor
 SELECT shipped_ns FROM fdi.monitor WHERE monitor_id = $1 FOR UPDATE
 -- Nobody can acknowledge it where it was. Its stamps may be ahead of the clock.
@@ -185,16 +220,25 @@ UPDATE fdi.monitor SET shipped_ns = $2 WHERE monitor_id = $1
 SELECT count(*) FROM fdi.episode
 WHERE ended_ns IS NULL OR acked_by IS NULL OR label IS NOT NULL
   OR unconfirmed_ns IS NOT NULL
+-- name: newest_in_plant
+SELECT coalesce(max(alive_ns), 0) FROM fdi.monitor_session
+-- What arrived later than $1 is not old, whatever its publisher's clock said.
 -- name: old_in_plant
-SELECT count(*), min(detected_ns), max(detected_ns) FROM fdi.episode
+SELECT count(*), min(detected_ns), max(detected_ns) FROM fdi.episode e
 WHERE ended_ns < $1 AND acked_by IS NOT NULL AND label IS NULL
-  AND unconfirmed_ns IS NULL
+  AND unconfirmed_ns IS NULL AND NOT EXISTS (
+    SELECT FROM fdi.episode_event v
+    WHERE (v.episode_id, v.monitor_id) = (e.episode_id, e.monitor_id)
+      AND v.recorded_ns >= $1)
 -- name: prune_plant
 WITH gone AS (
   DELETE FROM fdi.episode WHERE (episode_id, monitor_id) IN (
-    SELECT episode_id, monitor_id FROM fdi.episode
+    SELECT episode_id, monitor_id FROM fdi.episode e
     WHERE ended_ns < $1 AND acked_by IS NOT NULL AND label IS NULL
       AND unconfirmed_ns IS NULL AND fdi.utc(detected_ns) <= fdi.utc($1)
+      AND NOT EXISTS (SELECT FROM fdi.episode_event v
+        WHERE (v.episode_id, v.monitor_id) = (e.episode_id, e.monitor_id)
+          AND v.recorded_ns >= $1)
     ORDER BY fdi.utc(detected_ns) LIMIT 5000)
   RETURNING episode_id AS e, monitor_id AS m),
 f AS (DELETE FROM fdi.episode_fault USING gone
@@ -230,10 +274,13 @@ SELECT * FROM (
     e.model_set, e.end_reason, e.label, e.acked_by, e.source_id, e.model_hash,
     e.detected_ns, e.isolated_ns, e.cleared_ns, e.ended_ns, e.acked_ns,
     (SELECT max(last_ns) FROM episode_trace t
-     WHERE (t.episode_id, t.monitor_id) = (e.episode_id, e.monitor_id)),
+     WHERE (t.episode_id, t.monitor_id) = (e.episode_id, e.monitor_id)
+       AND is_stamp(last_ns)),
     e.session_id, e.fault_bits, e.strength, e.unknown_kind, e.layer,
     e.flow_unit, e.channels, e.faults, e.lowest, e.highest, e.worst_strength,
-    e.priority, e.unconfirmed_ns, e.host, e.monitor
+    e.priority, e.unconfirmed_ns, plain_name(e.monitor_id, e.fault),
+    ack_comment(e.monitor_id, e.episode_id, e.acked_by, e.acked_ns), e.host,
+    e.monitor
   FROM episode e
   WHERE {episodes}
   ORDER BY utc(e.detected_ns) DESC, e.valve_id DESC LIMIT {limit}) l
@@ -250,13 +297,21 @@ SELECT e.valve_id, coalesce(e.fault, ''), count(*),
   avg((e.ended_ns - e.detected_ns) * 1e-9::float8), max(e.peak_factor),
   max(e.detected_ns)
 FROM episode e
-WHERE {episodes} GROUP BY e.valve_id, e.fault ORDER BY e.valve_id, e.fault
+WHERE {episodes} AND {sound}
+GROUP BY e.valve_id, e.fault ORDER BY e.valve_id, e.fault
+-- Beside what the checks say: the sums of this row cannot overflow.
+-- name: plant_sound
+(is_stamp(e.detected_ns) AND is_stamp(e.isolated_ns) IS NOT FALSE
+  AND is_stamp(e.ended_ns) IS NOT FALSE AND is_finite(e.peak_factor))
+-- name: plant_unsound
+SELECT count(*) FROM episode e WHERE {episodes} AND NOT {sound}
 -- The time is that of the spans, not of their detection.
 -- name: plant_spans
 SELECT e.valve_id, coalesce(e.fault, ''), e.detected_ns, e.ended_ns, e.label,
   CASE WHEN e.ended_ns IS NULL THEN (
     SELECT max(last_ns) FROM episode_trace t
-    WHERE (t.episode_id, t.monitor_id) = (e.episode_id, e.monitor_id)) END
+    WHERE (t.episode_id, t.monitor_id) = (e.episode_id, e.monitor_id)
+      AND is_stamp(last_ns)) END
 FROM episode e
 WHERE {episodes} AND (e.ended_ns IS NULL OR e.ended_ns >= {since})
 ORDER BY e.detected_ns, e.valve_id
@@ -269,14 +324,19 @@ ORDER BY from_ns, valve_id
 -- name: plant_coverage
 SELECT valve_id, quality, sum(samples)::bigint, sum(seconds) / 3600
 FROM coverage_day JOIN monitor m USING (monitor_id)
-WHERE {valve}
+WHERE {valve} AND {sound}
   AND day >= $2::bigint / 86400000000000
-  AND day * 86400000000000 < $3 AND ($4 = '' OR true)
+  AND day::numeric * 86400000000000 < $3::bigint AND ($4 = '' OR true)
   AND $5::bigint IS NOT NULL AND ($6 = '' OR m.monitor = $6)
 GROUP BY valve_id, quality ORDER BY valve_id, sum(seconds) DESC
--- name: plant_newest
-SELECT episode_id FROM episode WHERE $1 = '' OR monitor = $1
-ORDER BY utc(detected_ns) DESC LIMIT 1
+-- name: plant_sound_day
+(day BETWEEN -25567 AND 65743 AND samples BETWEEN 0 AND 1000000000000
+  AND seconds BETWEEN 0 AND 1e9)
+-- name: plant_unsound_days
+SELECT count(*) FROM coverage_day JOIN monitor m USING (monitor_id)
+WHERE {valve} AND NOT {sound} AND $2::bigint IS NOT NULL
+  AND $3::bigint IS NOT NULL AND ($4 = '' OR true) AND $5::bigint IS NOT NULL
+  AND ($6 = '' OR m.monitor = $6)
 -- name: plant_by_prefix
 SELECT DISTINCT episode_id FROM episode
 WHERE $1 <> '' AND episode_id >= lower($1) AND episode_id < lower($1) || 'g'
@@ -303,8 +363,7 @@ FROM episode_strength WHERE
 -- The columns are kFieldsOf<Shelf>; $1 when, or NULL, $2 the monitor.
 -- name: plant_shelves
 FROM shelf JOIN monitor m USING (monitor_id)
-WHERE ($1::bigint IS NULL OR until_ns > $1 AND from_ns <= $1
-       AND (ended_ns IS NULL OR ended_ns > $1))
+WHERE ($1::bigint IS NULL OR until_ns > $1 AND ended_ns IS NULL)
   AND ($2 = '' OR m.monitor = $2)
 ORDER BY from_ns, shelf_id
 -- $1 valve, $2 first hour, $3 hour behind the last, $4 monitor.
@@ -314,6 +373,17 @@ SELECT DISTINCT ON (hour, epoch, model_hash)
 FROM health_hour JOIN monitor m USING (monitor_id)
 WHERE valve_id = $1 AND hour >= $2 AND hour < $3 AND ($4 = '' OR m.monitor = $4)
 ORDER BY hour, epoch, model_hash, live_ms DESC, m.host, m.monitor
+-- Open causes with their members, of which the columns make a CauseMember.
+-- name: plant_open_causes
+SELECT c.monitor_id, c.cause_id, c.group_name, c.opened_ns, m.episode_id,
+  m.valve_id, m.fault, m.isolated_ns, e.ended_ns
+FROM common_cause c JOIN common_cause_member m USING (monitor_id, cause_id)
+  LEFT JOIN episode e USING (monitor_id, episode_id)
+WHERE c.ended_ns IS NULL
+ORDER BY c.opened_ns, c.monitor_id, c.cause_id, m.isolated_ns, m.valve_id
+-- The last hour of each valve since hour $1.
+-- name: plant_seen
+SELECT valve_id, max(hour) FROM health_hour WHERE hour >= $1 GROUP BY valve_id
 -- Skips from valve to valve along the key.
 -- name: plant_health_valves
 WITH RECURSIVE valve(id) AS (

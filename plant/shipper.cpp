@@ -29,6 +29,8 @@ struct Table {
   /// The parent whose rows this table's replace, instead of joining them.
   const char* replaced_by{nullptr};
   bool has_source{false};  ///< Has columns host and monitor.
+  /// Column of the key that may be null, by which the key has "" instead.
+  const char* nullable{nullptr};
 };
 
 // In this order: Merge() of a table with replaced_by reads the stage that the
@@ -44,9 +46,12 @@ constexpr std::array kTables = {
     Table{"episode_strength", 3, sql::episode_strength},
     Table{"coverage_day", 3, sql::coverage_day},
     Table{"health_hour", 4, sql::health_hour},
-    Table{"data_gap", 1, sql::data_gap},
-    Table{"shelf", 1, sql::shelf},
-    Table{"monitor_session", 1, sql::monitor_session},
+    Table{"data_gap", 4, sql::data_gap, nullptr, false, "valve_id"},
+    Table{"shelf", 4, sql::shelf, nullptr, false, "fault"},
+    Table{"monitor_session", 2, sql::monitor_session},
+    Table{"common_cause", 1, sql::common_cause},
+    Table{"common_cause_member", 2, sql::common_cause_member},
+    Table{"fault_name", 1, sql::fault_name},
 };
 constexpr Table kModelSets{"model_set", 2, sql::model_set};
 
@@ -144,6 +149,7 @@ struct Shipper::Cursor {
   std::int64_t shipped_ns{0};
   std::optional<std::int64_t> copied_ns;
   std::string copied_valve;
+  bool behind{false};  // The plant has got more than is noted here.
 };
 
 namespace {
@@ -175,9 +181,10 @@ void ShortenLog(Database& history) {
   }
 }
 
-PlantDatabase Connect(Database& history, const std::string& url) {
+PlantDatabase Connect(Database& history, const std::string& url,
+                      PlantLimits limits) {
   ShortenLog(history);  // All the more if PostgreSQL is away.
-  return PlantDatabase(url);
+  return PlantDatabase(url, std::move(limits));
 }
 
 }  // namespace
@@ -191,10 +198,10 @@ void StopShipping(const DataDirectory& data) {
 }
 
 Shipper::Shipper(const DataDirectory& data, const std::string& url,
-                 const ShipSource& source)
+                 const ShipSource& source, PlantLimits limits)
     : data_(data),
       history_(data.history(), HistorySchema(), Access::kOccasionalWriter),
-      plant_(Connect(history_, url)),
+      plant_(Connect(history_, url, std::move(limits))),
       source_(source) {
   {
     // A temporary table is not in the file, so it needs no lock for writing: a
@@ -202,13 +209,22 @@ Shipper::Shipper(const DataDirectory& data, const std::string& url,
     const Snapshot snapshot(history_);
     history_.Run(sql::make_batch);
   }
-  Statement id = history_.Prepare(sql::history_id);
-  id.Step();
+  // Read at once: nothing of the history is held while the plant is waited for.
+  const std::string id = [this] {
+    Statement row = history_.Prepare(sql::history_id);
+    row.Step();
+    return row.Text(0);
+  }();
+  PlantTransaction transaction(plant_);
   monitor_id_ =
-      plant_
-          .Run(sql::announce_monitor, {id.Text(0), source.host, source.monitor})
+      plant_.Run(sql::announce_monitor, {id, source.host, source.monitor})
           .Text(0, 0)
           .value();
+  const PlantRows checks = plant_.Run(sql::checks);
+  for (int r = 0; r < checks.size(); ++r) {
+    checks_[checks.Text(r, 0).value_or("")] = checks.Text(r, 1).value_or("");
+  }
+  transaction.Commit();
 }
 
 Shipped Shipper::Ship() {
@@ -223,7 +239,9 @@ Shipped Shipper::Ship() {
 // before the one noted here, although it commits first.
 Shipper::Cursor Shipper::ReadCursor(std::int64_t shipped_ns_there) {
   Statement& row = history_.Cached(sql::ship_cursor);
-  if (!row.Bind(plant_.plant_id()).Step() || row.Int64(1) > shipped_ns_there) {
+  const bool known = row.Bind(plant_.plant_id()).Step();
+  const std::int64_t shipped_ns_here = known ? row.Int64(1) : 0;
+  if (!known || shipped_ns_here > shipped_ns_there) {
     row.Reset();
     Transaction begun(history_);
     history_.Run(sql::begin_copy, plant_.plant_id(), shipped_ns_there);
@@ -231,6 +249,7 @@ Shipper::Cursor Shipper::ReadCursor(std::int64_t shipped_ns_there) {
     row.Bind(plant_.plant_id()).Step();
   }
   Cursor cursor;
+  cursor.behind = shipped_ns_here < shipped_ns_there;
   row.Read(0, cursor.number, cursor.shipped_ns, cursor.copied_ns,
            cursor.copied_valve);
   row.Reset();
@@ -241,7 +260,7 @@ Shipper::Cursor Shipper::ReadCursor(std::int64_t shipped_ns_there) {
 //
 //     copied_ns set:  episodes detected after copied_ns, then
 //                     days and hours of valves after copied_valve, then
-//                     gaps, shelves and sessions
+//                     gaps, shelves, sessions and common causes
 //     copied_ns null: changes after number
 //
 // What changes after it was copied has a number above the cursor's, which was
@@ -298,7 +317,9 @@ bool Shipper::ShipBatch(Shipped& shipped) {
     throw PlantError("PostgreSQL " + plant_.name() +
                      ": somebody deleted this monitor from fdi.monitor");
   }
-  Cursor cursor = ReadCursor(there.Int64(0, 0));
+  staged_.clear();
+  const std::int64_t shipped_there_ns = there.Int64(0, 0);
+  Cursor cursor = ReadCursor(shipped_there_ns);
   bool found = false;
   std::vector<Batch> batches;
   std::vector<std::pair<std::string, std::string>> moved;
@@ -325,15 +346,51 @@ bool Shipper::ShipBatch(Shipped& shipped) {
   }
   // It rises with every commit, even if the clock was set back: ReadCursor()
   // takes an earlier time in PostgreSQL for a loss.
-  cursor.shipped_ns = std::max(UtcNow(), there.Int64(0, 0) + 1);
+  behind_ = behind_ || (cursor.behind && shipped_there_ns != last_there_ns_);
+  // Once all is shipped: what moved away has ended as such by then.
+  if (behind_ && !found) {
+    EndLost();
+    behind_ = false;
+  }
+  cursor.shipped_ns = std::max(UtcNow(), shipped_there_ns + 1);
   plant_.Run(sql::set_shipped,
              {monitor_id_, std::to_string(cursor.shipped_ns)});
   transaction.Commit();
+  last_there_ns_ = cursor.shipped_ns;
   if (found) {
     StoreCursor(cursor);
     ++shipped.batches;
   }
   return found;
+}
+
+// The plant has got more than this history knows of: it was restored from a
+// backup, or only the note here is missing. What is open there and not here
+// nobody would ever end.
+void Shipper::EndLost() {
+  const std::string now = std::to_string(UtcNow());
+  const PlantRows episodes = plant_.Run(sql::open_episodes, {monitor_id_});
+  Statement episode =
+      history_.Prepare("SELECT 1 FROM episode WHERE episode_id = ?");
+  for (int r = 0; r < episodes.size(); ++r) {
+    const std::string id = episodes.Text(r, 0).value_or("");
+    if (!episode.Bind(id).Step()) {
+      plant_.Run(sql::end_lost_episode, {monitor_id_, now, id});
+    }
+    episode.Reset();
+  }
+  const PlantRows shelves = plant_.Run(sql::open_shelves, {monitor_id_, now});
+  Statement shelf = history_.Prepare(
+      "SELECT 1 FROM shelf WHERE shelf_id = ? AND valve_id = ? AND from_ns = "
+      "?");
+  for (int r = 0; r < shelves.size(); ++r) {
+    const std::string valve = shelves.Text(r, 1).value_or("");
+    if (!shelf.Bind(shelves.Int64(r, 0), valve, shelves.Int64(r, 2)).Step()) {
+      plant_.Run(sql::end_lost_shelf, {monitor_id_, now, shelves.Text(r, 0),
+                                       valve, shelves.Text(r, 2)});
+    }
+    shelf.Reset();
+  }
 }
 
 // There are few, which change seldom: all of them, of which none is written
@@ -345,39 +402,38 @@ void Shipper::ShipModels(Shipped& shipped) {
   Database models(data_.models(), ModelsSchema(), Access::kReader);
   Statement rows = models.Prepare(sql::model_set);
   PlantTransaction transaction(plant_);
+  staged_.clear();
   Merge(Batch(kModelSets, rows), shipped);
   transaction.Commit();
 }
 
 // A temporary table for what COPY brings, with the columns of the table that it
 // is for. Evidence stays as it is there, too: packed twice it gets no smaller.
+// It ends with the transaction: the next one may have another session.
 void Shipper::MakeStage(const Batch& batch) {
-  // LIKE copies NOT NULL, so the columns that COPY does not bring have to go. A
-  // rollback takes the stage away but not its name in staged_: after an error a
-  // Shipper is not used again.
+  // LIKE copies NOT NULL, so the columns that COPY does not bring have to go.
   const Table& table = *batch.table;
   const std::string name = table.name;
-  if (!staged_.insert(name).second) {
-    return;
-  }
-  plant_.RunScript("CREATE TEMPORARY TABLE stage_" + name + " (LIKE fdi." +
-                   name + " INCLUDING STORAGE) ON COMMIT DELETE ROWS");
+  staged_.insert(name);
   plant_.RunScript(
-      "ALTER TABLE stage_" + name + " DROP COLUMN monitor_id" +
+      "CREATE TEMPORARY TABLE stage_" + name + " (LIKE fdi." + name +
+      " INCLUDING STORAGE) ON COMMIT DROP; ALTER TABLE stage_" + name +
+      " DROP COLUMN monitor_id" +
       (table.has_source ? ", DROP COLUMN host, DROP COLUMN monitor" : ""));
 }
 
 // COPY cannot replace rows, hence the stage, and then
 //
 //     INSERT INTO fdi.TABLE AS t (columns, monitor_id)
-//     SELECT s.columns, $1 FROM stage_TABLE s
+//     SELECT s.columns, $1 FROM stage_TABLE s WHERE (checks) IS NOT FALSE
 //     ON CONFLICT (keys, monitor_id)
 //     DO UPDATE SET (others) = ROW (EXCLUDED.others)
 //     WHERE (t.others) IS DISTINCT FROM (EXCLUDED.others)
 //
 // A row that is the same already is neither written nor counted; IS DISTINCT
 // FROM, because NULL = NULL is not true. PostgreSQL refuses a statement that
-// updates a row twice: the batch names each thing once.
+// updates a row twice: the batch names each thing once. A row that the checks
+// of the schema refuse is left out: it must not stop all behind it.
 void Shipper::Merge(const Batch& batch, Shipped& shipped) {
   const Table& table = *batch.table;
   const std::string name = table.name;
@@ -399,7 +455,12 @@ void Shipper::Merge(const Batch& batch, Shipped& shipped) {
   std::string values = Listed(columns, "s.") + ", $1::bigint";
   PlantDatabase::Parameters parameters = {monitor_id_};
   const auto keys = columns.begin() + table.keys;
-  const std::string key = Listed({columns.begin(), keys}) + ", monitor_id";
+  std::string key = "monitor_id";
+  for (auto column = columns.begin(); column != keys; ++column) {
+    key += table.nullable != nullptr && *column == table.nullable
+               ? ", (coalesce(" + *column + ", ''::text))"
+               : ", " + *column;
+  }
   columns.erase(columns.begin(), keys);
   std::string all = Listed(batch.columns) + ", monitor_id";
   if (table.has_source) {
@@ -408,16 +469,24 @@ void Shipper::Merge(const Batch& batch, Shipped& shipped) {
     all += ", host, monitor";
     columns.insert(columns.end(), {"host", "monitor"});
   }
-  shipped.rows[name] +=
-      plant_
-          .Run("INSERT INTO fdi." + name + " AS t (" + all + ") SELECT " +
-                   values + " FROM " + stage + " s ON CONFLICT (" + key +
-                   ") DO UPDATE SET (" + Listed(columns) + ") = ROW (" +
-                   Listed(columns, "EXCLUDED.") + ") WHERE (" +
-                   Listed(columns, "t.") + ") IS DISTINCT FROM (" +
-                   Listed(columns, "EXCLUDED.") + ")",
-               parameters)
-          .changed();
+  const auto check = checks_.find(name);
+  const std::string sound =
+      check == checks_.end() ? "true" : "(" + check->second + ")";
+  const PlantRows counts = plant_.Run(
+      "WITH merged AS (INSERT INTO fdi." + name + " AS t (" + all +
+          ") SELECT " + values + " FROM " + stage + " s WHERE " + sound +
+          " IS NOT FALSE ON CONFLICT (" + key + ") DO UPDATE SET (" +
+          Listed(columns) + ") = ROW (" + Listed(columns, "EXCLUDED.") +
+          ") WHERE (" + Listed(columns, "t.") + ") IS DISTINCT FROM (" +
+          Listed(columns, "EXCLUDED.") +
+          ") RETURNING 1) SELECT (SELECT count(*) FROM merged), (SELECT "
+          "count(*) FROM " +
+          stage + " WHERE " + sound + " IS FALSE)",
+      parameters);
+  shipped.rows[name] += counts.Int64(0, 0);
+  if (const std::int64_t left_out = counts.Int64(0, 1); left_out > 0) {
+    shipped.left_out[name] += left_out;
+  }
 }
 
 }  // namespace fdi::storage

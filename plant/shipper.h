@@ -23,6 +23,8 @@ struct Shipped {
   std::int64_t batches{0};
   /// By table of the plant's history: rows that were new or different there.
   std::map<std::string, std::int64_t> rows;
+  /// Likewise, rows that the checks of its schema refuse.
+  std::map<std::string, std::int64_t> left_out;
 };
 
 /// Ends shipping: no change is logged any more, none is kept, and `prune` waits
@@ -41,14 +43,15 @@ void StopShipping(const DataDirectory& data);
 /// plant is, with that time. After a crash between the two commits, or a
 /// restore of history.db from a backup, rows are sent again and change nothing.
 /// If the plant's time is before the one noted here, PostgreSQL lost what it
-/// had committed, or was restored from a backup: all is copied anew. One thread
-/// at a time.
+/// had committed, or was restored from a backup: all is copied anew. If it is
+/// later, and what is open there is not here, history.db was restored: that is
+/// ended there. One thread at a time.
 class Shipper {
  public:
   /// Connects, and opens history.db beside a running monitor.
   /// @throws DataError, SqliteError, PlantError
   Shipper(const DataDirectory& data, const std::string& url,
-          const ShipSource& source);
+          const ShipSource& source, PlantLimits limits = {});
 
   /// Until nothing is left. @throws DataError, SqliteError, PlantError; what
   ///   was shipped before is there, and the next call, of a new object, goes
@@ -69,6 +72,7 @@ class Shipper {
   Cursor ReadCursor(std::int64_t shipped_ns_there);
   bool TakeItems(Cursor& cursor);
   void StoreCursor(const Cursor& cursor);
+  void EndLost();
   void MakeStage(const Batch& batch);
 
   DataDirectory data_;
@@ -76,7 +80,11 @@ class Shipper {
   PlantDatabase plant_;
   ShipSource source_;
   std::string monitor_id_;
-  std::set<std::string> staged_;  // Tables that have a stage.
+  bool behind_{false};             // The plant got more than was noted here.
+  std::int64_t last_there_ns_{0};  // The time that this object set there.
+  std::map<std::string, std::string> checks_;  // By table.
+  std::set<std::string>
+      staged_;  // Tables that have a stage in this transaction.
 };
 
 }  // namespace fdi::storage

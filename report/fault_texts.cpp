@@ -4,6 +4,7 @@
 #include <cmath>
 #include <optional>
 #include <span>
+#include <utility>
 
 #include "base/error.h"
 #include "base/suggestion.h"
@@ -15,6 +16,7 @@ namespace {
 
 constexpr std::string_view kFileName = "faults.toml";
 constexpr std::string_view kUnknown = "unknown";
+constexpr std::string_view kFigures = "figure";
 
 // Indexed by the enumerations.
 constexpr std::array<std::string_view, 4> kDisciplines{"operator", "instrument",
@@ -74,7 +76,9 @@ SeverityBands ReadBands(TomlReader& table) {
   return bands;
 }
 
-void ReadText(TomlReader& table, FaultText& text) {
+// What a fault and a figure have in common.
+template <typename Entry>
+void ReadWords(TomlReader& table, Entry& text) {
   text.name = table.Text("name").value_or(text.name);
   text.check = table.Text("check").value_or(text.check);
   if (const auto word = table.Text("discipline")) {
@@ -84,13 +88,31 @@ void ReadText(TomlReader& table, FaultText& text) {
   if (const auto word = table.Text("namur")) {
     text.namur = Choice<NamurClass>(table, "namur", *word, kNamur);
   }
+}
+
+void ReadFigure(TomlReader& table, FigureText& text) {
+  ReadWords(table, text);
+  for (auto [key, limit] : {std::pair("lowest", &text.lowest),
+                            std::pair("highest", &text.highest)}) {
+    if (const auto value = table.Number(key)) {
+      *limit = value;
+    }
+  }
+  if (text.lowest && text.highest && *text.lowest > *text.highest) {
+    table.Refuse(table.Has("lowest") ? "lowest" : "highest",
+                 "lowest is above highest");
+  }
+}
+
+void ReadText(TomlReader& table, FaultText& text) {
+  ReadWords(table, text);
   if (auto bands = ReadBands(table); !bands.empty()) {
     text.bands = std::move(bands);
   }
 }
 
 [[noreturn]] void RefuseFault(const TomlReader& file, const std::string& key) {
-  std::vector<std::string> names{std::string(kUnknown)};
+  std::vector<std::string> names{std::string(kUnknown), std::string(kFigures)};
   for (const int fault : kFaultsAndFindings) {
     names.push_back(FaultName(fault));
   }
@@ -110,6 +132,10 @@ std::string_view NamurName(NamurClass namur) {
   return kNamur[static_cast<std::size_t>(namur)];
 }
 
+std::string_view StatusName(std::optional<NamurClass> status) {
+  return status ? NamurName(*status) : "good";
+}
+
 // Requires every key for every fault; Override() then rejects unknown ones.
 FaultTexts::FaultTexts(const std::filesystem::path& path) {
   TomlReader file(path);
@@ -126,12 +152,30 @@ FaultTexts::FaultTexts(const std::filesystem::path& path) {
   for (const int fault : kFaultsAndFindings) {
     require(FaultName(fault));
   }
+  const auto figures = file.Table(kFigures);
+  for (std::size_t i = 0; i < loop::kFigureCount; ++i) {
+    const std::string name(loop::FigureName(static_cast<loop::Figure>(i)));
+    if (!figures || !figures->Has(name)) {
+      file.Refuse(kFigures, name + " is missing");
+    }
+  }
   Override(path);
 }
 
 void FaultTexts::Override(const std::filesystem::path& path) {
   TomlReader file(path);
+  if (auto figures = file.Table(kFigures)) {
+    for (std::size_t i = 0; i < loop::kFigureCount; ++i) {
+      if (auto table =
+              figures->Table(loop::FigureName(static_cast<loop::Figure>(i)))) {
+        ReadFigure(*table, figures_[i]);
+      }
+    }
+  }
   for (const std::string& key : file.Keys()) {
+    if (key == kFigures) {
+      continue;
+    }
     const auto fault = FaultOf(key);
     auto table = fault ? file.Table(key) : std::nullopt;
     if (!table) {
@@ -179,6 +223,14 @@ FaultWords FaultTexts::Words(std::string_view answer, double strength,
   return words;
 }
 
+std::map<std::string, std::string> FaultTexts::Names() const {
+  std::map<std::string, std::string> names;
+  for (const auto& [fault, text] : texts_) {
+    names[KeyOf(fault)] = text.name;
+  }
+  return names;
+}
+
 SeverityCatalogue FaultTexts::Severities() const {
   SeverityCatalogue severities;
   for (const auto& [fault, text] : texts_) {
@@ -219,7 +271,20 @@ Json FaultTextsJson(const FaultTexts& texts) {
          {"severity", bands},
          {"label", IsFault(fault)}});
   }
-  return {{"faults", rows}};
+  Json figures = Json::array();
+  for (std::size_t i = 0; i < loop::kFigureCount; ++i) {
+    const auto figure = static_cast<loop::Figure>(i);
+    const FigureText& text = texts.Of(figure);
+    figures.push_back(
+        {{"figure", std::string(loop::FigureName(figure))},
+         {"name", text.name},
+         {"check", text.check},
+         {"discipline", std::string(DisciplineName(text.discipline))},
+         {"namur", std::string(NamurName(text.namur))},
+         {"lowest", text.lowest ? Json(*text.lowest) : Json()},
+         {"highest", text.highest ? Json(*text.highest) : Json()}});
+  }
+  return {{"faults", rows}, {"figures", figures}};
 }
 
 }  // namespace fdi::report

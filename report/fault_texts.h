@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <map>
@@ -9,6 +10,7 @@
 #include <vector>
 
 #include "diagnosis/fault_catalogue.h"
+#include "diagnosis/loop/valve_counters.h"
 #include "diagnosis/severity.h"
 #include "report/global_options.h"
 #include "report/json_output.h"
@@ -32,6 +34,8 @@ enum class NamurClass : std::uint8_t {
 
 std::string_view DisciplineName(Discipline discipline);  ///< "air", ...
 std::string_view NamurName(NamurClass namur);            ///< "failure", ...
+/// The same; "good" for nothing.
+std::string_view StatusName(std::optional<NamurClass> status);
 
 /// Texts about a fault for operators and planners.
 struct FaultText {
@@ -40,6 +44,23 @@ struct FaultText {
   Discipline discipline{Discipline::kInstrument};
   NamurClass namur{NamurClass::kCheckFunction};
   SeverityBands bands;
+};
+
+/// What is counted of a valve (loop::Figure), and from where on it needs
+/// somebody.
+struct FigureText {
+  std::string name;
+  std::string check;
+  Discipline discipline{Discipline::kInstrument};
+  NamurClass namur{NamurClass::kMaintenanceRequired};
+  /// Accepted values: up to the highest, and from the lowest on. Nothing: no
+  /// limit.
+  std::optional<double> lowest;
+  std::optional<double> highest;
+
+  bool Exceeded(double value) const {
+    return (lowest && value < *lowest) || (highest && value > *highest);
+  }
 };
 
 /// A diagnosis in plain words. For faults that cannot be distinguished, the
@@ -55,8 +76,9 @@ struct FaultWords {
 
 /// The fault catalogue: a text for every fault and for faults unlike any of
 /// them. A TOML file with one table per fault, [f1]..[p2] and [unknown], and
-/// the keys name, check, discipline, namur and severity; see
-/// monitor/catalogue/faults.toml.
+/// the keys name, check, discipline, namur and severity; and one per figure,
+/// [figure.dead_band] and so on, with lowest and highest instead of severity.
+/// See monitor/catalogue/faults.toml.
 class FaultTexts {
  public:
   /// Reads the whole catalogue from `path`.
@@ -69,6 +91,9 @@ class FaultTexts {
 
   /// @param fault or finding of the catalogue; 0 means unknown.
   const FaultText& Of(int fault) const;
+  const FigureText& Of(loop::Figure figure) const {
+    return figures_[static_cast<std::size_t>(figure)];
+  }
 
   /// @param answer as in fault_history: "f19", "f3|f6", "unknown", or empty;
   ///   other names count as unknown.
@@ -78,11 +103,16 @@ class FaultTexts {
   FaultWords Words(std::string_view answer, double strength,
                    std::optional<std::int64_t> priority = {}) const;
 
+  /// The name of every fault, finding and "unknown", by what the view
+  /// fault_history calls it.
+  std::map<std::string, std::string> Names() const;
+
   /// What the monitor needs to say how bad a fault is.
   SeverityCatalogue Severities() const;
 
  private:
   std::map<int, FaultText> texts_;  // [0]: unknown
+  std::array<FigureText, loop::kFigureCount> figures_;
 };
 
 /// The catalogue installed with the programs, overridden by DATA/faults.toml if
@@ -90,8 +120,10 @@ class FaultTexts {
 FaultTexts LoadFaultTexts(const GlobalOptions& options);
 
 /// {"faults": [{"fault", "name", "check", "discipline", "namur", "severity":
-/// [{"from", "level"}], "label"}]}, unknown last. An episode can be labelled
-/// with a fault, and not with a finding, which does not tell the cause.
+/// [{"from", "level"}], "label"}], "figures": [{"figure", "name", "check",
+/// "discipline", "namur", "lowest", "highest"}]}, unknown last. An episode can
+/// be labelled with a fault, and not with a finding, which does not tell the
+/// cause.
 Json FaultTextsJson(const FaultTexts& texts);
 
 }  // namespace fdi::report

@@ -18,6 +18,7 @@
 #include <CLI/CLI.hpp>
 
 #include "base/error.h"
+#include "base/passing_error.h"
 #include "base/printable.h"
 #include "base/suggestion.h"
 #include "report/help.h"
@@ -169,6 +170,7 @@ Program::Program(std::string name, std::string description)
   MapError<NotFoundError>(kExitNotFound);
   MapError<std::invalid_argument>(kExitUsage);
   MapError<fdi::ConfigError>(kExitUsage);
+  MapError<PassingError>(kExitPassing);
   AddGlobalOptions(*app_, options_);
   // For tests; hidden from --help.
   app_->add_flag_callback(
@@ -288,6 +290,7 @@ int Program::ParseAndRun(int argc, const char* const* argv) {
   } catch (const ExampleCheckRequest&) {
     return ReportExamples();
   } catch (const CLI::Success& request) {
+    RefuseUnknownVerb();
     return app_->exit(request);  // Prints --help or --version.
   } catch (const CLI::ConfigError& error) {
     const auto* option = app_->get_config_ptr();
@@ -299,6 +302,18 @@ int Program::ParseAndRun(int argc, const char* const* argv) {
                            " (see " + app_->get_name() + " --help)");
   }
   return RunVerb(argc, argv);
+}
+
+// CLI11 answers --help before it looks at the words that it could not place.
+void Program::RefuseUnknownVerb() const {
+  const CLI::App& chosen = Chosen(*app_);
+  const std::vector<std::string> left = app_->remaining(true);
+  if (!VerbNames(chosen).empty() && !left.empty() &&
+      !left.front().starts_with('-')) {
+    throw fdi::ConfigError(
+        RemovedWord().value_or(Unexpected(chosen, left.front())) + " (see " +
+        app_->get_name() + " --help)");
+  }
 }
 
 int Program::ReportExamples() {

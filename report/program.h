@@ -21,7 +21,7 @@ class App;
 
 namespace fdi::report {
 
-/// Exit codes of every program.
+/// Exit codes of every program; see also kExitPassing in passing_error.h.
 enum ExitCode : int {
   kExitOk = 0,
   kExitFailure = 1,
@@ -137,6 +137,7 @@ class Program {
   int Print(const Report& report) const;
   /// Of the first word among those left over that was removed or left out.
   std::optional<std::string> RemovedWord() const;
+  void RefuseUnknownVerb() const;
   void PrintError(const std::string& message) const;
 
   std::unique_ptr<CLI::App> app_;

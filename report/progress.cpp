@@ -13,8 +13,24 @@ namespace fdi::report {
 namespace {
 
 constexpr int kBarWidth = 30;
+// Before that an estimate of the time left jumps about.
+constexpr auto kFirstEstimate = std::chrono::seconds(5);
 // Frequent enough to look alive, and cheap compared to the work.
 constexpr auto kRedraw = std::chrono::milliseconds(100);
+
+// "about 3 min left, ", from the time that the work so far has taken.
+std::string TimeLeft(std::chrono::steady_clock::duration elapsed,
+                     double fraction) {
+  if (elapsed < kFirstEstimate || fraction < 0.01 || fraction >= 1.0) {
+    return {};
+  }
+  const double left_s = std::chrono::duration<double>(elapsed).count() *
+                        (1.0 - fraction) / fraction;
+  return "about " +
+         FormatDuration(static_cast<std::int64_t>(std::ceil(left_s)) *
+                        1'000'000'000) +
+         " left, ";
+}
 
 }  // namespace
 
@@ -40,7 +56,7 @@ void Progress::Update(double fraction, const std::string& note) {
     const auto now = std::chrono::steady_clock::now();
     if (now - last_draw_ >= kRedraw) {
       last_draw_ = now;
-      Draw(share, note);
+      Draw(share, TimeLeft(now - start_, share) + note);
     }
     return;
   }

@@ -121,12 +121,18 @@ table{border-collapse:collapse;font-variant-numeric:tabular-nums;font-size:12px}
 th,td{padding:2px 7px;border-bottom:1px solid #ddd;text-align:left;white-space:nowrap}
 th{font-weight:600}
 .number{text-align:right}
+td{vertical-align:top}td.wrap{white-space:normal;min-width:5em}
+.checks{list-style:"\2610\00a0\00a0";padding-left:1.5em}.checks li{margin:.5em 0}
+.blanks td{min-width:34em;height:2.2em;border-bottom:1px solid #767676}.blanks th{vertical-align:bottom}
 dl{display:grid;grid-template-columns:max-content 1fr;gap:0 1em;font-size:12px}
 dt{font-weight:600}dd{margin:0}
 .quiet{color:#767676}
 .good{background:#cce3f0}.warning{background:#fae7bf}.alarm{background:#f6d0bb;font-weight:600}
 svg{max-width:100%;height:auto;font-family:"DejaVu Sans",Verdana,sans-serif}
-@media (prefers-color-scheme:dark){body{background:#161616;color:#ddd}a{color:#56b4e9}th,td{border-color:#333}.quiet{color:#8c8c8c}.good{background:#123a52}.warning{background:#4d3a10}.alarm{background:#5c2a10}}
+@media screen and (prefers-color-scheme:dark){body{background:#161616;color:#ddd}a{color:#56b4e9}th,td{border-color:#333}.quiet{color:#8c8c8c}.good{background:#123a52}.warning{background:#4d3a10}.alarm{background:#5c2a10}}
+@media print{:root{color-scheme:light}body{margin:0;padding:0;max-width:none;font-size:10pt;print-color-adjust:exact;-webkit-print-color-adjust:exact}
+table,dl{font-size:8pt}th,td{white-space:normal;padding:2px 5px}td.wrap{min-width:0}.scroll{overflow:visible}
+h1,h2,h3{break-after:avoid}tr,li,svg,dl{break-inside:avoid}.checks{break-before:avoid}svg{max-height:230mm}h2{margin-top:1.2em}.blanks td{width:100%;min-width:0}.blanks th{white-space:nowrap}a{color:inherit;text-decoration:none}}
 )";
 
 std::string HtmlText(std::string_view text) {
@@ -161,9 +167,9 @@ const char* ToneName(Tone tone) {
 }  // namespace
 
 Report& Report::Table(std::string key, std::vector<Column> columns,
-                      std::string if_empty) {
-  views_.emplace_back(
-      TableView{std::move(key), std::move(columns), std::move(if_empty)});
+                      std::string if_empty, std::size_t widest) {
+  views_.emplace_back(TableView{std::move(key), std::move(columns),
+                                std::move(if_empty), widest});
   return *this;
 }
 
@@ -185,6 +191,16 @@ Report& Report::Heading(std::string text) {
 Report& Report::Picture(std::string id, std::string title, std::string svg) {
   views_.emplace_back(
       PictureView{std::move(id), std::move(title), std::move(svg)});
+  return *this;
+}
+
+Report& Report::Checks(std::vector<std::string> texts) {
+  views_.emplace_back(ChecksView{std::move(texts)});
+  return *this;
+}
+
+Report& Report::Blanks(std::vector<std::string> names) {
+  views_.emplace_back(BlanksView{std::move(names)});
   return *this;
 }
 
@@ -214,7 +230,8 @@ class Report::TextPrinter {
     }
     std::vector<TextTable::Column> columns;
     for (const Column& column : view.columns) {
-      columns.push_back({column.heading, AlignOf(rows, column), column.spare});
+      columns.push_back({column.heading, AlignOf(rows, column), column.spare,
+                         column.least_width});
     }
     TextTable table(std::move(columns));
     for (const Json& row : rows) {
@@ -229,7 +246,11 @@ class Report::TextPrinter {
         }
       }
     }
-    table.Print(out_, style_.text);
+    TextStyle style = style_.text;
+    if (style.width == 0) {
+      style.width = view.widest;
+    }
+    table.Print(out_, style);
   }
 
   void operator()(const FieldsView& view) const {
@@ -252,6 +273,16 @@ class Report::TextPrinter {
     out_ << '\n' << Printable(heading.text) << '\n';
   }
   void operator()(const PictureView&) const {}
+  void operator()(const ChecksView& checks) const {
+    for (const std::string& text : checks.texts) {
+      out_ << "[ ] " << Printable(text) << '\n';
+    }
+  }
+  void operator()(const BlanksView& blanks) const {
+    for (const std::string& name : blanks.names) {
+      out_ << Printable(name) << ": ____________________\n";
+    }
+  }
 
  private:
   const Json& document_;
@@ -315,6 +346,20 @@ class Report::HtmlPrinter {
          << HtmlText(picture.title) << "</h3>\n<div class=\"scroll\">"
          << picture.svg << "</div>\n";
   }
+  void operator()(const ChecksView& checks) const {
+    out_ << "<ul class=\"checks\">\n";
+    for (const std::string& text : checks.texts) {
+      out_ << "<li>" << HtmlText(text) << "</li>\n";
+    }
+    out_ << "</ul>\n";
+  }
+  void operator()(const BlanksView& blanks) const {
+    out_ << "<table class=\"blanks\">\n";
+    for (const std::string& name : blanks.names) {
+      out_ << "<tr><th>" << HtmlText(name) << "</th><td></td></tr>\n";
+    }
+    out_ << "</table>\n";
+  }
 
  private:
   // The attribute, where there is something to say.
@@ -328,7 +373,8 @@ class Report::HtmlPrinter {
     const Tone tone = column.tone ? column.tone(row) : Tone::kPlain;
     const std::string text = HtmlText(RawText(row, column, utc_));
     const std::string id = column.picture ? column.picture(row) : "";
-    out_ << "<td" << ClassOf(kind, ToneName(tone)) << '>'
+    out_ << "<td" << ClassOf(column.wraps ? "wrap" : kind, ToneName(tone))
+         << '>'
          << (id.empty() ? text
                         : "<a href=\"#" + HtmlText(id) + "\">" + text + "</a>")
          << "</td>";
@@ -359,17 +405,18 @@ void Report::PrintText(std::ostream& out, const ReportStyle& style) const {
 }
 
 void Report::PrintHtml(std::ostream& out, const std::string& title,
-                       bool utc) const {
+                       const PageStyle& style) const {
   const std::string heading = HtmlText(title);
   out << "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n"
          "<meta charset=\"utf-8\">\n"
          "<meta name=\"viewport\" content=\"width=device-width\">\n"
          "<meta name=\"color-scheme\" content=\"light dark\">\n<title>"
       << heading << "</title>\n<style>\n"
-      << kPageStyle << "</style>\n</head>\n<body>\n<h1>" << heading
+      << kPageStyle << "@page{size:A4" << (style.landscape ? " landscape" : "")
+      << ";margin:12mm}\n</style>\n</head>\n<body>\n<h1>" << heading
       << "</h1>\n";
   for (const View& view : views_) {
-    std::visit(HtmlPrinter(document, out, utc), view);
+    std::visit(HtmlPrinter(document, out, style.utc), view);
   }
   out << "</body>\n</html>\n";
 }

@@ -36,6 +36,8 @@ struct Column {
   /// If a table is wider than the terminal, columns above 0 are omitted, the
   /// highest first.
   int spare{0};
+  /// If a table is too wide, cells may be cut to this width; 0: never.
+  std::size_t least_width{0};
   /// Makes the text from the whole row, where one member does not suffice.
   std::function<std::string(const Json& row)> text{};
   std::function<Tone(const Json& row)> tone{};
@@ -46,6 +48,14 @@ struct Column {
   std::string meaning{};
   /// The id of the picture that HTML links the cell to; empty: none.
   std::function<std::string(const Json& row)> picture{};
+  /// Text of several words, which HTML breaks into lines.
+  bool wraps{false};
+};
+
+/// How a page is laid out.
+struct PageStyle {
+  bool utc{false};        ///< Times in UTC instead of the local zone.
+  bool landscape{false};  ///< On A4 paper; upright otherwise.
 };
 
 /// How a Report is rendered.
@@ -72,9 +82,10 @@ class Report {
   /// Shows the array at `key`, a member of the document or a path "a/b", as a
   /// table. A row is an object. `if_empty` is printed if there is no row.
   /// Of an object {"f3": {...}, ...} each member is a row, its name the row's
-  /// member "name".
+  /// member "name". Beside a terminal, which says how wide it is, the text is
+  /// no wider than `widest`; 0: unlimited.
   Report& Table(std::string key, std::vector<Column> columns,
-                std::string if_empty = "");
+                std::string if_empty = "", std::size_t widest = 0);
   /// Shows members of the object at `key` ("" is the document) as aligned
   /// lines "heading:  value".
   Report& Fields(std::string key, std::vector<Column> fields);
@@ -84,6 +95,10 @@ class Report {
   Report& Heading(std::string text);
   /// An SVG element below its title, in HTML only. `id` is what cells link to.
   Report& Picture(std::string id, std::string title, std::string svg);
+  /// Boxes to tick, each with a sentence.
+  Report& Checks(std::vector<std::string> texts);
+  /// Lines to fill in by hand, each behind its name.
+  Report& Blanks(std::vector<std::string> names);
   /// What --csv prints, if not the first table: the members `keys` of the rows
   /// at `key`.
   Report& Csv(std::string key, std::vector<std::string> keys);
@@ -91,9 +106,10 @@ class Report {
   /// The text output, in the order in which parts were added.
   void PrintText(std::ostream& out, const ReportStyle& style) const;
   /// The same parts as a page that needs no script and no other file, readable
-  /// on a light and a dark screen; all columns, whatever their `spare`.
+  /// on a light and a dark screen and on paper; all columns, whatever their
+  /// `spare`.
   void PrintHtml(std::ostream& out, const std::string& title,
-                 bool utc = false) const;
+                 const PageStyle& style = {}) const;
   /// The document.
   void PrintJson(std::ostream& out) const;
   /// One table as WriteCsvLine() writes it: keys as header, raw values.
@@ -105,6 +121,7 @@ class Report {
     std::string key;
     std::vector<Column> columns;
     std::string if_empty;
+    std::size_t widest{0};
   };
   struct FieldsView {
     std::string key;
@@ -121,8 +138,14 @@ class Report {
     std::string title;
     std::string svg;
   };
-  using View =
-      std::variant<TableView, FieldsView, LineView, HeadingView, PictureView>;
+  struct ChecksView {
+    std::vector<std::string> texts;
+  };
+  struct BlanksView {
+    std::vector<std::string> names;
+  };
+  using View = std::variant<TableView, FieldsView, LineView, HeadingView,
+                            PictureView, ChecksView, BlanksView>;
   class TextPrinter;
   class HtmlPrinter;
 

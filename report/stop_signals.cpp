@@ -5,12 +5,14 @@
 #include <cerrno>
 #include <csignal>
 #include <cstdint>
+#include <cstring>
 #include <stdexcept>
 #include <system_error>
 
 #include <fcntl.h>
 #include <poll.h>
 #include <sys/eventfd.h>
+#include <sys/time.h>
 #include <unistd.h>
 
 namespace fdi::report {
@@ -24,6 +26,8 @@ std::atomic<bool> g_stop{false};
 std::atomic<bool> g_reload{false};
 std::atomic<bool> g_reloads{false};  // What SIGHUP means.
 std::atomic<bool> g_installed{false};
+std::atomic<std::int64_t> g_patience_ms{0};  // 0: any.
+std::atomic<const char*> g_last_words{""};
 std::array<struct sigaction, kSignals.size()> g_previous;
 static_assert(std::atomic<bool>::is_always_lock_free);
 
@@ -66,12 +70,27 @@ void Wake() noexcept {
   errno = saved_errno;
 }
 
+extern "C" void FdiOnAlarm(int /*signal*/) {
+  const char* words = g_last_words;
+  [[maybe_unused]] const auto written = write(2, words, std::strlen(words));
+  _exit(1);
+}
+
+// With 0, none is set any more. A plain system call in Linux.
+void SetAlarm(std::int64_t after_ms) noexcept {
+  const itimerval timer{{0, 0}, {after_ms / 1000, after_ms % 1000 * 1000}};
+  setitimer(ITIMER_REAL, &timer, nullptr);
+}
+
 extern "C" void FdiOnSignal(int signal) {
   if (signal == SIGHUP) {
     // Kernel and shell may both send it when a terminal is closed.
     (g_reloads ? g_reload : g_stop) = true;
   } else if (g_stop.exchange(true)) {
     _exit(1);  // The orderly stop hangs; exit() is unsafe here.
+  }
+  if (g_stop && g_patience_ms > 0) {
+    SetAlarm(g_patience_ms);
   }
   Wake();
 }
@@ -108,11 +127,27 @@ StopSignals::StopSignals(HangUp hang_up) {
 }
 
 StopSignals::~StopSignals() {
+  EndWithin(std::chrono::milliseconds(0));
   for (std::size_t i = 0; i < kSignals.size(); ++i) {
     sigaction(kSignals[i], &g_previous[i], nullptr);
   }
   close(g_event.exchange(-1));
   g_installed = false;
+}
+
+void StopSignals::EndWithin(std::chrono::milliseconds patience,
+                            const char* last_words) {
+  g_last_words = last_words;
+  g_patience_ms = patience.count();
+  struct sigaction action {};
+  action.sa_flags = SA_RESTART;
+  sigemptyset(&action.sa_mask);
+  action.sa_handler = patience.count() > 0 ? &FdiOnAlarm : SIG_DFL;
+  SetAlarm(0);
+  sigaction(SIGALRM, &action, nullptr);
+  if (g_stop && patience.count() > 0) {
+    SetAlarm(patience.count());
+  }
 }
 
 bool StopSignals::stop_requested() const noexcept {

@@ -22,6 +22,13 @@ class StopSignals {
   StopSignals(const StopSignals&) = delete;
   StopSignals& operator=(const StopSignals&) = delete;
 
+  /// From a stop request on, the process has `patience`, and then ends at once
+  /// with `last_words` on stderr (exit code 1): for work that loses nothing by
+  /// that and looks seldom whether to stop. Zero: as long as it takes.
+  /// @param last_words has to live as long as this object
+  void EndWithin(std::chrono::milliseconds patience,
+                 const char* last_words = "");
+
   /// Cheap; thread safe.
   bool stop_requested() const noexcept;
   /// Waits for a signal. Returns kStop from the first stop on, and kReload once

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 #include <numeric>
+#include <utility>
 
 #include "base/error.h"
 
@@ -69,6 +70,17 @@ std::vector<std::size_t> TextTable::Widths() const {
   return widths;
 }
 
+// Of columns whose cells may be cut, the least.
+std::vector<std::size_t> TextTable::Least(
+    std::vector<std::size_t> widths) const {
+  for (std::size_t c = 0; c < columns_.size(); ++c) {
+    if (columns_[c].least_width > 0) {
+      widths[c] = std::min(widths[c], columns_[c].least_width);
+    }
+  }
+  return widths;
+}
+
 // The columns that remain, in order: while the table is too wide, the one with
 // the highest `spare` is dropped, of equal ones the leftmost. Columns with 0
 // always remain.
@@ -95,15 +107,30 @@ std::vector<std::size_t> TextTable::Shown(
 }
 
 void TextTable::Print(std::ostream& out, const TextStyle& style) const {
-  const std::vector<std::size_t> widths = Widths();
-  const std::vector<std::size_t> shown = Shown(widths, style.width);
+  std::vector<std::size_t> widths = Widths();
+  std::vector<std::size_t> shown(columns_.size());
+  std::iota(shown.begin(), shown.end(), 0);
+  if (style.width > 0) {
+    const std::vector<std::size_t> whole = std::exchange(widths, Least(widths));
+    shown = Shown(widths, style.width);
+    std::size_t needed = kGap * (shown.size() - 1);
+    for (const std::size_t c : shown) {
+      needed += widths[c];
+    }
+    for (const std::size_t c : shown) {
+      const std::size_t room = style.width - std::min(needed, style.width);
+      const std::size_t more = std::min(whole[c] - widths[c], room);
+      widths[c] += more;
+      needed += more;
+    }
+  }
   const auto print = [&](const auto& cell_of, const auto& code_of) {
     for (const std::size_t c : shown) {
       const bool last = c == shown.back();
       // No trailing blanks: they could wrap on a terminal.
       const bool bare = last && columns_[c].align == Align::kLeft;
-      const std::string text =
-          Padded(cell_of(c), bare ? 0 : widths[c], columns_[c].align);
+      const std::string text = Padded(Shortened(cell_of(c), widths[c]),
+                                      bare ? 0 : widths[c], columns_[c].align);
       out << Toned(text, code_of(c), style.colour)
           << (last ? "\n" : std::string(kGap, ' '));
     }
@@ -131,6 +158,20 @@ void TextTable::Print(std::ostream& out, const TextStyle& style) const {
 std::size_t TextWidth(const std::string& text) {
   return static_cast<std::size_t>(std::count_if(
       text.begin(), text.end(), [](char c) { return (c & '\xC0') != '\x80'; }));
+}
+
+std::string Shortened(const std::string& text, std::size_t width) {
+  if (TextWidth(text) <= width) {
+    return text;
+  }
+  std::size_t end = 0;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    if ((text[i] & '\xC0') != '\x80' && width-- == 1) {
+      end = i;
+      break;
+    }
+  }
+  return text.substr(0, end) + "…";
 }
 
 std::string FormatNumber(double value, int decimals) {

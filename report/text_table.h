@@ -32,6 +32,8 @@ class TextTable {
     /// If the table is too wide, columns above 0 are omitted, the highest
     /// first.
     int spare{0};
+    /// If the table is too wide, cells may be cut to this width; 0: never.
+    std::size_t least_width{0};
   };
 
   explicit TextTable(std::vector<Column> columns);
@@ -51,6 +53,7 @@ class TextTable {
     std::vector<Tone> tones;
   };
   std::vector<std::size_t> Widths() const;
+  std::vector<std::size_t> Least(std::vector<std::size_t> widths) const;
   std::vector<std::size_t> Shown(const std::vector<std::size_t>& widths,
                                  std::size_t width) const;
 
@@ -60,6 +63,9 @@ class TextTable {
 
 /// Code points of UTF-8 text, each taken as one cell of the terminal.
 std::size_t TextWidth(const std::string& text);
+
+/// `text` if it fits, or its beginning and an ellipsis. @param width > 0
+std::string Shortened(const std::string& text, std::size_t width);
 
 /// `value` with `decimals`; "-" if it is not finite.
 std::string FormatNumber(double value, int decimals);

@@ -35,6 +35,10 @@ struct RecordDrive {
 double DelayedCommand(const std::vector<RecordRow>& record, std::size_t k,
                       int delay);
 
+/// Seconds that a row is simulated for. A valve settles within ten: longer ones
+/// change nothing at their ends but what the simulation costs.
+double SimulatedPeriod(double period_s);
+
 /// Response of the simulated valve in one row.
 struct RecordAnswer {
   double x_pct;

@@ -5,6 +5,9 @@
 #include <cmath>
 #include <numbers>
 #include <span>
+#include <string>
+
+#include "base/error.h"
 
 namespace fdi::simulator {
 double WaterDensity(double temperature_c) {
@@ -37,14 +40,26 @@ double FlowFromUnit(FlowUnit unit, double flow, double density_kg_m3) {
 
 void FlowConversion::Apply(Sample& sample) {
   if (sample.Has(Signal::kT1)) {
-    temperature_c_ = sample[Signal::kT1];
+    to_.t1_degc = sample[Signal::kT1];
   }
-  if (sample.flow_unit != to_) {
-    const double density = LiquidDensity(temperature_c_);
+  if (sample.Has(Signal::kP1)) {
+    to_.p1_kpa = sample[Signal::kP1];
+  }
+  if (sample.flow_unit != to_.unit) {
+    if (to_.medium.is_gas() && to_.p1_kpa <= 0.0) {
+      throw DataError(
+          "F is in " + std::string(FlowUnitName(sample.flow_unit)) +
+          ", the valve's in " + std::string(FlowUnitName(to_.unit)) +
+          ": m3/h of a gas become t/h by its density, which needs P1 (kPa "
+          "absolute) in the record. If they are m3/h at standard conditions, "
+          "map them as Nm3/h");
+    }
+    const double density =
+        MediumAt(to_.medium, 1e3 * to_.p1_kpa, 0.0, to_.t1_degc).density_kg_m3;
     double& flow = sample.values[Index(Signal::kF)];
-    flow =
-        FlowInUnit(to_, FlowFromUnit(sample.flow_unit, flow, density), density);
-    sample.flow_unit = to_;
+    flow = FlowInUnit(to_.unit, FlowFromUnit(sample.flow_unit, flow, density),
+                      density);
+    sample.flow_unit = to_.unit;
   }
 }
 
@@ -174,6 +189,13 @@ double CriticalPressureRatio(double inlet_pressure_pa) {
   constexpr std::array<double, 7> kRatio{0.94, 0.87,  0.84, 0.79,
                                          0.75, 0.725, 0.685};
   return Interpolate(kPressure, kRatio, inlet_pressure_pa);
+}
+
+double MolarMass(const Medium& medium) {
+  constexpr double kWaterKgKmol = 18.015;
+  return medium.fluid == Fluid::kGas     ? medium.molar_mass_kg_kmol
+         : medium.fluid == Fluid::kSteam ? kWaterKgKmol
+                                         : 0.0;
 }
 
 double VapourPressure(const Medium& medium, double temperature_c) {

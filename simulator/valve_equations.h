@@ -19,16 +19,25 @@ double WaterDensity(double temperature_c);
 /// not change the liquid's density.
 double LiquidDensity(double temperature_c);
 
-/// Converts the flow of successive samples to a unit, with LiquidDensity() at
-/// the last known T1, initially 20 degC.
+/// The unit that a valve's flow is wanted in, and what decides its density.
+struct FlowTarget {
+  FlowUnit unit{FlowUnit::kM3PerHour};
+  Medium medium{};
+  double p1_kpa{0.0};    ///< Usual P1; 0: not known.
+  double t1_degc{20.0};  ///< Usual T1.
+};
+
+/// Converts the flow of successive samples to a unit, m3/h being those at the
+/// inlet, by the density of the medium at the last known P1 and T1, initially
+/// the usual ones.
 class FlowConversion {
  public:
-  explicit FlowConversion(FlowUnit to) : to_(to) {}
+  explicit FlowConversion(const FlowTarget& to) : to_(to) {}
+  /// @throws DataError if a gas has to be converted whose P1 is not known.
   void Apply(Sample& sample);
 
  private:
-  FlowUnit to_;
-  double temperature_c_{20.0};
+  FlowTarget to_;  // With the last known P1 and T1.
 };
 
 /// Vapour pressure of water Pv = 10^(-2141/(T + 273.15) + 10.7167) [Pa], the
@@ -56,6 +65,9 @@ double RecoveryCoefficient(const Trim& trim, double closing);
 double BypassRecoveryCoefficient(double closing);
 /// Critical pressure ratio rc(P1) of the benchmark's table.
 double CriticalPressureRatio(double inlet_pressure_pa);
+
+/// M of the medium [kg/kmol]; 0 for liquids.
+double MolarMass(const Medium& medium);
 
 /// Vapour pressure of the medium [Pa]; 0 for gases.
 double VapourPressure(const Medium& medium, double temperature_c);

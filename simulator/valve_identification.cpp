@@ -195,9 +195,6 @@ struct LineSums {
 // Kv f(X) of a row [m3/h]; 0 if not usable.
 double EffectiveKv(const RecordRow& row, const ValveParameters& valve) {
   const Instrumentation& i = valve.instruments;
-  if (!row.x_measured || !row.flow_measured) {
-    return 0.0;
-  }
   // A saturated transmitter gives only a bound of the flow.
   const double margin = 0.01 * (i.flow.high - i.flow.low);
   if (row.flow < i.flow.low + margin || row.flow > i.flow.high - margin) {
@@ -209,6 +206,10 @@ double EffectiveKv(const RecordRow& row, const ValveParameters& valve) {
   return CapacityFor(FlowFromUnit(i.flow_unit, row.flow, medium.density_kg_m3),
                      valve.trim, medium, 0.01 * row.x_pct);
 }
+
+// About the middle of its travel a linear trim has the slope of an exponent of
+// 2, one of equal percentage and large rangeability that of 5.
+constexpr double kExponentFactor = 8.0;
 
 // The unknowns of `nominal` with its air relay, best determined first: Kv and
 // exponent (only with flow), coefficients of the air relay, filter time of the
@@ -229,8 +230,8 @@ std::vector<ValveUnknown> UnknownsOf(const ValveParameters& nominal,
         1e-5, 1e6);
     if (nominal.trim.characteristic == FlowCharacteristic::kExponential) {
       add(
-          "trim.exponent", [](V& v) -> double& { return v.trim.exponent; }, 2.0,
-          0.1, 20.0);
+          "trim.exponent", [](V& v) -> double& { return v.trim.exponent; },
+          kExponentFactor, 0.1, 20.0);
     }
   }
   if (nominal.positioner.relay == AirRelay::kOrifice) {
@@ -325,6 +326,17 @@ ValveParameters WithUnknowns(ValveParameters parameters,
   return parameters;
 }
 
+// A valve without a position transmitter has its command in the place of X.
+bool HasPosition(const std::vector<HealthyRecord>& records) {
+  return std::ranges::any_of(records, [](const HealthyRecord& record) {
+    return std::ranges::any_of(record.rows, &RecordRow::x_measured);
+  });
+}
+
+bool IsUsable(const RecordRow& row, bool has_position) {
+  return row.flow_measured && (row.x_measured || !has_position);
+}
+
 // Beyond it, the shut-off part of the trim may begin.
 double ShuttingOff(const Trim& trim) {
   return std::min(0.97, trim.shut_off);
@@ -335,6 +347,7 @@ double ShuttingOff(const Trim& trim) {
 double SizeOf(const std::vector<HealthyRecord>& records,
               const ValveParameters& valve) {
   constexpr std::size_t kMinRows = 30;
+  const bool has_position = HasPosition(records);
   std::vector<double> ratios;
   for (const HealthyRecord& record : records) {
     for (const RecordRow& row : record.rows) {
@@ -343,8 +356,8 @@ double SizeOf(const std::vector<HealthyRecord>& records,
           valve, {},
           {0.01 * in.cv_pct, 1e3 * in.p1_kpa, 1e3 * in.p2_kpa, in.t1_degc},
           0.01 * row.x_pct, 0.0);
-      if (row.x_measured && row.flow_measured && row.flow > 0.0 &&
-          expected > 0.0 && row.x_pct < 100.0 * ShuttingOff(valve.trim)) {
+      if (IsUsable(row, has_position) && row.flow > 0.0 && expected > 0.0 &&
+          row.x_pct < 100.0 * ShuttingOff(valve.trim)) {
         ratios.push_back(row.flow / expected);
       }
     }
@@ -388,9 +401,11 @@ Trim RegressTrim(const std::vector<HealthyRecord>& records,
   //
   // For a characteristic without n, y = ln(Kv f) - ln f(X) and n = 0.
   LineSums sums;
+  const bool has_position = HasPosition(records);
   for (const HealthyRecord& record : records) {
     for (const RecordRow& row : record.rows) {
-      const double kv = EffectiveKv(row, nominal);
+      const double kv =
+          IsUsable(row, has_position) ? EffectiveKv(row, nominal) : 0.0;
       const double x = 0.01 * row.x_pct;
       if (kv > 0.0 && x < ShuttingOff(trim)) {
         const double shape = exponential ? 0.0 : std::log(Opening(trim, x));
@@ -408,7 +423,8 @@ Trim RegressTrim(const std::vector<HealthyRecord>& records,
   if (exponential && x_variance > kMinSpread * kMinSpread) {
     const double n =
         -(sums.xy / sums.w - x_mean * sums.y / sums.w) / x_variance;
-    trim.exponent = std::clamp(n, 0.5 * trim.exponent, 2.0 * trim.exponent);
+    trim.exponent = std::clamp(n, trim.exponent / kExponentFactor,
+                               kExponentFactor * trim.exponent);
   }
   const double slope = exponential ? trim.exponent : 0.0;
   trim.kv_m3_h = std::exp(sums.y / sums.w + slope * x_mean);
@@ -671,7 +687,8 @@ RobustFit Identification::Fit(const Hypothesis& hypothesis,
                      options);
 }
 
-// Fits each briefly to the liveliest segment, and compares X on all of them.
+// Fits each briefly to the liveliest segment, and compares X on all of them; F
+// where there is no X.
 Hypothesis Identification::Best(std::vector<Hypothesis> hypotheses) const {
   constexpr int kIterations = 4;
   std::vector<ValveCandidate> candidates;
@@ -683,10 +700,11 @@ Hypothesis Identification::Best(std::vector<Hypothesis> hypotheses) const {
       Simulate(candidates, segments_, kCoarse, options_.threads);
   std::size_t best = 0;
   double least = std::numeric_limits<double>::infinity();
+  const bool by_flow = !HasPosition(records_);
   for (std::size_t i = 0; i < motions.size(); ++i) {
     const double loss =
         Residuals(candidates[i].parameters, motions[i], segments_,
-                  static_cast<std::size_t>(options_.settle_rows), false)
+                  static_cast<std::size_t>(options_.settle_rows), by_flow)
             .norm();
     // A lag of the valve resembles a delay of part of a sample, and so does
     // friction.

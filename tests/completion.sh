@@ -37,11 +37,19 @@ expect 'list label' fdi-store history l
 expect 'list' "$bin/fdi-store" history lis
 expect '--domain' fdi-monitor run --dom
 expect '--model-set' fdi-monitor run --model
+expect '--plant' fdi-trainer onboard --pl
+expect '--plant' fdi-store valves add --pl
 expect 'udp' fdi-monitor --transport u
 expect 'paper' fdi-trainer train --preset p
 expect 'shm' fdi-monitor --transport = s
 expect 'lossless' fdi-monitor run --record l
 expect 'f19' fdi-store history list --fault f19
+expect 'rtn_unack' fdi-store history list --state r
+expect 'unacked unack' fdi-store history ack --all --state un
+expect 'lublin-actuator-3 lublin-actuator-3-refit' \
+  fdi-simulator run --parameters lub
+expect 'level-loop' fdi-simulator run --excitation le
+expect 'true t1' fdi-store history label last t
 expect 'f19:' fdi-simulator run --fault f19
 expect 'incipient@' fdi-simulator run --fault f19 : inc
 expect 'abrupt@ incipient@' fdi-simulator run --fault f19 :

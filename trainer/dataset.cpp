@@ -9,6 +9,7 @@
 #include <string>
 
 #include "base/error.h"
+#include "base/usual_period.h"
 #include "diagnosis/fault_catalogue.h"
 
 namespace fdi::trainer {
@@ -260,7 +261,8 @@ void RequireAlike(const std::vector<TrainingRun>& runs) {
   const TrainingRun& first = runs.front();
   const SignalMask signals = first.samples.front().sample.present;
   for (const TrainingRun& run : runs) {
-    if (run.period_s != first.period_s) {
+    // Recordings of earlier versions have the first step, with its jitter.
+    if (UsualPeriod(run.period_s) != UsualPeriod(first.period_s)) {
       throw DataError("run " + run.id + " has a sample period of " +
                       std::to_string(run.period_s) + " s, run " + first.id +
                       " of " + std::to_string(first.period_s) + " s");

@@ -101,10 +101,13 @@ void IndexFault(const std::vector<Indication>& all, Zone zone,
 }  // namespace
 
 std::vector<int> FaultsIn(const ModelSet& models, FaultSet set) {
+  const bool named = (set & ~FindingsOf(models)) != 0;
   std::vector<int> faults;
   for (std::size_t i = 0; i < models.faults.size(); ++i) {
-    if ((set >> i & 1U) != 0 && IsFault(models.faults[i])) {
-      faults.push_back(models.faults[i]);
+    const int fault = models.faults[i];
+    if ((set >> i & 1U) != 0 &&
+        (IsFault(fault) || (named && fault == kLowFlow))) {
+      faults.push_back(fault);
     }
   }
   return faults;

@@ -55,7 +55,8 @@ struct RunIndices {
 RunIndices ComputeIndices(const std::vector<Indication>& indications,
                           double horizon_s = 0.0);
 
-/// The numbers of the faults in `set`, ascending.
+/// The numbers of the faults in `set`, ascending. Findings of the floor are not
+/// scored, but for a loss of flow that stands beside a fault as another answer.
 std::vector<int> FaultsIn(const ModelSet& models, FaultSet set);
 
 /// Called for every sample with what the engine said about it.

@@ -109,6 +109,17 @@ void FitRod(const std::vector<Stretch>& stretches, FloorLimits& floor) {
   floor.slow.rate *= kSlower;
 }
 
+// Nothing shows how the rod moves: at once, or as slowly as a rod of any valve,
+// 1 %/s and a sixth of the way in a second.
+void AssumeRod(double period_s, FloorLimits& floor) {
+  floor.delay = 0;
+  floor.quick = {1.0, kRates.back()};
+  floor.slow = {1.0 - std::pow(1.0 - kShares.front(), period_s),
+                kSlower * kRates.front() * period_s};
+  floor.deviation = kMinFloorDeviation;
+  floor.stuck_travel = kMinStuckTravel;
+}
+
 // The largest value that `values` stay at or above for `length` in a row: a
 // limit from there on is never exceeded for so long.
 double Sustained(const std::vector<double>& values, int length) {
@@ -155,6 +166,11 @@ void FitDeviation(const std::vector<Stretch>& stretches, FloorLimits& floor) {
   floor.stuck_travel = std::max(kMinStuckTravel, kFloorMargin * repeated);
 }
 
+// In the place of X where that is not measured.
+Signal Position(const Sample& sample) {
+  return sample.Has(Signal::kX) ? Signal::kX : Signal::kCv;
+}
+
 bool HasDp(const Sample& sample) {
   return sample.Has(Signal::kP1) && sample.Has(Signal::kP2);
 }
@@ -190,8 +206,12 @@ void FitLevels(const std::vector<Stretch>& stretches, FloorLimits& floor) {
 // out. Where X hardly moves, the slope is noise, and the exponent stays at its
 // default. With the f of a trim, y is ln(F/(f √dP)) and n is 0.
 //
+// Without X, the straight line is that of CV, and the factor takes the most
+// open position that the rod may have, as Floor does.
+//
 // The factor solves the test F > c F(X − L/2, dP) + m F_high of Floor for the
-// largest c that the record reached for flow_samples in a row.
+// largest c that the record reached for flow_samples in a row; the share in the
+// test F < s LeastFlowAt(X, dP) − m F_high is found likewise.
 void FitFlow(const std::vector<Stretch>& stretches, FloorLimits& floor) {
   FitLevels(stretches, floor);
   const bool shaped = !floor.flow_shape.empty();
@@ -204,15 +224,15 @@ void FitFlow(const std::vector<Stretch>& stretches, FloorLimits& floor) {
     for (const Sample& sample : stretch.samples) {
       const double flow = sample[Signal::kF];
       const double dp = DpOf(sample, floor);
-      const double shape =
-          shaped ? FlowShapeAt(floor, sample[Signal::kX]) : 1.0;
+      const double at = sample[Position(sample)];
+      const double shape = shaped ? FlowShapeAt(floor, at) : 1.0;
       if (flow <= floor.flow_margin * floor.flow_high ||
           flow >= kMaxFlowShare * floor.flow_high || dp <= 0.0 ||
           shape <= 0.0) {
         continue;
       }
       const double weight = flow * flow;
-      const double x = 0.01 * sample[Signal::kX];
+      const double x = 0.01 * at;
       const double y = std::log(flow / std::sqrt(dp)) - std::log(shape);
       w += weight;
       wx += weight * x;
@@ -232,19 +252,32 @@ void FitFlow(const std::vector<Stretch>& stretches, FloorLimits& floor) {
         std::clamp(-(wxy / w - wx / w * (wy / w)) / variance, 1.0, 8.0);
   }
   floor.flow_gain = std::exp(wy / w + floor.flow_exponent * wx / w);
+  double too_little = floor.flow_factor;  // its inverse is the share
   for (const Stretch& stretch : stretches) {
     std::vector<double> ratios;
+    RodBand rod(floor);
+    rod.Restart(stretch.samples.front()[Signal::kCv]);
+    std::vector<double> shortfalls;
     for (const Sample& sample : stretch.samples) {
+      rod.Step(sample[Signal::kCv]);
+      const bool has_x = sample.Has(Signal::kX);
+      const double x = has_x ? sample[Signal::kX] : rod.most_open();
+      const double least_open = has_x ? x : rod.least_open();
       const double least =
-          FlowAt(floor, sample[Signal::kX] - 0.5 * floor.deviation,
-                 DpOf(sample, floor));
+          FlowAt(floor, x - 0.5 * floor.deviation, DpOf(sample, floor));
       const double flow =
           sample[Signal::kF] - floor.flow_margin * floor.flow_high;
       ratios.push_back(least > 0.0 ? flow / least : 0.0);
+      shortfalls.push_back(LeastFlowAt(floor, least_open, DpOf(sample, floor)) /
+                           (std::max(sample[Signal::kF], 0.0) +
+                            floor.flow_margin * floor.flow_high));
     }
+    too_little = std::max(
+        too_little, kFlowMargin * Sustained(shortfalls, floor.flow_samples));
     floor.flow_factor = std::max(
         floor.flow_factor, kFlowMargin * Sustained(ratios, floor.flow_samples));
   }
+  floor.flow_share = 1.0 / too_little;
 }
 
 }  // namespace
@@ -253,7 +286,8 @@ std::optional<FloorLimits> FitFloor(const Condition& normal, double period_s,
                                     std::vector<double> flow_shape) {
   const std::vector<Stretch> stretches = WholeStretches(normal);
   const Sample& first = stretches.front().samples.front();
-  if (!first.Has(Signal::kCv) || !first.Has(Signal::kX)) {
+  const bool has_x = first.Has(Signal::kX);
+  if (!first.Has(Signal::kCv) || !(has_x || first.Has(Signal::kF))) {
     return std::nullopt;
   }
   // FitDeviation() runs the rod that FitRod() has found, FitFlow() allows for
@@ -264,8 +298,12 @@ std::optional<FloorLimits> FitFloor(const Condition& normal, double period_s,
   };
   floor.deviation_samples = samples(kDeviationS);
   floor.flow_samples = samples(kFlowS);
-  FitRod(stretches, floor);
-  FitDeviation(stretches, floor);
+  if (has_x) {
+    FitRod(stretches, floor);
+    FitDeviation(stretches, floor);
+  } else {
+    AssumeRod(period_s, floor);
+  }
   if (first.Has(Signal::kF)) {
     floor.flow_shape = std::move(flow_shape);
     FitFlow(stretches, floor);
@@ -274,6 +312,9 @@ std::optional<FloorLimits> FitFloor(const Condition& normal, double period_s,
 }
 
 void WidenFloor(const std::vector<Stretch>& normal, FloorLimits& floor) {
+  if (normal.empty() || !normal.front().samples.front().Has(Signal::kX)) {
+    return;
+  }
   FloorLimits shown = floor;
   FitDeviation(normal, shown);
   floor.deviation = std::max(floor.deviation, shown.deviation);

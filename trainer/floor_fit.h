@@ -13,7 +13,7 @@ namespace fdi::trainer {
 /// of twice what they err by on these very data, within fixed bounds.
 ///
 /// @param flow_shape that of FloorLimits; the gain alone is fitted then.
-/// @return Nothing without CV and X.
+/// @return Nothing without CV and one of X, F.
 std::optional<FloorLimits> FitFloor(const Condition& normal, double period_s,
                                     std::vector<double> flow_shape = {});
 

@@ -32,12 +32,30 @@ ChannelObserver FitObserver(const ChannelPlan& plan,
                           adapted.outputs, least);
 }
 
+// A signal that is not there reads 0, to which any model can be fitted.
+void RequireOutputs(const std::vector<TrainingRun>& runs,
+                    const std::vector<ChannelPlan>& channels) {
+  for (const TrainingRun& run : runs) {
+    for (const ChannelPlan& plan : channels) {
+      if (!run.samples.empty() &&
+          !run.samples.front().sample.Has(plan.output)) {
+        throw DataError(
+            "run " + run.id + " has no " +
+            std::string(SignalName(plan.output)) + ", which the channel " +
+            plan.name +
+            " predicts: fdi-trainer onboard takes what a valve measures");
+      }
+    }
+  }
+}
+
 }  // namespace
 
 ModelSet TrainModelSet(const std::vector<TrainingRun>& runs,
                        const TrainingOptions& options,
                        const Progress& progress) {
   Require(!options.channels.empty(), "a model set needs a channel");
+  RequireOutputs(runs, options.channels);
   Reporter reporter(progress);
   const std::vector<Condition> conditions =
       BuildConditions(runs, options.dataset);

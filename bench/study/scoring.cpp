@@ -52,10 +52,13 @@ ModelSet LoadModels(const ScoringOptions& options,
 report::Report LeftOut(const ScoringOptions& options,
                        const report::Context& context) {
   const ModelSet models = LoadModels(options, context);
-  return LeaveOneOut(models,
-                     LoadScoredRuns(options.selection, RequiredSignals(models),
-                                    models.flow_unit, context),
-                     {options.assume_normal});
+  return LeaveOneOut(
+      models,
+      LoadScoredRuns(
+          options.selection, RequiredSignals(models),
+          EngineDetector(std::make_shared<const ModelSet>(models)).flow,
+          context),
+      {options.assume_normal});
 }
 
 report::Report Seeds(const ScoringOptions& options,
@@ -69,7 +72,7 @@ report::Report Seeds(const ScoringOptions& options,
 report::Report Score(const ScoringOptions& options,
                      const report::Context& context, const Detector& detector) {
   const auto runs = LoadScoredRuns(options.selection, detector.required,
-                                   detector.flow_unit, context);
+                                   detector.flow, context);
   if (!options.verdicts.empty() && runs.size() != options.verdicts.size()) {
     throw ConfigError(std::to_string(options.verdicts.size()) +
                       " files of verdicts for " + std::to_string(runs.size()) +

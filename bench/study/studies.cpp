@@ -264,7 +264,9 @@ SeedStudy RepeatWithSeeds(const Detector& detector,
     storage::StoredRun simulated =
         SimulateRun(std::get<SimulatedRun>(run.source));
     ConvertFlow(simulated,
-                detector.flow_unit.value_or(simulated.info.run.flow_unit), {});
+                detector.flow.value_or(
+                    simulator::FlowTarget{simulated.info.run.flow_unit}),
+                {});
     results[s][r] =
         Evaluate(detector, {std::move(simulated), RunLabel(run), run.horizon_s,
                             static_cast<std::size_t>(i)});

@@ -179,7 +179,7 @@ Detector FittedBaseline(Baseline baseline, FlowUnit flow_unit) {
   Detector detector;
   detector.name = baseline.name;
   detector.required = kBasicSignals;
-  detector.flow_unit = flow_unit;
+  detector.flow = simulator::FlowTarget{flow_unit};
   detector.follow = [baseline = std::move(baseline)](const ScoredRun& run,
                                                      const VerdictSink&) {
     return FollowBaseline(baseline, run.run);

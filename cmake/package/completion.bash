@@ -55,7 +55,7 @@ _fdi_entry() {
 # The candidates for a value: _fdi_candidates NAME ENTRY
 _fdi_candidates() {
   local value=${2%%  *} words
-  words=$(grep -oE '[a-z0-9-]+(\|[a-z0-9-]+)+' <<<"$2" | head -1)
+  words=$(grep -oE '[a-z0-9_-]+(\|[a-z0-9_-]+)+' <<<"$2" | head -1)
   case "$1 $value" in
     *SPEC* | fault\ *) _fdi_faults ;;
     valve\ * | valves\ *)
@@ -72,6 +72,10 @@ _fdi_candidates() {
       _fdi_listed episode_id history list --limit 100
       ;;
     type\ *) _fdi_listed name types list ;;
+    label\ *)
+      printf '%s\n' true false
+      _fdi_faults
+      ;;
     *) [[ ! $words ]] || tr '|' '\n' <<<"$words" ;;
   esac
 }
@@ -86,6 +90,8 @@ _fdi_value() {
   if [[ ${how[*]} ]]; then
     compopt -o filenames
     mapfile -t COMPREPLY < <(compgen "${how[@]}" -- "$word")
+    [[ $value != *\|* ]] ||
+      _fdi_offer "$word" < <(_fdi_candidates "$name" "$entry")
     return
   fi
   if [[ $value == *SPEC* ]]; then

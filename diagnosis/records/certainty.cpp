@@ -31,7 +31,7 @@ Certainty CertaintyOf(std::string_view faults, Layer layer, double factor,
     return Certainty::kOneOf;
   }
   const std::optional<int> fault = ParseFinding(faults);
-  const bool cause = fault && IsFault(*fault);
+  const bool cause = fault && (IsFault(*fault) || IsLoopFinding(*fault));
   const double least = layer == Layer::kPhysics ? kAgreeingFactor : kSureFactor;
   return cause && factor >= least ? Certainty::kSure : Certainty::kLikely;
 }

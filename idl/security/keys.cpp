@@ -22,6 +22,7 @@
 #include <unistd.h>
 
 #include "base/error.h"
+#include "base/passing_error.h"
 #include "base/time_units.h"
 #include "diagnosis/records/partitions.h"
 
@@ -122,6 +123,10 @@ std::string TextOf(BIO* bio) {
 std::string Read(const fs::path& file) {
   std::ifstream stream(file, std::ios::binary);
   if (!stream) {
+    if (MayPass(errno)) {
+      throw PassingError(file.string() + ": cannot be read (" +
+                         std::generic_category().message(errno) + ")");
+    }
     Refuse(file, std::string("cannot be read (") +
                      std::generic_category().message(errno) +
                      "); expected a file that fdi-store keys has made");
@@ -133,11 +138,10 @@ std::string Read(const fs::path& file) {
 }
 
 // Creates the file with its final mode, so it is never open to others. It gets
-// its name once it is complete, and replaces none.
+// its name once it is complete, and replaces none, also none that somebody else
+// makes meanwhile. What cannot get its name is removed: it may be a private
+// key.
 void Write(const fs::path& file, std::string_view text, mode_t mode) {
-  if (fs::exists(file)) {
-    throw DataError(file.string() + ": exists");
-  }
   const fs::path fresh = file.string() + ".new";
   fs::remove(fresh);  // An interrupted call may have left it.
   const int handle =
@@ -146,13 +150,21 @@ void Write(const fs::path& file, std::string_view text, mode_t mode) {
                        write(handle, text.data(), text.size()) ==
                            static_cast<ssize_t>(text.size()) &&
                        fsync(handle) == 0 &&
-                       rename(fresh.c_str(), file.c_str()) == 0;
-  const std::string reason = std::generic_category().message(errno);
+                       renameat2(AT_FDCWD, fresh.c_str(), AT_FDCWD,
+                                 file.c_str(), RENAME_NOREPLACE) == 0;
+  const int reason = errno;
   if (handle >= 0) {
     close(handle);
+    if (!written) {
+      unlink(fresh.c_str());
+    }
   }
   if (!written) {
-    throw DataError(file.string() + ": cannot be written: " + reason);
+    throw DataError(file.string() +
+                    (reason == EEXIST
+                         ? ": exists"
+                         : ": cannot be written: " +
+                               std::generic_category().message(reason)));
   }
 }
 
@@ -670,9 +682,9 @@ KeyInfo CheckKey(const fs::path& folder, std::int64_t now_ns) {
            "expired at " + UtcText(info.until_ns / kNsPerSecond) + "Z" + renew);
   }
   if (now_ns < info.from_ns) {
-    Refuse(folder / kCertificate,
-           "is valid from " + UtcText(info.from_ns / kNsPerSecond) +
-               "Z on; is the clock of this machine right?");
+    throw PassingError((folder / kCertificate).string() + ": is valid from " +
+                       UtcText(info.from_ns / kNsPerSecond) +
+                       "Z on; is the clock of this machine right?");
   }
   return info;
 }

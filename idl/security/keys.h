@@ -74,7 +74,7 @@ std::vector<KeyInfo> ListKeys(const std::filesystem::path& folder);
 /// Checks the five files of one key at `now_ns` (UTC).
 /// @throws ConfigError naming the file, the defect and the remedy: missing,
 ///   open to others, expired, not signed by the authority, modified, or of
-///   another key.
+///   another key. @throws PassingError if it is not valid yet.
 KeyInfo CheckKey(const std::filesystem::path& folder, std::int64_t now_ns);
 
 }  // namespace fdi::idl

@@ -60,50 +60,60 @@ std::string LoadToken(const std::filesystem::path& path) {
 
 bool FailureLimit::Allows(const std::string& origin, Clock::time_point now) {
   const bool known = failing_.contains(origin);
-  return (!known && failing_.size() < kMaxOrigins) ||
-         AllowanceOf(origin, now).attempts >= 1.0;
+  const bool room =
+      failing_.size() < kMaxOrigins || when_full_ == WhenFull::kReplaceOldest;
+  return (!known && room) || AllowanceOf(origin, now).attempts >= 1.0;
 }
 
 void FailureLimit::Add(const std::string& origin, Clock::time_point now) {
   AllowanceOf(origin, now).attempts -= 1.0;
 }
 
-// Once the table is full, all further origins share one allowance.
+double FailureLimit::Refilled(const Allowance& allowance,
+                              Clock::time_point now) {
+  const std::chrono::duration<double> passed = now - allowance.stamp;
+  return std::min(allowance.attempts + passed.count(), kAttempts);
+}
+
+void FailureLimit::MakeRoom(Clock::time_point now) {
+  std::erase_if(failing_, [now](const auto& entry) {
+    return Refilled(entry.second, now) >= kAttempts;
+  });
+  if (failing_.size() >= kMaxOrigins &&
+      when_full_ == WhenFull::kReplaceOldest) {
+    failing_.erase(std::min_element(failing_.begin(), failing_.end(),
+                                    [](const auto& a, const auto& b) {
+                                      return a.second.stamp < b.second.stamp;
+                                    }));
+  }
+}
+
 FailureLimit::Allowance& FailureLimit::AllowanceOf(const std::string& origin,
                                                    Clock::time_point now) {
-  const auto refilled = [now](const Allowance& allowance) {
-    const std::chrono::duration<double> passed = now - allowance.stamp;
-    return std::min(allowance.attempts + passed.count(), kAttempts);
-  };
-  if (failing_.size() >= kMaxOrigins) {
-    std::erase_if(failing_, [&](const auto& entry) {
-      return refilled(entry.second) >= kAttempts;
-    });
+  if (failing_.size() >= kMaxOrigins && !failing_.contains(origin)) {
+    MakeRoom(now);
   }
   const bool shared =
       failing_.size() >= kMaxOrigins && !failing_.contains(origin);
   Allowance& allowance =
       failing_.try_emplace(shared ? "" : origin, Allowance{kAttempts, now})
           .first->second;
-  allowance = {refilled(allowance), now};
+  allowance = {Refilled(allowance, now), now};
   return allowance;
 }
 
-Permission TokenGuard::Check(std::string_view authorization,
-                             const std::string& origin, Clock::time_point now) {
+Permission TokenGuard::Check(std::string_view token, const std::string& origin,
+                             Clock::time_point now) {
   if (token_.empty()) {
     return Permission::kReadOnly;
+  }
+  if (SameSecret(token, token_)) {
+    return Permission::kGranted;
   }
   const std::lock_guard lock(mutex_);
   if (!failures_.Allows(origin, now)) {
     ++counts_.unread;
     return Permission::kTooMany;
-  }
-  constexpr std::string_view kScheme = "Bearer ";
-  if (authorization.starts_with(kScheme) &&
-      SameSecret(authorization.substr(kScheme.size()), token_)) {
-    failures_.Reset(origin);
-    return Permission::kGranted;
   }
   failures_.Add(origin, now);
   ++counts_.wrong;

@@ -30,17 +30,23 @@ enum class Permission : std::uint8_t {
   kTooMany
 };
 
-/// Slows down guessing: after five failures in a row an address gets one
-/// attempt per second. Bounded memory; not thread safe.
+/// Slows down guessing: after five failures in a row an origin gets one attempt
+/// per second. Bounded memory; not thread safe.
 class FailureLimit {
  public:
   using Clock = std::chrono::steady_clock;
+  /// What a new origin gets once 256 others are failing: an allowance that all
+  /// further ones share, or the place of the one that failed longest ago. The
+  /// latter is for origins that cost whoever invents them more than a second
+  /// for each 5 attempts that it wins.
+  enum class WhenFull : std::uint8_t { kShare, kReplaceOldest };
+
+  explicit FailureLimit(WhenFull when_full) : when_full_(when_full) {}
 
   /// Whether an attempt from `origin` is to be checked.
   bool Allows(const std::string& origin, Clock::time_point now);
   /// Records that a checked attempt failed.
   void Add(const std::string& origin, Clock::time_point now);
-  void Reset(const std::string& origin) { failing_.erase(origin); }
 
  private:
   // Remaining attempts, refilled at one per second.
@@ -49,28 +55,32 @@ class FailureLimit {
     Clock::time_point stamp;
   };
   Allowance& AllowanceOf(const std::string& origin, Clock::time_point now);
+  static double Refilled(const Allowance& allowance, Clock::time_point now);
+  void MakeRoom(Clock::time_point now);
 
+  WhenFull when_full_;
   std::map<std::string, Allowance> failing_;  // By origin; bounded.
 };
 
-/// Decides who may change something. An attempt that FailureLimit refuses is
-/// not checked, even if its token is right. Failures are counted and logged
-/// with their origin. Thread safe.
+/// Decides who may change something. The right token is granted always: many
+/// may share an address, as behind a proxy, and one of them must not lock the
+/// others out. Wrong ones are counted, logged with their origin, and slowed.
+/// Thread safe.
 class TokenGuard {
  public:
   using Clock = FailureLimit::Clock;
   struct Counts {
     std::uint64_t wrong{0};
-    std::uint64_t unread{0};  ///< Refused with kTooMany, unchecked.
+    std::uint64_t unread{0};  ///< Wrong ones that were refused with kTooMany.
   };
 
   /// @param token empty: the console is read-only.
   TokenGuard(std::string token, LogSink log)
       : token_(std::move(token)), log_(std::move(log)) {}
 
-  /// @param authorization the header, "Bearer TOKEN".
+  /// @param token as sent; empty: none.
   /// @param origin the address that the request came from.
-  Permission Check(std::string_view authorization, const std::string& origin,
+  Permission Check(std::string_view token, const std::string& origin,
                    Clock::time_point now = Clock::now());
   bool writable() const { return !token_.empty(); }
   Counts counts() const;
@@ -79,7 +89,7 @@ class TokenGuard {
   const std::string token_;
   const LogSink log_;
   mutable std::mutex mutex_;
-  FailureLimit failures_;
+  FailureLimit failures_{FailureLimit::WhenFull::kShare};
   Counts counts_;
 };
 

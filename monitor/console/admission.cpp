@@ -12,6 +12,7 @@ namespace {
 
 constexpr const char* kApi = "/api/";
 constexpr const char* kLogIn = "/api/v1/login";
+constexpr const char* kTokenHeader = "X-FDI-Token";
 constexpr std::size_t kShownPath = 200;
 
 // Quotes untrusted text as one word of a log line.
@@ -26,13 +27,17 @@ std::string_view PlainAddress(std::string_view address) {
                                       : address;
 }
 
-// Whether a page of this server sent the request: browsers state the origin of
-// each POST, and scripts cannot forge it.
-// The HTTP server has checked Host before (HostAllowed()).
-bool IsSameOrigin(const httplib::Request& request) {
-  const std::string origin = request.get_header_value("Origin");
-  const std::string host = request.get_header_value("Host");
-  return origin == "http://" + host || origin == "https://" + host;
+// The token of the request. The page sends it in a header of its own, because
+// a browser's fetch() with Authorization would displace what the browser itself
+// sends there to a proxy with basic authentication.
+std::string TokenOf(const httplib::Request& request) {
+  if (request.has_header(kTokenHeader)) {
+    return request.get_header_value(kTokenHeader);
+  }
+  constexpr std::string_view kScheme = "Bearer ";
+  const std::string header = request.get_header_value("Authorization");
+  return header.starts_with(kScheme) ? header.substr(kScheme.size())
+                                     : std::string();
 }
 
 }  // namespace
@@ -61,13 +66,15 @@ void Admission::Reload() {
   }
 }
 
-void Admission::AddTo(httplib::Server& server, const std::string& cookie) {
+void Admission::AddTo(httplib::Server& server, const std::string& cookie,
+                      bool https) {
   // Without users there is no cookie that a browser would add by itself. The
   // token comes in a header that a foreign page cannot fill in.
   if (!logins_) {
     return;
   }
   cookie_ = cookie;
+  https_ = https;
   using Handler = httplib::Server::HandlerResponse;
   server.set_pre_routing_handler(
       [this](const httplib::Request& request, httplib::Response& response) {
@@ -95,8 +102,8 @@ bool Admission::Admit(const httplib::Request& request,
   }
   if (request.method == "POST" && !IsSameOrigin(request)) {
     Refuse(request, response, 403, "origin",
-           "Origin: expected http:// or https:// and " +
-               request.get_header_value("Host"));
+           "Origin: expected the address of this page, " +
+               request.get_header_value("Host") + ", with its https or http");
     return false;
   }
   if (!request.path.starts_with(kApi) || request.path == kLogIn ||
@@ -111,6 +118,18 @@ bool Admission::Admit(const httplib::Request& request,
            std::string("expected a session: POST ") + kLogIn);
   }
   return false;
+}
+
+// Whether a page of this server sent the request: browsers state the origin of
+// each POST, and scripts cannot forge it. Where the browser uses https, to us
+// or to a proxy that says so, a page of http is another one, which anybody on
+// the way can fill. The HTTP server has checked Host before (HostAllowed()).
+bool Admission::IsSameOrigin(const httplib::Request& request) const {
+  const std::string origin = request.get_header_value("Origin");
+  const std::string host = request.get_header_value("Host");
+  const bool https =
+      https_ || request.get_header_value("X-Forwarded-Proto") == "https";
+  return origin == "https://" + host || (!https && origin == "http://" + host);
 }
 
 bool Admission::FromProxy(const httplib::Request& request) const {
@@ -188,8 +207,8 @@ void Admission::LogIn(const httplib::Request& request,
     case Logins::Outcome::kTooMany:
       response.set_header("Retry-After", "1");
       return Refuse(request, response, 429, "slowed",
-                    "too many wrong passwords came from this address: one "
-                    "attempt per second is looked at");
+                    "too many wrong passwords for this name came from this "
+                    "address: one attempt per second is looked at");
     case Logins::Outcome::kWrong:
       LogRefusal(request, "password", name);
       return SendError(response, 401, "the name or the password is wrong");
@@ -199,7 +218,7 @@ void Admission::LogIn(const httplib::Request& request,
   // A browser that logs in again replaces its cookie. Its old session would be
   // usable until it expires and take one of the places.
   logins_->LogOut(SessionOf(request));
-  // Whether the browser uses https, which may end at a proxy.
+  // https may end at a proxy that does not say so.
   const bool secure =
       request.get_header_value("Origin").starts_with("https://");
   response.set_header("Set-Cookie", cookie_ + "=" + session +
@@ -237,8 +256,7 @@ bool Admission::Authorize(const httplib::Request& request,
     return true;
   }
   // Reached without users, or if the session has ended since Admit().
-  switch (token_.Check(request.get_header_value("Authorization"),
-                       request.remote_addr)) {
+  switch (token_.Check(TokenOf(request), request.remote_addr)) {
     case Permission::kReadOnly:
       Refuse(request, response, 403, "read_only",
              "this console is read-only: start the monitor with "
@@ -247,14 +265,14 @@ bool Admission::Authorize(const httplib::Request& request,
     case Permission::kWrongToken:  // Already logged by the guard.
       response.set_header("WWW-Authenticate", "Bearer");
       SendError(response, 401,
-                "Authorization: expected Bearer and the token of the file "
-                "named by --console-write");
+                std::string(kTokenHeader) +
+                    ", or Authorization: Bearer: expected the token of the "
+                    "file named by --console-write");
       return false;
     case Permission::kTooMany:
       response.set_header("Retry-After", "1");
       Refuse(request, response, 429, "slowed",
-             "too many wrong tokens came from this address: one attempt "
-             "per second is looked at");
+             "too many wrong tokens came from this address");
       return false;
     case Permission::kGranted:
       break;

@@ -52,8 +52,10 @@ class Admission {
   Admission(const AdmissionOptions& options, LogSink log);
 
   /// Installs a check before every route, and the login and logout routes. Call
-  /// before the server starts. @param cookie name of the session cookie.
-  void AddTo(httplib::Server& server, const std::string& cookie);
+  /// before the server starts.
+  /// @param cookie name of the session cookie, another one for each console.
+  /// @param https whether the server speaks nothing else.
+  void AddTo(httplib::Server& server, const std::string& cookie, bool https);
 
   /// The sender of the request; nothing without users or without a login.
   std::optional<Visitor> Authenticate(const httplib::Request& request);
@@ -86,6 +88,7 @@ class Admission {
   bool Admit(const httplib::Request& request, httplib::Response& response);
   void LogIn(const httplib::Request& request, httplib::Response& response);
   void LogOut(const httplib::Request& request, httplib::Response& response);
+  bool IsSameOrigin(const httplib::Request& request) const;
   bool FromProxy(const httplib::Request& request) const;
   std::string UserHeader(const httplib::Request& request) const;
   std::string SessionOf(const httplib::Request& request) const;
@@ -99,6 +102,7 @@ class Admission {
   TokenGuard token_;
   std::optional<Logins> logins_;
   std::string cookie_;
+  bool https_{false};
   monitor::LogLimit refusals_{{10, std::chrono::milliseconds(10'000)}};
   mutable std::mutex mutex_;
   AdmissionCounts counts_;

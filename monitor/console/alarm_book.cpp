@@ -13,6 +13,7 @@ namespace {
 
 using storage::Alarm;
 using storage::AlarmState;
+using storage::HistoryAwayError;
 
 void AddTo(ValveAlarm& valve, const Alarm& alarm,
            const report::FaultTexts& texts) {
@@ -26,7 +27,7 @@ void AddTo(ValveAlarm& valve, const Alarm& alarm,
     valve.severity =
         texts.Words(e.fault.value_or("unknown"), e.strength, e.priority)
             .severity;
-    valve.strength = e.isolated_ns ? std::optional(e.strength) : std::nullopt;
+    valve.strength = IsNamed(e) ? std::optional(e.strength) : std::nullopt;
     valve.unconfirmed_ns = e.unconfirmed_ns;
     valve.fault = e.fault.value_or("");
     valve.certainty = storage::CertaintyOf(e);
@@ -102,6 +103,9 @@ std::vector<Json> AlarmBook::Read(storage::History& history,
       const auto left = history.Alarms({history.Show(id)}, now_ns);
       changed.push_back(AlarmJson(left.front(), texts_));
     } catch (const NotFoundError&) {  // Pruned.
+    } catch (const HistoryAwayError&) {
+      throw;
+    } catch (const DataError&) {  // A row that cannot be read any more.
     }
   }
   if (!std::exchange(read_, true)) {

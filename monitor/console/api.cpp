@@ -2,16 +2,25 @@
 
 #include <cctype>
 #include <charconv>
+#include <chrono>
 #include <exception>
 
 #include <httplib.h>
 
 #include "base/error.h"
+#include "storage/history/foreign_history.h"
 #include "storage/history/history_reader.h"
 
 namespace fdi::console {
 namespace {
 
+// Of a page that has its style and pictures in itself, and no script.
+constexpr const char* kPagePolicy =
+    "default-src 'none'; style-src 'unsafe-inline'; base-uri 'none'; "
+    "form-action 'none'; frame-ancestors 'none'";
+
+// For what a request asks of a history on another host.
+constexpr std::chrono::seconds kRequestTime{15};
 constexpr std::int64_t kLastMs = 9'000'000'000'000;  // year 2255
 
 // Lower-cases a name for the middle of a sentence: "flow transmitter ...", but
@@ -35,7 +44,11 @@ std::unique_ptr<storage::History> Api::History() const {
   if (const auto away = alarms.away()) {
     throw storage::HistoryAwayError(away->reason);
   }
-  return sources.plant_history();
+  auto history = sources.plant_history();
+  if (auto* foreign = dynamic_cast<storage::ForeignHistory*>(history.get())) {
+    foreign->FinishWithin(kRequestTime);
+  }
+  return history;
 }
 
 Json Api::Words(const ModelFacts* facts, const TracePoint* point) const {
@@ -77,8 +90,14 @@ void AddRoutes(httplib::Server& server, const Api& api,
           return;
         }
         const File file = route.file(api, request);
-        response.set_header("Content-Disposition",
-                            "attachment; filename=\"" + file.name + "\"");
+        if (file.is_page) {
+          // Replaces that of the console, whose style is in files.
+          response.headers.erase("Content-Security-Policy");
+          response.set_header("Content-Security-Policy", kPagePolicy);
+        } else {
+          response.set_header("Content-Disposition",
+                              "attachment; filename=\"" + file.name + "\"");
+        }
         response.set_content(file.body, file.type.c_str());
       });
     });

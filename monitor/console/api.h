@@ -77,11 +77,12 @@ struct Api {
   Json Words(const ModelFacts* facts, const TracePoint* point) const;
 };
 
-/// A file to download.
+/// A file to download, or a page with its own style to look at.
 struct File {
   std::string type;
   std::string name;
   std::string body;
+  bool is_page{false};
 };
 
 /// A GET handler for paths that match a regular expression: JSON or a file.
@@ -93,7 +94,8 @@ struct Route {
 
 /// /api/v1/status, faults, valves, valves/ID/trend.
 std::vector<Route> LiveRoutes();
-/// /api/v1/alarms, history, statistics, shelf, episodes/ID with .csv .svg .png.
+/// /api/v1/alarms, history, statistics, shelf, episodes/ID with .csv .svg .png
+/// .html.
 std::vector<Route> HistoryRoutes();
 
 /// Exceptions become {"error"} with 400 for ConfigError and

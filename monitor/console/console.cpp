@@ -1,8 +1,14 @@
 #include "monitor/console/console.h"
 
+#include <array>
+#include <cstdio>
+#include <filesystem>
+#include <functional>
 #include <random>
 
 #include <httplib.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include "base/error.h"
 #include "monitor/http/request_head.h"
@@ -18,6 +24,31 @@ constexpr const char* kPolicy =
     "default-src 'self'; img-src 'self' data:; base-uri 'none'; "
     "form-action 'none'; frame-ancestors 'none'";
 
+// Browsers send the cookies of a host to all its ports and paths, and behind a
+// proxy the consoles of many machines may have one host name. The name is that
+// of this console also after a restart: a browser does not collect cookies.
+std::string CookieName(const monitor::HttpAddress& address,
+                       const std::filesystem::path& models) {
+  std::array<char, 256> machine{};
+  gethostname(machine.data(), machine.size() - 1);
+  // The page of a plant has no models.
+  const std::filesystem::path folder =
+      models.empty() ? models : std::filesystem::absolute(models).parent_path();
+  struct stat data {};
+  stat(folder.c_str(), &data);  // Of containers, the path may be the same.
+  std::string console = machine.data();
+  console.append(" ")
+      .append(ToString(address))
+      .append(" ")
+      .append(folder.string())
+      .append(" " + std::to_string(data.st_dev))
+      .append(" " + std::to_string(data.st_ino));
+  char text[24];
+  std::snprintf(text, sizeof text, "fdi_%016zx",
+                std::hash<std::string>()(console));
+  return text;
+}
+
 std::string NewInstance() {
   std::random_device random;
   char text[17];
@@ -25,9 +56,22 @@ std::string NewInstance() {
   return text;
 }
 
+// What comes from a history, which may be on another host that answers slowly.
+bool NeedsHistory(std::string_view path) {
+  for (const std::string_view of :
+       {"/api/v1/alarms", "/api/v1/history", "/api/v1/statistics",
+        "/api/v1/shelf", "/api/v1/causes", "/api/v1/episodes/",
+        "/api/v1/worklist"}) {
+    if (path.starts_with(of)) {
+      return true;
+    }
+  }
+  return path.starts_with("/api/v1/valves/") && path.ends_with("/health");
+}
+
 // Each stream occupies a thread; one more tells further clients that all are
 // taken. Pictures are drawn by a program that uses a whole processor for a
-// second.
+// second. Requests for the history hold up no others.
 std::vector<monitor::HttpLane> Lanes() {
   return {{StreamOptions{}.max_clients + 1, 16,
            [](std::string_view path) { return path == "/api/v1/stream"; }},
@@ -38,7 +82,8 @@ std::vector<monitor::HttpLane> Lanes() {
              return path.starts_with("/api/v1/episodes/") &&
                     (path.ends_with(".svg") || path.ends_with(".png"));
            }},
-          {4}};
+          {4, 32, NeedsHistory},
+          {2}};
 }
 
 monitor::HttpServerOptions ServerOptions(const ConsoleOptions& options) {
@@ -114,8 +159,8 @@ void Console::Start(ConsoleSources sources) {
   SetDefaultResponses();
   RenewTls();
   httplib::Server& routes = server_->routes();
-  // Cookies ignore the port, and a host may run two consoles.
-  access_.AddTo(routes, "fdi_" + std::to_string(server_->address().port));
+  access_.AddTo(routes, CookieName(server_->address(), api_->sources.models),
+                server_->has_tls());
   for (const auto& group : {LiveRoutes(), HistoryRoutes(), more_routes_}) {
     AddRoutes(routes, *api_, group);
   }

@@ -13,10 +13,11 @@
 #include "diagnosis/fault_catalogue.h"
 #include "import/csv.h"
 #include "monitor/console/api.h"
-#include "report/plot/episode_figure.h"
+#include "report/plot/episode_page.h"
 #include "report/plot/gnuplot.h"
 #include "report/report.h"
 #include "storage/history/common_cause.h"
+#include "storage/history/foreign_history.h"
 #include "storage/history/history_reader.h"
 #include "storage/history/strength.h"
 
@@ -30,11 +31,16 @@ Json Alarms(const Api& api, const httplib::Request& /*request*/) {
   // While the history of a plant is unavailable, alarms heard on the bus are
   // used.
   std::vector<storage::Alarm> alarms = api.alarms.UnstoredAlarms();
+  std::string note;
   if (!api.sources.plant_history || !api.alarms.away()) {
-    std::ranges::move(api.History()->AlarmList(now_ns, kMaxAlarms),
+    const auto reader = api.History();
+    std::ranges::move(reader->AlarmList(now_ns, kMaxAlarms),
                       std::back_inserter(alarms));
+    note = storage::TakeNote(*reader);
   }
-  return {{"now_ms", Ms(now_ns)}, {"alarms", AlarmsJson(alarms, api.texts)}};
+  return {{"now_ms", Ms(now_ns)},
+          {"alarms", AlarmsJson(alarms, api.texts)},
+          {"note", TextOrNull(note)}};
 }
 
 storage::EpisodeFilter FilterOf(const Api& api,
@@ -64,6 +70,7 @@ Json History(const Api& api, const httplib::Request& request) {
   filter.limit = limit;
   const auto reader = api.History();
   std::vector<storage::Episode> episodes = reader->List(filter);
+  const std::string note = storage::TakeNote(*reader);
   bool more = false;
   if (std::ssize(episodes) == limit) {
     storage::EpisodeFilter older = filter;
@@ -78,7 +85,8 @@ Json History(const Api& api, const httplib::Request& request) {
   return {{"episodes",
            AlarmsJson(reader->Alarms(std::move(episodes), filter.now_ns),
                       api.texts)},
-          {"more", more}};
+          {"more", more},
+          {"note", TextOrNull(note)}};
 }
 
 Json DaysJson(const storage::AlarmStatistics& statistics) {
@@ -134,7 +142,8 @@ Json Statistics(const Api& api, const httplib::Request& request) {
             {"false", statistics.labelled_false},
             {"none", statistics.unlabelled}}},
           {"most_in_10_min", statistics.most_in_flood_window},
-          {"gaps", std::move(gaps)}};
+          {"gaps", std::move(gaps)},
+          {"note", TextOrNull(storage::TakeNote(*reader))}};
 }
 
 Json Shelves(const Api& api, const httplib::Request& /*request*/) {
@@ -144,20 +153,15 @@ Json Shelves(const Api& api, const httplib::Request& /*request*/) {
        reader->Shelves(api.sources.utc_now_ns())) {
     list.push_back(ShelfJson(shelf));
   }
-  return {{"shelf", std::move(list)}};
+  return {{"shelf", std::move(list)},
+          {"note", TextOrNull(storage::TakeNote(*reader))}};
 }
 
-// Those that are open; the history of a plant has none.
+// Those that are open.
 Json Causes(const Api& api, const httplib::Request& /*request*/) {
   Json list = Json::array();
-  if (api.sources.plant_history) {
-    return {{"causes", std::move(list)}};
-  }
-  storage::HistoryReader reader(api.sources.history);
-  storage::CauseFilter filter;
-  filter.open_only = true;
-  for (const auto& cause :
-       storage::ReadCommonCauses(reader.database(), filter)) {
+  const auto history = api.History();
+  for (const storage::CommonCause& cause : history->OpenCauses()) {
     Json members = Json::array();
     for (const storage::CauseMember& member : cause.members) {
       members.push_back({{"episode", member.episode_id},
@@ -311,11 +315,13 @@ Json Episode(const Api& api, const httplib::Request& request) {
     list.push_back(EventJson(event));
   }
   Json look = LookJson(reader->Look(episode.id), points, trace);
+  Json growth =
+      GrowthJson(storage::GrowthOf(episode, reader->Strengths(episode.id)));
   return {{"episode", AlarmJson(alarm, api.texts)},
           {"events", std::move(list)},
           {"look", std::move(look)},
-          {"growth", GrowthJson(storage::GrowthOf(
-                         episode, reader->Strengths(episode.id)))},
+          {"growth", std::move(growth)},
+          {"note", TextOrNull(storage::TakeNote(*reader))},
           {"trace", std::move(trace)},
           {"model_hash", ModelFactsJson(*models)["hash"]}};
 }
@@ -403,18 +409,34 @@ File EpisodePicture(const Api& api, const httplib::Request& request) {
                            {.stop = api.stopping})};
 }
 
+// The page of `fdi-store history report`, with times in UTC.
+File EpisodeHtml(const Api& api, const httplib::Request& request) {
+  const std::string id = request.matches[1];
+  const auto reader = api.History();
+  const plot::EpisodeEvidence evidence =
+      plot::LoadEvidence(*reader, id, api.sources.models);
+  const storage::Alarm alarm =
+      reader->Alarms({evidence.episode}, api.sources.utc_now_ns()).front();
+  std::ostringstream html;
+  plot::EpisodePage(evidence, alarm, api.texts, true, {.stop = api.stopping})
+      .PrintHtml(html, plot::EpisodeTitle(evidence.episode, api.texts), {true});
+  return {"text/html; charset=utf-8", "", html.str(), true};
+}
+
 }  // namespace
 
 std::vector<Route> HistoryRoutes() {
-  return {{"/api/v1/alarms", Alarms},
-          {"/api/v1/history", History},
-          {"/api/v1/statistics", Statistics},
-          {"/api/v1/shelf", Shelves},
-          {"/api/v1/causes", Causes},
-          {"/api/v1/episodes/([0-9a-fA-F]{1,16}|last)", Episode},
-          {"/api/v1/episodes/([0-9a-f]{1,16}|last)\\.csv", nullptr, EpisodeCsv},
-          {"/api/v1/episodes/([0-9a-f]{1,16}|last)\\.(svg|png)", nullptr,
-           EpisodePicture}};
+  return {
+      {"/api/v1/alarms", Alarms},
+      {"/api/v1/history", History},
+      {"/api/v1/statistics", Statistics},
+      {"/api/v1/shelf", Shelves},
+      {"/api/v1/causes", Causes},
+      {"/api/v1/episodes/([0-9a-fA-F]{1,16}|last)", Episode},
+      {"/api/v1/episodes/([0-9a-f]{1,16}|last)\\.csv", nullptr, EpisodeCsv},
+      {"/api/v1/episodes/([0-9a-f]{1,16}|last)\\.(svg|png)", nullptr,
+       EpisodePicture},
+      {"/api/v1/episodes/([0-9a-f]{1,16}|last)\\.html", nullptr, EpisodeHtml}};
 }
 
 }  // namespace fdi::console

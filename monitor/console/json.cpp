@@ -178,9 +178,10 @@ Json TileJson(const ValveState& valve, const ValveAlarm& alarm,
       {"faults", faults},
       {"certainty", CertaintyJson(valve, storage::JoinNames(faults), alarm)},
       {"factor", named ? Rounded(valve.factor, kFactorDecimals) : Json()},
-      {"strength",
-       named ? Rounded(alarm.strength.value_or(valve.strength), kFactorDecimals)
-             : Json()},
+      // As the alarm has it, if there is one.
+      {"strength", alarm.strength ? Rounded(*alarm.strength, kFactorDecimals)
+                   : named        ? Rounded(valve.strength, kFactorDecimals)
+                                  : Json()},
       {"severity",
        alarm.severity ? Json(SeverityName(*alarm.severity)) : Json()},
       {"unconfirmed_ms", Ms(alarm.unconfirmed_ns)},
@@ -320,6 +321,9 @@ Json AlarmJson(const storage::Alarm& alarm, const report::FaultTexts& texts) {
   const storage::Episode& e = alarm.episode;
   const report::FaultWords words =
       texts.Words(e.fault.value_or("unknown"), e.strength, e.priority);
+  const auto strength = [&e](std::optional<double> value) {
+    return IsNamed(e) ? Rounded(value, kFactorDecimals) : Json();
+  };
   Json json{{"episode", e.episode_id},
             {"valve", e.valve_id},
             {"fault", TextOrNull(e.fault)},
@@ -334,14 +338,15 @@ Json AlarmJson(const storage::Alarm& alarm, const report::FaultTexts& texts) {
             {"ended_ms", Ms(e.ended_ns)},
             {"end_reason", TextOrNull(e.end_reason)},
             {"peak_factor", Rounded(e.peak_factor, kFactorDecimals)},
-            {"strength", Rounded(e.strength, kFactorDecimals)},
-            {"lowest", Rounded(e.lowest, kFactorDecimals)},
-            {"highest", Rounded(e.highest, kFactorDecimals)},
-            {"worst_strength", Rounded(e.worst_strength, kFactorDecimals)},
+            {"strength", strength(e.strength)},
+            {"lowest", strength(e.lowest)},
+            {"highest", strength(e.highest)},
+            {"worst_strength", strength(e.worst_strength)},
             {"unconfirmed_ms", Ms(e.unconfirmed_ns)},
             {"label", TextOrNull(e.label)},
             {"acked_by", TextOrNull(e.acked_by)},
             {"acked_ms", Ms(e.acked_ns)},
+            {"ack_comment", TextOrNull(e.ack_comment)},
             {"model_set", e.model_set},
             {"severity", SeverityName(words.severity)},
             {"priority", PriorityOf(words.severity)},

@@ -19,9 +19,10 @@ Logins::Outcome Logins::LogIn(const std::string& name,
                               const std::string& origin, std::string& session,
                               Clock::time_point now) {
   std::string hash = dummy_hash_;
+  const std::string asked = origin + ' ' + name.substr(0, kMaxName);
   {
     const std::lock_guard lock(mutex_);
-    if (!failures_.Allows(origin, now)) {
+    if (!failures_.Allows(asked, now)) {
       return Outcome::kTooMany;
     }
     const auto user = users_.find(name);
@@ -33,7 +34,7 @@ Logins::Outcome Logins::LogIn(const std::string& name,
   const std::lock_guard lock(mutex_);
   const auto user = users_.find(name);  // May have changed during the hash.
   if (!fits || user == users_.end() || user->second.hash != hash) {
-    failures_.Add(origin, now);
+    failures_.Add(asked, now);
     return Outcome::kWrong;
   }
   if (sessions_.size() >= kMaxSessions) {

@@ -29,8 +29,10 @@ class Logins {
 
   explicit Logins(Users users);
 
-  /// Takes the time of hashing a password even if the name is unknown.
-  /// @param origin client address: see FailureLimit.
+  /// Takes the time of hashing a password even if the name is unknown. Wrong
+  /// passwords slow down further ones for the same name from the same address,
+  /// and nobody else: behind a proxy, all share its address.
+  /// @param origin client address.
   /// @param session set on success: the secret that the client presents.
   Outcome LogIn(const std::string& name, const std::string& password,
                 const std::string& origin, std::string& session,
@@ -58,7 +60,7 @@ class Logins {
   mutable std::mutex mutex_;
   Users users_;
   std::vector<Session> sessions_;
-  FailureLimit failures_;
+  FailureLimit failures_{FailureLimit::WhenFull::kReplaceOldest};
 };
 
 }  // namespace fdi::console

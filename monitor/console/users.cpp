@@ -26,7 +26,6 @@ constexpr const char* kOption = "--console-users";
 constexpr std::array<const char*, 3> kRoles{"view", "acknowledge", "engineer"};
 constexpr const char* kNoPassword = "*";
 constexpr std::size_t kRandomBytes = 24;
-constexpr std::size_t kMaxName = 64;
 constexpr std::size_t kMinPassword = 8;
 constexpr std::size_t kMaxPassword = 256;
 
@@ -43,6 +42,39 @@ bool IsName(std::string_view text) {
 // The name on a line; empty if it is a comment.
 std::string_view NameOn(std::string_view line) {
   return line.starts_with('#') ? "" : line.substr(0, line.find(':'));
+}
+
+// Whether checking a password against the hash takes at most about a second
+// and 128 MiB: the strings of crypt(5) state their cost. What another program
+// makes with usual settings stays below.
+bool IsCheap(const std::string& hash) {
+  constexpr unsigned long kMostRounds = 1'000'000;  // SHA-512-crypt
+  constexpr std::string_view kDigits = "./0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZ";
+  const auto number = [&hash](std::size_t at) {
+    return std::strtoul(hash.c_str() + at, nullptr, 10);
+  };
+  // log2(N) - 1 is at `at`; r, and p where it is stated, are the usual ones.
+  const auto scrypt = [&](std::size_t at, std::string_view rest) {
+    const std::size_t n = kDigits.find(hash[at]);
+    return n <= kDigits.find('C') &&
+           hash.compare(at + 1, rest.size(), rest) == 0;
+  };
+  if (hash.starts_with("$y$j") || hash.starts_with("$gy$j")) {
+    const std::size_t at = hash.find('j') + 1;
+    return scrypt(at, "T$") || scrypt(at, "5$");
+  }
+  if (hash.starts_with("$7$")) {
+    return scrypt(3, "U..../....");
+  }
+  if (hash.starts_with("$2")) {
+    return number(4) <= 13;
+  }
+  const std::string_view rounds = "rounds=";
+  if (hash.starts_with("$6$")) {
+    return hash.compare(3, rounds.size(), rounds) != 0 ||
+           number(3 + rounds.size()) <= kMostRounds;
+  }
+  return false;
 }
 
 std::pair<std::string, User> ParseLine(const std::string& line) {
@@ -64,6 +96,12 @@ std::pair<std::string, User> ParseLine(const std::string& line) {
     throw ConfigError(
         "the hash: expected one that fdi-monitor console-user or mkpasswd has "
         "made, or *");
+  }
+  if (hash != kNoPassword && !IsCheap(hash)) {
+    throw ConfigError(
+        "the hash: expected one of yescrypt or scrypt up to cost 8, of bcrypt "
+        "up to 13 or of SHA-512 up to 1000000 rounds, which is checked "
+        "within about a second");
   }
   return {line.substr(0, first), {*role, std::move(hash)}};
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
@@ -17,6 +18,7 @@ enum class Role : std::uint8_t {
   kEngineer,     ///< Label.
 };
 
+inline constexpr std::size_t kMaxName = 64;
 inline constexpr const char* kRoleNames = "view, acknowledge or engineer";
 const char* RoleName(Role role);
 std::optional<Role> ParseRole(std::string_view name);
@@ -31,7 +33,8 @@ struct User {
 using Users = std::map<std::string, User, std::less<>>;
 
 /// Reads lines NAME:ROLE:HASH; empty ones and those with # in front are
-/// skipped. A name has 1..64 letters, digits, '.', '_', '-', '@'.
+/// skipped. A name has 1..64 letters, digits, '.', '_', '-', '@'. A hash whose
+/// check would take more than about a second is refused.
 /// @throws ConfigError with the number of the line and what is accepted, or if
 ///   others can read the file; DataError if it cannot be read.
 Users LoadUsers(const std::filesystem::path& path);

@@ -597,8 +597,16 @@ void HttpServer::Add(const Pages& pages) {
 
 void HttpServer::Start() {
   gate_->Start();
-  thread_ = std::thread([this] { gate_->listen_after_bind(); });
+  auto ended = std::make_shared<std::atomic<bool>>(false);
+  thread_ = std::thread([this, ended] {
+    gate_->listen_after_bind();
+    *ended = true;
+  });
   while (!gate_->is_running()) {  // An earlier stop() would be lost.
+    if (*ended) {
+      throw std::runtime_error(ToString(address_) +
+                               ": cannot listen: the socket was closed");
+    }
     std::this_thread::yield();
   }
 }

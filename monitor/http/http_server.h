@@ -87,7 +87,8 @@ class HttpServer {
   /// The library's server, for what pages cannot do. Use before Start().
   httplib::Server& routes();
 
-  /// Starts serving. Call once.
+  /// Starts serving. Call once. @throws std::runtime_error if the socket was
+  /// closed meanwhile.
   void Start();
 
   /// Stops accepting connections. Does not block.

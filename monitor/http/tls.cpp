@@ -8,6 +8,7 @@
 #include <iterator>
 #include <new>
 #include <string>
+#include <system_error>
 
 #include <openssl/err.h>
 #include <openssl/pem.h>
@@ -16,6 +17,7 @@
 #include <sys/socket.h>
 
 #include "base/error.h"
+#include "base/passing_error.h"
 #include "monitor/http/private_file.h"
 
 namespace fdi::monitor {
@@ -29,6 +31,15 @@ std::string Reason() {
                            : ERR_reason_error_string(error);
   ERR_clear_error();
   return reason == nullptr ? "unknown reason" : reason;
+}
+
+// If it was for lack of something, that may come: the file is not at fault.
+void CheckForLack(const char* option, const std::filesystem::path& file) {
+  if (MayPass(errno)) {
+    throw PassingError(std::string(option) + " " + file.string() +
+                       ": cannot be read (" +
+                       std::generic_category().message(errno) + ")");
+  }
 }
 
 [[noreturn]] void Refuse(const char* option, const std::filesystem::path& file,
@@ -93,7 +104,11 @@ void TakeKey(SSL_CTX* context, const TlsFiles& files) {
   const bool apart = !files.key.empty();
   const char* const option = apart ? "--console-key" : "--console-tls";
   const std::filesystem::path& file = apart ? files.key : files.certificate;
+  errno = 0;
   std::ifstream stream(file);
+  if (!stream) {
+    CheckForLack(option, file);
+  }
   const std::string content{std::istreambuf_iterator<char>(stream), {}};
   // Searched before the mode of the file is checked: a certificate without a
   // key may be readable by all, and the reason to be told is the missing key.
@@ -129,7 +144,9 @@ int CheckValidity(const X509* certificate, const std::filesystem::path& file) {
     Refuse("--console-tls", file, "the certificate has expired");
   }
   if (X509_cmp_current_time(X509_get0_notBefore(certificate)) > 0) {
-    Refuse("--console-tls", file, "the certificate is not valid yet");
+    throw PassingError("--console-tls " + file.string() +
+                       ": the certificate is not valid yet; is the clock of "
+                       "this machine right?");
   }
   return days;
 }
@@ -226,8 +243,10 @@ TlsContext::TlsContext(const TlsFiles& files)
   // with records that carry no data.
   SSL_CTX_clear_mode(context, SSL_MODE_AUTO_RETRY);
   SSL_CTX_set_session_cache_mode(context, SSL_SESS_CACHE_OFF);  // Tickets do.
+  errno = 0;
   if (SSL_CTX_use_certificate_chain_file(context, files.certificate.c_str()) !=
       1) {
+    CheckForLack("--console-tls", files.certificate);
     Refuse("--console-tls", files.certificate,
            "expected a certificate in PEM (" + Reason() + ")");
   }

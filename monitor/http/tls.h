@@ -49,6 +49,7 @@ class TlsSession {
 /// TLS 1.2 and 1.3 with one certificate. Thread safe.
 class TlsContext {
  public:
+  /// @throws PassingError for a certificate that is not valid yet.
   /// @throws ConfigError naming the option and the file: a certificate that
   ///   cannot be read, has expired or is not valid yet; a key that others can
   ///   read, that needs a passphrase or that is of another certificate.

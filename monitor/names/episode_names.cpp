@@ -139,6 +139,7 @@ void EpisodeNames::RequestLook(simulator::LookTask task) {
   key.stamp_ns = task.stamp_ns;
   key.window.detection = task.window.detection;
   key.detection_stamp_ns = task.detection_stamp_ns;
+  key.set_back_ns = task.set_back_ns;
   pending_looks_.push_back(
       {std::move(key), worker_->Submit(valve_id_, physics_, std::move(task))});
 }

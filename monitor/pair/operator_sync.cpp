@@ -5,6 +5,7 @@
 
 #include "base/error.h"
 #include "base/printable.h"
+#include "base/retry.h"
 
 namespace fdi::monitor {
 namespace {
@@ -33,7 +34,7 @@ OperatorSync::OperatorSync(idl::Participant& participant,
 
 void OperatorSync::Start() {
   thread_ = std::jthread([this](const std::stop_token& stop) {
-    while (!stop.stop_requested()) {
+    const auto exchange = [this] {
       in_.Take(
           {[this](const OperatorAction& action, const auto&) {
              if (received_.size() < kMaxReceivedActions) {
@@ -42,15 +43,14 @@ void OperatorSync::Start() {
            },
            {}},
           kPeriod);
-      try {
-        ApplyReceived();
-        SendActions();
-      } catch (const std::exception& error) {  // Retried in the next period.
-        const std::string reason = error.what();
-        log_.Report(LogId::kOperatorSync, "operator_action_waits",
-                    [&reason] { return "reason=" + LogValue(reason); });
-      }
-    }
+      ApplyReceived();
+      SendActions();
+    };
+    RetryUntil(stop, kPeriod, exchange, [this](const std::exception& error) {
+      const std::string reason = error.what();
+      log_.Report(LogId::kOperatorSync, "operator_action_waits",
+                  [&reason] { return "reason=" + LogValue(reason); });
+    });
   });
 }
 

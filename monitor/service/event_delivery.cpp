@@ -6,7 +6,9 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <filesystem>
 #include <mutex>
+#include <sstream>
 #include <string_view>
 #include <system_error>
 #include <thread>
@@ -236,6 +238,29 @@ std::vector<std::string> SplitWords(const std::string& text) {
   return words;
 }
 
+bool CanRun(const std::string& path) {
+  return std::filesystem::is_regular_file(path) &&
+         access(path.c_str(), X_OK) == 0;
+}
+
+// As execvp(3) looks for it.
+void RequireProgram(const std::string& target, const std::string& name) {
+  bool found = CanRun(name);
+  if (name.find('/') == std::string::npos) {
+    const char* path = std::getenv("PATH");
+    std::istringstream folders(path == nullptr ? "/bin:/usr/bin" : path);
+    found = false;
+    for (std::string folder; !found && std::getline(folders, folder, ':');) {
+      found = CanRun((folder.empty() ? "." : folder) + "/" + name);
+    }
+  }
+  if (!found) {
+    Refuse(target, "no program '" + name +
+                       "' that can be run (is it in the PATH, or its path "
+                       "right, and is it executable?)");
+  }
+}
+
 // A request that is left behind may still use static objects of cpp-httplib. So
 // the process ends without destroying them.
 void KeepStaticObjects() {
@@ -365,6 +390,7 @@ std::unique_ptr<EventDelivery> MakeEventDelivery(
   if (words.empty()) {
     Refuse(target, "nothing to run");
   }
+  RequireProgram(target, words.front());
   return DeliverToProgram(std::move(words), limit);
 }
 

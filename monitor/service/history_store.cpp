@@ -33,12 +33,17 @@ HistoryStore::HistoryStore(const std::filesystem::path& path, Clock utc_now_ns,
                            LogSink log)
     : writer_(path), utc_now_ns_(std::move(utc_now_ns)), log_(std::move(log)) {}
 
-void HistoryStore::BeginSession(const std::string& software,
-                                const std::string& config) {
-  session_ = {software, config};
+void HistoryStore::BeginSession(
+    const std::string& software, const std::string& config,
+    const std::map<std::string, std::string>& fault_names) {
+  session_ = Session{software, config, fault_names};
+  BeginSession(*session_);
+}
+
+void HistoryStore::BeginSession(const Session& session) {
   const std::int64_t now_ns = utc_now_ns_();
-  const storage::SessionStart start =
-      writer_.BeginSession(now_ns, software, config);
+  const storage::SessionStart start = writer_.BeginSession(
+      now_ns, session.software, session.config, session.fault_names);
   if (start.died_ns) {
     log_(LogLevel::kWarning,
          "session_died outage_s=" +
@@ -95,7 +100,7 @@ void HistoryStore::OnCurrentFile(const std::function<void()>& call) {
     return;
   }
   if (session_) {
-    BeginSession(std::string(session_->first), std::string(session_->second));
+    BeginSession(*session_);
   }
   try {
     TellApart([&] {

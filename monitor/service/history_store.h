@@ -32,7 +32,9 @@ class HistoryStore : public HistorySink {
 
   /// If the previous session crashed, its outage is recorded as a gap of all
   /// valves. Call before recording anything.
-  void BeginSession(const std::string& software, const std::string& config);
+  /// @param fault_names plain names by fault
+  void BeginSession(const std::string& software, const std::string& config,
+                    const std::map<std::string, std::string>& fault_names = {});
   /// Episodes that earlier sessions left open. Call before recording anything.
   std::vector<OpenEpisode> OpenEpisodes();
   /// Of each valve the episode that ended last.
@@ -67,6 +69,13 @@ class HistoryStore : public HistorySink {
   void EndSession() { writer_.EndSession(utc_now_ns_(), true); }
 
  private:
+  struct Session {
+    std::string software;
+    std::string config;
+    std::map<std::string, std::string> fault_names;
+  };
+
+  void BeginSession(const Session& session);
   void OnCurrentFile(const std::function<void()>& call);
   void ReportDamage(const std::vector<std::string>& damaged);
   void SkipIfNotFound(const char* operation, const std::function<void()>& call);
@@ -74,7 +83,7 @@ class HistoryStore : public HistorySink {
   storage::HistoryWriter writer_;
   Clock utc_now_ns_;
   LogSink log_;
-  std::optional<std::pair<std::string, std::string>> session_;  // As begun.
+  std::optional<Session> session_;  // As begun.
   bool moved_{false};  // Into a file that does not have what follows yet.
   // Of each episode the last event that names it, and the last one.
   std::map<std::uint64_t, std::vector<FaultEvent>> open_;

@@ -1,8 +1,12 @@
 #include "monitor/service/run_store.h"
 
 #include <algorithm>
+#include <optional>
 #include <stdexcept>
 #include <utility>
+#include <vector>
+
+#include "base/usual_period.h"
 
 namespace fdi::monitor {
 namespace {
@@ -19,14 +23,30 @@ storage::StoredSample ToStored(const ReceivedSample& received) {
   return stored;
 }
 
-// Sample period derived from two samples of a source, allowing for lost ones
-// between them; 1 s if they are out of order.
-double PeriodBetween(const Sample& first, const Sample& second) {
+// So many steps show the period, whatever gaps and jitter are among them.
+constexpr std::size_t kPeriodSteps = 32;
+
+// From one sample of a source to another one [s], allowing for lost ones
+// between them; nothing if they are out of order.
+std::optional<double> StepBetween(const Sample& first, const Sample& second) {
   if (second.seq <= first.seq || second.stamp_ns <= first.stamp_ns) {
-    return 1.0;
+    return std::nullopt;
   }
   return static_cast<double>(second.stamp_ns - first.stamp_ns) /
          static_cast<double>(second.seq - first.seq) / 1e9;
+}
+
+// The period of a stream with these steps, 1 s without any. One that keeps its
+// step is taken at its word; jitter blurs a round one. (One step may be
+// either.)
+double PeriodOf(const std::vector<double>& steps) {
+  if (steps.empty()) {
+    return 1.0;
+  }
+  const auto [least, most] = std::minmax_element(steps.begin(), steps.end());
+  const double median = ShorterMedian(steps);
+  const bool steady = steps.size() > 1 && *most - *least <= 1e-6 * median;
+  return steady ? median : UsualPeriod(median);
 }
 
 }  // namespace
@@ -59,14 +79,19 @@ void RunStore::Append(const ReceivedSample& sample) {
     End(sample.valve_id, streams.front());
     streams.erase(streams.begin());
   }
-  streams.push_back({sample.sample.source_id, std::nullopt, stored});
+  Stream& stream = streams.emplace_back();
+  stream.source_id = sample.sample.source_id;
+  stream.first = stored;
+  stream.last = sample.sample;
 }
 
 void RunStore::AppendTo(const std::string& valve_id, Stream& stream,
                         const storage::StoredSample& sample) {
   if (!stream.run) {
-    Begin(valve_id, stream, PeriodBetween(stream.first.sample, sample.sample));
+    const auto step = StepBetween(stream.first.sample, sample.sample);
+    Begin(valve_id, stream, step ? PeriodOf({*step}) : 1.0);
   }
+  AddStep(stream, sample);
   if (sample.intake == Intake::kAccepted &&
       sample.sample.stamp_ns - stream.start_ns >= kRunLengthNs) {
     recorder_.End(*stream.run);
@@ -75,6 +100,21 @@ void RunStore::AppendTo(const std::string& valve_id, Stream& stream,
     return;
   }
   recorder_.Append(*stream.run, sample);
+}
+
+// What begins with a late sample or a jump has its period from what follows.
+void RunStore::AddStep(Stream& stream, const storage::StoredSample& sample) {
+  if (stream.steps.size() >= kPeriodSteps) {
+    return;
+  }
+  if (const auto step = StepBetween(stream.last, sample.sample)) {
+    stream.steps.push_back(*step);
+    if (const double period_s = PeriodOf(stream.steps);
+        period_s != std::exchange(stream.period_s, period_s)) {
+      recorder_.SetPeriod(*stream.run, period_s);
+    }
+  }
+  stream.last = sample.sample;
 }
 
 void RunStore::Begin(const std::string& valve_id, Stream& stream,

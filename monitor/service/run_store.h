@@ -37,12 +37,15 @@ class RunStore : public SampleSink {
     storage::StoredSample first;  // Held until the second one starts a run.
     std::int64_t start_ns{0};     // Start of `run`.
     double period_s{1.0};
+    Sample last{};              // The newest one that counted as a step.
+    std::vector<double> steps;  // The first ones [s], which tell the period.
   };
   using Streams = std::vector<Stream>;  // of one valve, the newest at the end
 
   void AppendTo(const std::string& valve_id, Stream& stream,
                 const storage::StoredSample& sample);
   void Begin(const std::string& valve_id, Stream& stream, double period_s);
+  void AddStep(Stream& stream, const storage::StoredSample& sample);
   void End(const std::string& valve_id, Stream& stream);
 
   std::string software_;

@@ -15,6 +15,7 @@
 #include <cstdio>
 #include <exception>
 #include <functional>
+#include <limits>
 #include <utility>
 
 #include <systemd/sd-daemon.h>
@@ -22,9 +23,12 @@
 #include "base/printable.h"
 #include "base/time_text.h"
 #include "base/time_units.h"
+#include "diagnosis/loop_watch.h"
 #include "diagnosis/records/partitions.h"
 #include "diagnosis/records/valve_glob.h"
+#include "idl/interface_watch.h"
 #include "monitor/bus/dds_options.h"
+#include "monitor/clock_watch.h"
 #include "monitor/guard.h"
 #include "monitor/health_book.h"
 #include "monitor/service/shadow.h"
@@ -58,9 +62,17 @@ milliseconds Milliseconds(double seconds) {
   return milliseconds(static_cast<std::int64_t>(seconds * 1e3));
 }
 
-storage::DataDirectory Prepared(const std::filesystem::path& path) {
+// A folder that was not there may be one that was not meant.
+storage::DataDirectory Prepared(const std::filesystem::path& path,
+                                const LogSink& log) {
   storage::DataDirectory data{path};
+  const bool is_new = !std::filesystem::exists(path);
   storage::EnsureExists(data);
+  if (is_new) {
+    log(LogLevel::kWarning,
+        EventLine("data_folder_made",
+                  {{"path", std::filesystem::absolute(path).string()}}));
+  }
   PrepareModels(data.models());
   return data;
 }
@@ -72,6 +84,7 @@ PipelineOptions PipelineOptionsOf(const ServiceOptions& options) {
   pipeline.stale_timeout = Milliseconds(options.stale_timeout_s);
   pipeline.trace.before_s = options.trace_before_s;
   pipeline.second_look = options.second_look;
+  pipeline.loop_audit = options.loop_audit;
   return pipeline;
 }
 
@@ -131,7 +144,7 @@ Service::Service(const ServiceOptions& options, const report::Context& context)
                    ? std::make_unique<console::Console>(
                          *options.console, context.options, context.log)
                    : nullptr),
-      data_(Prepared(context.options.data_dir)),
+      data_(Prepared(context.options.data_dir, context.log)),
       lock_(data_.lock(), "recording faults"),
       hook_(
           options.on_event.empty()
@@ -203,6 +216,9 @@ Service::Service(const ServiceOptions& options, const report::Context& context)
       heartbeat_(Members(pipeline_, recorder_.get(), service_pulse_)),
       started_ns_(NowNs()),
       last_status_line_(Clock::now()) {
+  // Decision vectors of loops without a model set refer to it; it is in no
+  // store.
+  models_topic_.Write(idl::Describe(*AuditModels(LoopWatch::kInterval_s)));
   AttachListeners();
   ListAfterCommit();
 }
@@ -211,7 +227,8 @@ Service::~Service() = default;
 
 // Who follows the valves, in this order.
 void Service::AttachListeners() {
-  pipeline_.Attach(std::make_unique<HealthBooks>());
+  pipeline_.Attach(std::make_unique<HealthBooks>(counters_));
+  pipeline_.Attach(std::make_unique<ClockWatch>(NowNs, context_.log));
   if (shadow_) {
     pipeline_.Attach(*shadow_);
   }
@@ -305,7 +322,8 @@ bool Service::RecordingDegraded() const {
 }
 
 void Service::Start() {
-  history_.BeginSession(context_.software, context_.command_line);
+  history_.BeginSession(context_.software, context_.command_line,
+                        report::LoadFaultTexts(context_.options).Names());
   if (hook_) {
     hook_->Start();
   }
@@ -371,6 +389,19 @@ void Service::ExpectSeenValves() {
   }
 }
 
+// A valve whose stream ended has left nothing but its alarm.
+void Service::ExpectAlarmedValves() {
+  storage::HistoryReader reader(data_.history());
+  constexpr std::int64_t kAll = std::numeric_limits<std::int64_t>::max();
+  for (const storage::Alarm& alarm : reader.AlarmList(NowNs(), kAll)) {
+    const storage::Episode& episode = alarm.episode;
+    if (GlobMatches(options_.valves, episode.valve_id)) {
+      console_->live().Expect(episode.valve_id, episode.unconfirmed_ns.value_or(
+                                                    episode.detected_ns));
+    }
+  }
+}
+
 void Service::ExpectAssignedValves() {
   for (const std::string& valve_id : assignment_->AssignedValves()) {
     if (GlobMatches(options_.valves, valve_id)) {
@@ -389,6 +420,7 @@ void Service::ServeConsole() {
   console_->Start({data_.history(), data_.models(), context_.software,
                    started_ns_, facts, NowNs});
   ExpectSeenValves();
+  ExpectAlarmedValves();
   ExpectAssignedValves();
 }
 
@@ -599,7 +631,8 @@ StatusFacts Service::Facts() const {
           RecordingDegraded(),
           heartbeat_.StalledSince(Clock::now() - kStallLimit),
           pair_ ? std::optional(pair_->status()) : std::nullopt,
-          shares_.contested()};
+          shares_.contested(),
+          idl::MissingInterfaces()};
 }
 
 std::string Service::Metrics() const {

@@ -47,6 +47,7 @@ struct ServiceOptions {
   bool lossless_decisions{false};
   bool best_effort{false};  ///< ValveSample without retransmission.
   bool second_look{true};   ///< Of onboarded valves, by physics.
+  bool loop_audit{true};    ///< Of valves without a model set.
   double stale_timeout_s{3600.0};
   double trace_before_s{1800.0};
   double status_period_s{60.0};     ///< Of the status line in the log.
@@ -97,6 +98,7 @@ class Service {
   void ResendEvents();
   void ServeConsole();
   void ExpectSeenValves();
+  void ExpectAlarmedValves();
   void ExpectAssignedValves();
   void ServeProbes();
   void Diagnose();

@@ -2,15 +2,18 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <map>
+#include <random>
 #include <system_error>
 #include <utility>
 
 #include <nlohmann/json.hpp>
 #include <sys/resource.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "base/printable.h"
@@ -318,6 +321,10 @@ idl::MonitorStatusMessage StatusOf(const StatusFacts& facts) {
     status.text += status.text.empty() ? "" : "; ";
     status.text += "nobody stands by";
   }
+  if (!facts.missing_interfaces.empty()) {
+    status.text += status.text.empty() ? "" : "; ";
+    status.text += "no interface has " + facts.missing_interfaces;
+  }
   if (facts.contested.count > 0) {
     status.text += status.text.empty() ? "" : "; ";
     status.text +=
@@ -346,14 +353,30 @@ idl::MonitorStatusMessage StatusOf(const StatusFacts& facts) {
 }
 
 std::string MonitorName() {
-  // 47 bytes of the host, a colon and the pid fit the 64 bytes that the wire
-  // has for the name of a monitor. gethostname() need not terminate a name that
-  // it cuts: the last byte, which it is not given, remains 0.
-  std::array<char, 48> host{};
-  if (gethostname(host.data(), host.size() - 1) != 0) {
-    host = {'?'};
-  }
-  return std::string(host.data()) + ":" + std::to_string(getpid());
+  static const std::string name = [] {
+    // 47 bytes of the host, a colon, the pid and the suffix fit the 64 bytes
+    // that the wire has for the name of a monitor. gethostname() need not
+    // terminate a name that it cuts: the last byte, which it is not given,
+    // remains 0.
+    std::array<char, 48> host{};
+    if (gethostname(host.data(), host.size() - 1) != 0) {
+      host = {'?'};
+    }
+    std::string unique =
+        std::string(host.data()) + ":" + std::to_string(getpid());
+    // In containers every monitor may be HOST:1.
+    constexpr ino_t kFirstPidNamespace = 0xEFFFFFFC;  // Linux, proc_ns.h
+    struct stat pids {};
+    if (stat("/proc/self/ns/pid", &pids) != 0 ||
+        pids.st_ino != kFirstPidNamespace) {
+      std::array<char, 8> suffix{};
+      std::snprintf(suffix.data(), suffix.size(), "-%06x",
+                    std::random_device()() & 0xFFFFFFU);
+      unique += suffix.data();
+    }
+    return unique;
+  }();
+  return name;
 }
 
 std::string ManagerLine(const idl::MonitorStatusMessage& status) {

@@ -40,6 +40,7 @@ struct StatusFacts {
   std::vector<std::string_view> stalled{};  ///< Names of threads.
   std::optional<Pair::Status> pair{};       ///< Nothing: not in a pair.
   ContestedValves contested{};
+  std::string missing_interfaces{};  ///< Of DDS; see MissingInterfaces().
 };
 
 /// All counters and gauges, the counters first.
@@ -48,7 +49,8 @@ std::vector<Measure> MeasuresOf(const StatusFacts& facts);
 /// Named measures and health. The caller sets monitor, software and stamps.
 idl::MonitorStatusMessage StatusOf(const StatusFacts& facts);
 
-/// "host:pid"
+/// "host:pid"; with a random suffix in a pid namespace of its own (a
+/// container).
 std::string MonitorName();
 
 /// One line for a service manager, without values that change all the time.

@@ -10,7 +10,9 @@
 #include <httplib.h>
 
 #include "base/time_units.h"
+#include "planner/fleet_report.h"
 #include "planner/work_list.h"
+#include "storage/history/foreign_history.h"
 #include "storage/history/health.h"
 
 namespace fdi::planner {
@@ -23,6 +25,7 @@ using console::TimeParameter;
 
 constexpr std::int64_t kDays = 90;  // Unless since_ms says otherwise.
 constexpr std::int64_t kMaxRows = 1000;
+constexpr std::int64_t kWeek = 7 * kNsPerDay;
 constexpr std::int64_t kCacheNs = 60'000'000'000;
 
 // The last work list that was requested.
@@ -31,6 +34,7 @@ struct WorkListCache {
   std::string query;
   std::int64_t read_ns{0};
   std::vector<WorkRow> rows;
+  std::string note;  // What was left out.
 };
 
 std::vector<HealthLimit> LimitsOf(const httplib::Request& request) {
@@ -62,19 +66,28 @@ report::Report ReadReport(WorkListCache& cache, const Api& api,
     work.limits = LimitsOf(request);
     const auto history = api.History();
     cache.rows = ReadWorkList(*history, api.texts, work);
+    cache.note = storage::TakeNote(*history);
     cache.query = query;
     cache.read_ns = now_ns;
   }
-  return WorkListReport(cache.rows);
+  report::Report report = WorkListReport(cache.rows);
+  report.document["note"] = console::TextOrNull(cache.note);
+  return report;
 }
 
 // One array per quantity, as charts need them; all have the same length.
-Json ColumnsJson(const std::vector<HealthHour>& hours) {
+Json ColumnsJson(const std::vector<HealthHour>& hours,
+                 const report::FaultTexts& texts) {
   Json columns;
   for (const char* key :
-       {"t_ms", "seen_h", "live_h", "alarm_h", "open_h", "shut_h", "d0",
-        "travel_strokes", "reversals", "epoch"}) {
+       {"t_ms", "seen_h", "live_h", "alarm_h", "auto_h", "open_h", "shut_h",
+        "d0", "travel_strokes", "path_strokes", "reversals", "slip_jumps",
+        "turns", "steps", "exceeded", "status", "epoch"}) {
     columns[key] = Json::array();
+  }
+  for (std::size_t i = 0; i < loop::kFigureCount; ++i) {
+    columns[std::string(loop::FigureName(static_cast<loop::Figure>(i)))] =
+        Json::array();
   }
   // If an hour lacks a channel, for example because the model set was
   // different, its columns have nulls.
@@ -88,7 +101,7 @@ Json ColumnsJson(const std::vector<HealthHour>& hours) {
       }
     }
   };
-  const Json rows = HealthHoursJson(hours);
+  const Json rows = HealthHoursJson(hours, texts);
   for (std::size_t i = 0; i < rows.size(); ++i) {
     for (auto& [key, column] : columns.items()) {
       column.push_back(key == "t_ms" ? console::Ms(hours[i].hour * kNsPerHour)
@@ -124,27 +137,73 @@ Json Health(const Api& api, const httplib::Request& request) {
   const std::vector<HealthHour> hours =
       history->Health({valve_id, since_ns, now_ns + kNsPerHour});
   Json json{{"valve", valve_id}, {"step", hourly ? "hour" : "day"}};
-  json.update(ColumnsJson(hourly ? hours : DaysOf(hours)));
+  json.update(ColumnsJson(hourly ? hours : DaysOf(hours), api.texts));
   json["trends"] = TrendsJson(TrendsOf(hours, limits));
+  json["note"] = console::TextOrNull(storage::TakeNote(*history));
   return json;
+}
+
+// The last report that was requested.
+struct FleetCache {
+  std::mutex mutex;
+  std::int64_t since_ns{-1};  // As asked for; 0: the last week.
+  std::int64_t made_ns{0};
+  report::Report report;
+};
+
+// Without the audit of stored runs, which takes long.
+report::Report ReadFleet(FleetCache& cache, const Api& api,
+                         const httplib::Request& request) {
+  const std::int64_t since_ns = TimeParameter(request, "since_ms", 0);
+  const std::int64_t now_ns = api.sources.utc_now_ns();
+  const std::lock_guard lock(cache.mutex);
+  if (since_ns != cache.since_ns || now_ns >= cache.made_ns + kCacheNs ||
+      now_ns < cache.made_ns) {
+    FleetQuery query;
+    query.now_ns = now_ns;
+    query.since_ns = since_ns > 0 ? since_ns : now_ns - kWeek;
+    query.software = api.sources.software;
+    if (!api.sources.plant_history) {
+      query.loops = LoopsOf(api.sources.models);
+      query.causes = CausesOf(api.sources.history, query.since_ns);
+    }
+    const auto history = api.History();
+    cache.report = FleetReport(history.get(), api.texts, query);
+    cache.since_ns = since_ns;
+    cache.made_ns = now_ns;
+  }
+  return cache.report;
 }
 
 }  // namespace
 
 std::vector<console::Route> ConsoleRoutes() {
+  const auto fleet = std::make_shared<FleetCache>();
   const auto cache = std::make_shared<WorkListCache>();
-  return {{"/api/v1/worklist",
-           [cache](const Api& api, const httplib::Request& request) {
-             return ReadReport(*cache, api, request).document;
-           }},
-          {"/api/v1/worklist.csv", nullptr,
-           [cache](const Api& api, const httplib::Request& request) {
-             std::ostringstream csv;
-             ReadReport(*cache, api, request).PrintCsv(csv);
-             return console::File{"text/csv; charset=utf-8", "worklist.csv",
-                                  csv.str()};
-           }},
-          {"/api/v1/valves/(.+)/health", Health}};
+  return {
+      {"/api/v1/worklist",
+       [cache](const Api& api, const httplib::Request& request) {
+         return ReadReport(*cache, api, request).document;
+       }},
+      {"/api/v1/worklist.csv", nullptr,
+       [cache](const Api& api, const httplib::Request& request) {
+         std::ostringstream csv;
+         ReadReport(*cache, api, request).PrintCsv(csv);
+         return console::File{"text/csv; charset=utf-8", "worklist.csv",
+                              csv.str()};
+       }},
+      {"/api/v1/report",
+       [fleet](const Api& api, const httplib::Request& request) {
+         return ReadFleet(*fleet, api, request).document;
+       }},
+      {"/api/v1/report.html", nullptr,
+       [fleet](const Api& api, const httplib::Request& request) {
+         std::ostringstream html;
+         ReadFleet(*fleet, api, request)
+             .PrintHtml(html, kFleetTitle, {true, true});
+         return console::File{"text/html; charset=utf-8", "", html.str(), true};
+       }},
+      {"/api/v1/valves/(.+)/health", Health}};
 }
 
 }  // namespace fdi::planner

@@ -97,6 +97,14 @@ void PlantFeed::Poll(Clock::time_point now) {
     monitor.line.silent = now - monitor.heard > kMonitorSilence;
     monitor.line.valves = 0;
   }
+  std::erase_if(valves_, [&](const auto& item) {
+    const bool forget = now - item.second.heard > kForgetValve;
+    if (forget) {
+      Checkpoint none;
+      board_.OnRemoved(item.first, none);
+    }
+    return forget;
+  });
   for (auto& [id, valve] : valves_) {
     Monitor& monitor = monitors_[valve.participant];
     ++monitor.line.valves;

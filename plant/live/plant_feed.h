@@ -23,6 +23,9 @@ class PlantFeed {
   using Clock = std::chrono::steady_clock;
   /// A monitor publishes its status each second.
   static constexpr std::chrono::milliseconds kMonitorSilence{1800};
+  /// After which a silent valve leaves the page. Long enough for every shift to
+  /// have seen it; its alarms stay, they are the history's.
+  static constexpr std::chrono::hours kForgetValve{24};
 
   explicit PlantFeed(console::LiveBoard& board) : board_(board) {}
 
@@ -35,8 +38,9 @@ class PlantFeed {
            const idl::Reception& reception, Clock::time_point now);
 
   /// Marks as silent the valves that sent nothing for three of their periods
-  /// and at least 3 s, or whose monitor is silent. Forgets monitors without
-  /// valves after a minute of silence. Call several times a second.
+  /// and at least 3 s, or whose monitor is silent. Forgets valves after
+  /// kForgetValve, monitors without valves after a minute of silence. Call
+  /// several times a second.
   void Poll(Clock::time_point now);
 
   /// Ordered by name; thread safe.

@@ -1,17 +1,25 @@
 #include <algorithm>
+#include <chrono>
+#include <condition_variable>
 #include <memory>
+#include <mutex>
 #include <optional>
+#include <stop_token>
 #include <string>
+#include <thread>
 #include <type_traits>
 
 #include <CLI/CLI.hpp>
 
 #include "base/time_text.h"
+#include "base/time_units.h"
+#include "diagnosis/records/valve_glob.h"
 #include "monitor/console/console.h"
 #include "monitor/throttled_log.h"
 #include "plant/live/plant_feed.h"
 #include "plant/plant_reader.h"
 #include "programs/monitor/bus_view.h"
+#include "programs/monitor/console_access.h"
 #include "programs/monitor/planner.h"
 #include "programs/monitor/verbs.h"
 #include "report/program.h"
@@ -24,6 +32,7 @@ struct PlantConsoleOptions {
   std::string from;
   std::string listen{"127.0.0.1:8081"};
   console::ConsoleOptions console;
+  ConsoleAccess access;
   BusOptions bus{.program = "fdi-monitor console"};
 };
 
@@ -36,11 +45,51 @@ console::MonitorFacts FactsOf(const std::vector<console::MonitorLine>& lines) {
   return {well ? "OK" : "DEGRADED", {}, 0};
 }
 
+// Short: people wait for the answer, and after one failure all get it at once.
+storage::PlantLimits Limits(const std::stop_token& stop) {
+  storage::PlantLimits limits;
+  limits.connect = std::chrono::seconds(5);
+  limits.lock = std::chrono::seconds(5);
+  limits.statement = std::chrono::seconds(10);
+  limits.stop = stop;
+  return limits;
+}
+
+// Lists the valves of the last month also if they are silent. Tried again until
+// the plant's history answers; that it is away is on the page already.
+void ExpectSeenValves(const std::stop_token& stop,
+                      const PlantConsoleOptions& options,
+                      console::LiveBoard& board) {
+  constexpr std::int64_t kMonthNs = 30 * kNsPerDay;
+  constexpr std::chrono::seconds kRetry{10};
+  std::mutex mutex;
+  std::condition_variable_any stopped;
+  while (!stop.stop_requested()) {
+    try {
+      storage::PlantReader plant(options.from, "", Limits(stop));
+      for (const auto& [valve, last_ns] :
+           plant.SeenValves(NowNs() - kMonthNs)) {
+        if (GlobMatches(options.bus.valves, valve)) {
+          board.Expect(valve, last_ns);
+        }
+      }
+      return;
+    } catch (const std::exception&) {
+      std::unique_lock lock(mutex);
+      stopped.wait_for(lock, stop, kRetry, [] { return false; });
+    }
+  }
+}
+
 int RunConsole(PlantConsoleOptions options, const report::Context& context) {
+  options.access.ApplyTo(options.console);
   options.console.address = ParseHttpAddress(options.listen, "--listen");
   options.console.routes = PlannerRoutes();
   const LogSink log = LimitLog(context.log);
-  const report::StopSignals signals;
+  using Signals = report::StopSignals;
+  Signals signals(options.access.given() ? Signals::HangUp::kReload
+                                         : Signals::HangUp::kStop);
+  std::stop_source stopping;
   const std::int64_t started_ns = NowNs();
   std::optional<PlantFeed> feed;  // Outlives the console's threads.
   console::Console console(options.console, context.options, log);
@@ -52,11 +101,19 @@ int RunConsole(PlantConsoleOptions options, const report::Context& context) {
                  started_ns,
                  [&feed] { return FactsOf(feed->monitors()); },
                  NowNs,
-                 [url = options.from] {
-                   return std::make_unique<storage::PlantReader>(url);
+                 [url = options.from, stop = stopping.get_token()] {
+                   return std::make_unique<storage::PlantReader>(url, "",
+                                                                 Limits(stop));
                  },
                  [&feed] { return feed->monitors(); }});
+  const std::jthread expecting([&](const std::stop_token& stop) {
+    ExpectSeenValves(stop, options, console.live());
+  });
   while (!signals.stop_requested()) {
+    if (signals.WaitFor(std::chrono::milliseconds(0)) ==
+        Signals::Event::kReload) {
+      console.Reload();
+    }
     bus.Take(
         [&](const auto& message, const idl::Reception& reception) {
           using Message = std::decay_t<decltype(message)>;
@@ -72,6 +129,7 @@ int RunConsole(PlantConsoleOptions options, const report::Context& context) {
         [](const std::string& /*valve_id*/) {});
     feed->Poll(PlantFeed::Clock::now());
   }
+  stopping.request_stop();
   console.Close();
   return report::kExitOk;
 }
@@ -99,6 +157,7 @@ void AddConsoleVerb(report::Program& program) {
                   "free one")
       ->capture_default_str()
       ->type_name("ADDRESS:PORT");
+  AddConsoleAccess(console, options->access, nullptr);
   console
       .add_option("--console-files", options->console.files,
                   "Folder of the page instead of the installed one")

@@ -7,11 +7,11 @@
 #include <string>
 
 #include <CLI/CLI.hpp>
-#include <arpa/inet.h>
 
 #include "base/error.h"
 #include "monitor/service/service.h"
 #include "monitor/throttled_log.h"
+#include "programs/monitor/console_access.h"
 #include "programs/monitor/planner.h"
 #include "programs/monitor/verbs.h"
 #include "report/program.h"
@@ -28,8 +28,7 @@ struct RunArguments {
   std::string console{"off"};
   console::ConsoleOptions console_options;
   std::string console_token;
-  std::string console_users;
-  TlsFiles console_tls;
+  ConsoleAccess console_access;
   PairOptions pair;
   std::filesystem::path groups;
   ServiceOptions service;
@@ -63,28 +62,11 @@ std::function<std::string(std::string)> AddressOr(const std::string& usual) {
   };
 }
 
-std::string CheckAddress(const std::string& text) {
-  std::array<unsigned char, sizeof(in6_addr)> ignored{};
-  return inet_pton(AF_INET, text.c_str(), ignored.data()) == 1 ||
-                 inet_pton(AF_INET6, text.c_str(), ignored.data()) == 1
-             ? ""
-             : text + " is no IPv4 or IPv6 address";
-}
-
-std::string CheckHeader(const std::string& text) {
-  return std::all_of(
-             text.begin(), text.end(),
-             [](unsigned char c) { return std::isalnum(c) != 0 || c == '-'; })
-             ? ""
-             : text + " has more than letters, digits and '-'";
-}
-
 void TakeConsole(const RunArguments& arguments, ServiceOptions& options) {
   const bool writable = !arguments.console_token.empty();
-  const bool users = !arguments.console_users.empty();
-  const bool tls = !arguments.console_tls.certificate.empty();
   if (arguments.console == "off") {
-    if (writable || users || tls || !arguments.console_options.files.empty()) {
+    if (writable || arguments.console_access.given() ||
+        !arguments.console_options.files.empty()) {
       throw ConfigError(
           "--console-write, --console-users, --console-tls and "
           "--console-files need --console[=[ADDRESS:]PORT]");
@@ -99,12 +81,7 @@ void TakeConsole(const RunArguments& arguments, ServiceOptions& options) {
   if (writable) {
     console.admission.token_file = arguments.console_token;
   }
-  if (users) {
-    console.admission.users_file = arguments.console_users;
-  }
-  if (tls) {
-    console.tls = arguments.console_tls;
-  }
+  arguments.console_access.ApplyTo(console);
 }
 
 void AddConsoleOptions(CLI::App& run, RunArguments& arguments) {
@@ -120,36 +97,7 @@ void AddConsoleOptions(CLI::App& run, RunArguments& arguments) {
                      "shelve and label; a FILE that does not exist is made "
                      "with a random token")
           ->type_name("FILE");
-  CLI::Option* users =
-      run.add_option("--console-users", arguments.console_users,
-                     "Ask for a name and a password of FILE, which "
-                     "console-user makes, and let each user do what the role "
-                     "allows")
-          ->excludes(token)
-          ->type_name("FILE");
-  console::AdmissionOptions& admission = arguments.console_options.admission;
-  CLI::Option* header =
-      run.add_option("--console-proxy-user", admission.proxy_header,
-                     "Header by which a proxy says which of those users asks")
-          ->needs(users)
-          ->check(CheckHeader)
-          ->type_name("HEADER");
-  CLI::Option* proxy =
-      run.add_option("--console-proxy-from", admission.proxy_address,
-                     "Address of that proxy; the header is ignored from others")
-          ->needs(header)
-          ->check(CheckAddress)
-          ->type_name("ADDRESS");
-  header->needs(proxy);
-  CLI::Option* tls =
-      run.add_option("--console-tls", arguments.console_tls.certificate,
-                     "Serve https with this certificate, its issuers and, "
-                     "without --console-key, its key; SIGHUP reads them anew")
-          ->type_name("FILE.pem");
-  run.add_option("--console-key", arguments.console_tls.key,
-                 "Its key, without passphrase and only for the service to read")
-      ->needs(tls)
-      ->type_name("FILE.pem");
+  AddConsoleAccess(run, arguments.console_access, token);
   run.add_option("--console-files", arguments.console_options.files,
                  "Folder of the page instead of the installed one")
       ->type_name("DIR");
@@ -226,6 +174,16 @@ int Run(const RunArguments& arguments, const report::Context& context) {
   return service.Run(signals);
 }
 
+// Who judges beside the observers.
+void AddJudgeOptions(CLI::App& run, ServiceOptions& service) {
+  run.add_flag("!--no-second-look", service.second_look,
+               "Name faults as the observers do, without the second look by "
+               "the physics of an onboarded valve");
+  run.add_flag("!--no-loop-audit", service.loop_audit,
+               "Leave valves without a model set unjudged, without the audit "
+               "of their loops");
+}
+
 }  // namespace
 
 void AddRunVerb(report::Program& program) {
@@ -266,9 +224,7 @@ void AddRunVerb(report::Program& program) {
                "slow subscriber of it holds the monitor up");
   run.add_flag("--best-effort", service.best_effort,
                "Take samples without retransmission");
-  run.add_flag("!--no-second-look", service.second_look,
-               "Name faults as the observers do, without the second look by "
-               "the physics of an onboarded valve");
+  AddJudgeOptions(run, service);
   run.add_option("--stale-timeout", service.stale_timeout_s,
                  "Close an episode when its valve was silent for this time [s]")
       ->check(CLI::Range(1.0, 1e7))

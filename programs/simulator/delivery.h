@@ -27,13 +27,17 @@ struct DeliveryOptions {
   std::optional<std::string> speed;
   std::optional<double> wait_reader_s;
   bool keep_alive{false};
-  std::string start;  ///< RFC 3339, or empty: now.
+  std::string start;    ///< RFC 3339, or empty: now.
+  bool end_now{false};  ///< The last stamp is that of its publication.
 };
 
 void AddDeliveryOptions(CLI::App& verb, DeliveryOptions& options);
 
-/// options.start, or now to the millisecond. @throws ConfigError
-std::int64_t StartOf(const DeliveryOptions& options);
+/// options.start, or now to the millisecond; with end_now so much earlier that
+/// the last of the samples is stamped when it is published: before that each is
+/// older than the clock. @throws ConfigError
+std::int64_t StartOf(const DeliveryOptions& options, double duration_s,
+                     double speed);
 
 /// Parses "1", "0.5", "60" (times real time) or "max" (infinity: as fast as the
 /// readers accept samples). @throws ConfigError naming these.

@@ -217,13 +217,13 @@ std::optional<Sample> StreamFeed::TakeLine(const std::string& line) {
 }
 
 void StreamFeed::ConvertFlow(Sample& sample) {
-  if (!options_.flow_unit) {
+  if (!options_.flow) {
     return;
   }
   if (!conversion_) {
-    conversion_.emplace(*options_.flow_unit);
+    conversion_.emplace(*options_.flow);
     if (sample.Has(Signal::kF)) {
-      ReportConversion(log_, kStdin, sample.flow_unit, *options_.flow_unit);
+      ReportConversion(log_, kStdin, sample.flow_unit, options_.flow->unit);
     }
   }
   conversion_->Apply(sample);

@@ -63,8 +63,8 @@ struct StreamOptions {
   bool split_gaps{false};
   /// 0: the first step, or 1 s for JSON lines without t_s.
   double period_s{0.0};
-  /// Unit to which flow is converted; nothing: unchanged.
-  std::optional<FlowUnit> flow_unit{};
+  /// To which flow is converted; nothing: unchanged.
+  std::optional<FlowTarget> flow{};
 };
 
 /// Samples from a pipe, line by line, as CSV or JSON (detected from the first

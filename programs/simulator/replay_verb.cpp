@@ -1,3 +1,4 @@
+#include <chrono>
 #include <filesystem>
 #include <memory>
 #include <string>
@@ -12,6 +13,7 @@
 #include "programs/simulator/delivery.h"
 #include "programs/simulator/recorded_feed.h"
 #include "programs/simulator/verbs.h"
+#include "simulator/second_look/valve_physics.h"
 #include "simulator/valve_equations.h"
 #include "storage/database/data_directory.h"
 #include "storage/models/models.h"
@@ -55,17 +57,18 @@ Recording LoadRun(const ReplayOptions& options,
   return recording;
 }
 
-// The flow unit of the valve's model set in the data directory, if any.
-std::optional<FlowUnit> UnitOf(const std::string& valve,
-                               const report::Context& context) {
+// Of the valve's model set in the data directory, if any.
+std::optional<FlowTarget> FlowTargetOf(const std::string& valve,
+                                       const report::Context& context) {
   const storage::DataDirectory data{context.options.data_dir};
   if (!std::filesystem::exists(data.models())) {
     return std::nullopt;
   }
   storage::ModelStore store(data.models());
   const auto assigned = store.AssignedModelSet(valve);
-  return assigned ? std::optional(store.Load(*assigned).flow_unit)
-                  : std::nullopt;
+  return assigned
+             ? std::optional(simulator::FlowTargetOf(store.Load(*assigned)))
+             : std::nullopt;
 }
 
 Recording LoadCsv(const ReplayOptions& options,
@@ -77,11 +80,12 @@ Recording LoadCsv(const ReplayOptions& options,
                     .log = context.log});
   Recording recording;
   const FlowUnit own = table.header.flow_unit;
-  const FlowUnit unit = UnitOf(options.valve, context).value_or(own);
+  const FlowTarget to =
+      FlowTargetOf(options.valve, context).value_or(FlowTarget{own});
   if ((table.header.signals & MaskOf(Signal::kF)) != 0) {
-    ReportConversion(context.log, options.csv, own, unit);
+    ReportConversion(context.log, options.csv, own, to.unit);
   }
-  FlowConversion conversion(unit);
+  FlowConversion conversion(to);
   for (SampleSeries run : table.runs) {
     for (LabelledSample& labelled : run.samples) {
       conversion.Apply(labelled.sample);
@@ -102,15 +106,21 @@ void Check(const ReplayOptions& options) {
   if (options.keep_stamps && !options.delivery.start.empty()) {
     throw ConfigError("--keep-stamps and --start exclude each other");
   }
+  if (options.delivery.end_now &&
+      (options.keep_stamps || options.csv == kStdinName)) {
+    throw ConfigError(
+        "--end-now goes neither with --keep-stamps nor with --csv -, whose end "
+        "is not known");
+  }
   if (options.csv.empty() && options.table.given()) {
     throw ConfigError("--map, --zone and --resample are of --csv");
   }
-  StartOf(options.delivery);  // An invalid one is rejected first.
+  StartOf(options.delivery, 0.0, 1.0);  // An invalid one is rejected first.
 }
 
 // Opens the feed; sets `valve_id` if the options do not.
-std::unique_ptr<Feed> OpenFeed(const ReplayOptions& options,
-                               const Restamping& restamping,
+std::unique_ptr<Feed> OpenFeed(const ReplayOptions& options, double speed,
+                               Restamping restamping,
                                const report::Context& context,
                                report::StopSignals& signals,
                                std::string& valve_id) {
@@ -120,7 +130,7 @@ std::unique_ptr<Feed> OpenFeed(const ReplayOptions& options,
           "--csv -: what is resampled or long is read as a whole; try a file");
     }
     StreamOptions stream = options.stream;
-    stream.flow_unit = UnitOf(options.valve, context);
+    stream.flow = FlowTargetOf(options.valve, context);
     return std::make_unique<StreamFeed>(STDIN_FILENO, signals, stream,
                                         restamping, context.log);
   }
@@ -129,12 +139,24 @@ std::unique_ptr<Feed> OpenFeed(const ReplayOptions& options,
   if (valve_id.empty()) {
     valve_id = recording.valve_id;
   }
+  if (!recording.samples.empty()) {
+    restamping.start =
+        [&options, speed,
+         duration_s = 1e-9 * static_cast<double>(
+                                 recording.samples.back().sample.stamp_ns -
+                                 recording.samples.front().sample.stamp_ns)] {
+          return StartOf(options.delivery, duration_s, speed);
+        };
+  }
   return std::make_unique<StoredFeed>(std::move(recording.samples), restamping);
 }
 
 report::Report Replay(ReplayOptions options, const report::Context& context) {
   Check(options);
   options.stream.map = options.table.Read(context.options.utc);
+  if (const auto target = FlowTargetOf(options.valve, context)) {
+    importer::CheckGasFlow(options.stream.map, MolarMass(target->medium));
+  }
   const bool at_once = options.csv == kStdinName && !options.delivery.speed;
   const double speed =
       ParseSpeed(options.delivery.speed.value_or(at_once ? "max" : "1"));
@@ -146,13 +168,19 @@ report::Report Replay(ReplayOptions options, const report::Context& context) {
   }
   Restamping restamping;
   restamping.keep = options.keep_stamps;
-  restamping.start = [&options] { return StartOf(options.delivery); };
+  restamping.start = [&options, speed] {
+    return StartOf(options.delivery, 0.0, speed);
+  };
   restamping.source_id = NewSourceId();
 
   report::StopSignals signals;
+  // Nothing is published before the whole file is read.
+  signals.EndWithin(std::chrono::milliseconds(800),
+                    "fdi-simulator: error: interrupted\n");
   FedValve valve{options.valve, restamping.source_id};
   const auto feed =
-      OpenFeed(options, restamping, context, signals, valve.valve_id);
+      OpenFeed(options, speed, restamping, context, signals, valve.valve_id);
+  signals.EndWithin(std::chrono::milliseconds(0));
   RequireValveId(valve.valve_id);
   FeedSinks sinks;
   sinks.publisher = std::make_unique<SamplePublisher>(

@@ -39,7 +39,7 @@ struct RunOptions {
 };
 
 // Applies the scenario file, then the options, then --set.
-Scenario BaseScenario(const RunOptions& options) {
+Scenario BaseScenario(const RunOptions& options, double speed) {
   Scenario scenario;
   ValveSimulationConfig& config = scenario.config;
   if (!options.scenario.empty()) {
@@ -67,7 +67,7 @@ Scenario BaseScenario(const RunOptions& options) {
     ApplySetting(setting, scenario);
   }
   if (config.start_ns == 0 || !options.delivery.start.empty()) {
-    config.start_ns = StartOf(options.delivery);
+    config.start_ns = StartOf(options.delivery, config.duration_s, speed);
   }
   return scenario;
 }
@@ -83,12 +83,12 @@ std::string ValveIdOf(const std::string& base, int index) {
 }
 
 // One scenario per valve, each with its own seed and source.
-std::vector<Scenario> Scenarios(const RunOptions& options) {
+std::vector<Scenario> Scenarios(const RunOptions& options, double speed) {
   if (!options.export_file.empty() && options.valves > 1) {
     throw ConfigError("--export takes one valve, not " +
                       std::to_string(options.valves));
   }
-  const Scenario base = BaseScenario(options);
+  const Scenario base = BaseScenario(options, speed);
   const auto others = static_cast<std::uint64_t>(options.valves) - 1;
   if (base.config.seed > kMaxSeed - others) {
     throw ConfigError("--valves " + std::to_string(options.valves) +
@@ -157,7 +157,7 @@ report::Report Run(const RunOptions& options, const report::Context& context) {
   const double speed = options.no_publish
                            ? ParseSpeed("max")
                            : ParseSpeed(options.delivery.speed.value_or("1"));
-  const std::vector<Scenario> scenarios = Scenarios(options);
+  const std::vector<Scenario> scenarios = Scenarios(options, speed);
   report::StopSignals signals;
   SimulationFeed feed(scenarios, signals);
   std::vector<FedValve> valves;
@@ -226,13 +226,13 @@ void AddScenarioOptions(CLI::App& verb, RunOptions& options) {
       ->default_str("")
       ->allow_extra_args(false);
   verb.add_option("--parameters", options.parameters,
-                  "lublin-actuator-3 (default), lublin-actuator-3-refit, "
-                  "paper-operating-point or FILE.toml")
-      ->type_name("NAME");
+                  "The valve (default: lublin-actuator-3)")
+      ->type_name(
+          "lublin-actuator-3|lublin-actuator-3-refit|paper-operating-point|"
+          "FILE.toml");
   verb.add_option("--excitation", options.excitation,
-                  "operating-point (default), sine, level-loop, "
-                  "inventory-loop or csv:FILE")
-      ->type_name("NAME");
+                  "What moves it (default: operating-point)")
+      ->type_name("operating-point|sine|level-loop|inventory-loop|csv:FILE");
   verb.add_option("--set", options.settings,
                   "A scenario key, e.g. excitation.amplitude_pct=5, "
                   "noise=false, parameters.trim.kv_m3_h=72; may be repeated")

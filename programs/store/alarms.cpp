@@ -61,7 +61,9 @@ Report Acknowledge(const AckOptions& options, const Context& context) {
   if (episodes.empty()) {
     report.Line("no episode to acknowledge");
   }
-  report.document["episodes"] = Rows(episodes, EpisodeJson);
+  NameFaults(episodes, context);
+  report.document["episodes"] =
+      Rows(reader.Alarms(std::move(episodes), NowNs()), EpisodeJson);
   return report;
 }
 
@@ -78,9 +80,12 @@ Report LabelEpisode(const EpisodeLabelOptions& options,
   HistoryEditor editor(path);
   const std::uint64_t id =
       editor.Label(options.id, options.label, options.note.Note());
-  const Episode episode = reader.Show(EpisodeIdText(id));
+  std::vector<Episode> labelled{reader.Show(EpisodeIdText(id))};
+  NameFaults(labelled, context);
+  const Alarm alarm = reader.Alarms(std::move(labelled), NowNs()).front();
+  const Episode& episode = alarm.episode;
   Report report;
-  report.document = EpisodeJson(episode);
+  report.document = EpisodeJson(alarm);
   return report.Line(episode.episode_id + " labelled " +
                      episode.label.value_or(""));
 }

@@ -4,8 +4,10 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <cmath>
 #include <filesystem>
 #include <iterator>
+#include <map>
 #include <span>
 
 #include "base/csv_cells.h"
@@ -13,6 +15,7 @@
 #include "import/csv.h"
 #include "import/layout.h"
 #include "import/tag_map.h"
+#include "programs/store/loop_audits.h"
 #include "programs/store/verbs.h"
 #include "report/plot/loop_figure.h"
 #include "storage/runs/runs.h"
@@ -587,6 +590,30 @@ void JudgeAll(const AuditOptions& options, const Context& context,
   }
 }
 
+// Selectors of windows of `window_s`, spread evenly over the part of the run
+// since `since_ns`, the newest first.
+std::vector<std::string> SpreadWindows(const RunInfo& run,
+                                       std::int64_t since_ns, double window_s,
+                                       int windows) {
+  const auto seconds = [&run](std::int64_t stamp_ns) {
+    return static_cast<double>(stamp_ns - run.run.start_ns) * 1e-9;
+  };
+  const double first = seconds(std::max(run.first_stamp_ns, since_ns));
+  // Windows end before their last instant.
+  const double end = seconds(run.last_stamp_ns) + run.run.period_s;
+  const auto fit = static_cast<int>(std::ceil((end - first) / window_s));
+  const int count = std::clamp(fit, 1, windows);
+  std::vector<std::string> selectors;
+  for (int i = 0; i < count; ++i) {
+    const double to =
+        count == 1 ? end : end - (end - first - window_s) * i / (count - 1);
+    selectors.push_back(run.id + '@' +
+                        std::to_string(std::max(first, to - window_s)) + ':' +
+                        std::to_string(to));
+  }
+  return selectors;
+}
+
 Column BandColumn() {
   Column column{"band [% of OP]", "band_pct"};
   column.align = report::Align::kRight;
@@ -680,6 +707,55 @@ Report AuditLoops(const AuditOptions& options, const Context& context) {
 }
 
 }  // namespace
+
+LoopAudits AuditStoredRuns(const DataDirectory& data, std::int64_t since_ns,
+                           int windows) {
+  LoopAudits audits;
+  if (windows <= 0 || !std::filesystem::exists(data.runs())) {
+    return audits;
+  }
+  RunStore store(data.runs());
+  std::map<std::string, RunInfo> newest;
+  for (const RunInfo& info : store.List()) {  // Ordered by start.
+    if (info.samples > 0 && info.last_stamp_ns >= since_ns) {
+      newest.insert_or_assign(info.run.valve_id, info);
+    }
+  }
+  const AuditOptions options;
+  std::vector<Judged> judged;
+  for (const auto& [valve, run] : newest) {
+    const std::size_t before = judged.size();
+    Json skipped = Json::array();
+    for (const std::string& selector :
+         SpreadWindows(run, since_ns, options.window_s, windows)) {
+      try {
+        JudgeRecord(ReadRun(selector, store), options, judged, skipped);
+      } catch (const DataError& error) {
+        skipped.push_back({{"reason", error.what()}});
+      } catch (const NotFoundError& error) {
+        skipped.push_back({{"reason", error.what()}});
+      }
+    }
+    if (judged.size() == before && !skipped.empty()) {
+      audits.skipped.emplace_back(valve, skipped.front()["reason"]);
+    }
+  }
+  for (const Judged& one : judged) {
+    const bool sticks = one.audit.verdict == Verdict::kStiction;
+    audits.windows.push_back({one.loop,
+                              std::string(loop::VerdictName(one.audit.verdict)),
+                              one.audit.sure, std::string(one.audit.reason),
+                              sticks && one.audit.evidence.fit
+                                  ? std::optional(one.audit.evidence.fit->band)
+                                  : std::nullopt,
+                              one.start_ns.value_or(0)});
+  }
+  for (const Json& period : CommonPeriods(judged)) {
+    audits.periods.push_back(
+        {period["period_s"], period["loops"].get<std::vector<std::string>>()});
+  }
+  return audits;
+}
 
 void AddAuditVerb(report::Program& program) {
   auto [verb, options] = AddVerb(

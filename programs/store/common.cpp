@@ -2,9 +2,14 @@
 #include <sstream>
 
 #include "base/error.h"
+#include "base/time_units.h"
 #include "diagnosis/fault_catalogue.h"
+#include "programs/store/clock.h"
 #include "programs/store/verbs.h"
+#include "report/fault_texts.h"
 #include "storage/history/certainty.h"
+#include "storage/history/foreign_history.h"
+#include "storage/history/history_reader.h"
 #include "storage/models/models.h"
 
 namespace fdi::storage {
@@ -29,10 +34,14 @@ void EpisodeOptions::AddTo(CLI::App& verb) {
   verb.add_option("--fault", fault,
                   std::string(kFaultNames) + ", paper1..paper5 or unknown");
   window.AddTo(verb);
+  std::string states;
+  for (const std::string& name : EpisodeStateNames()) {
+    states += (states.empty() ? "" : "|") + name;
+  }
   verb.add_option("--state", state,
-                  "any; of the episode open, detected, isolated or closed; of "
-                  "the alarm unack, acked, rtn_unack, normal or shelved; "
-                  "unacked: unack or rtn_unack");
+                  "open, detected, isolated or closed of the episode; the "
+                  "others of the alarm; unacked: unack or rtn_unack")
+      ->type_name(states);
   AddLimit(verb, limit);
 }
 
@@ -47,7 +56,11 @@ void PlantOptions::AddTo(CLI::App& verb) {
 std::unique_ptr<History> OpenHistory(const PlantOptions& plant,
                                      const Context& context) {
   if (plant.asked()) {
-    return OpenPlant(plant);
+    auto history = OpenPlant(plant);
+    if (auto* foreign = dynamic_cast<ForeignHistory*>(history.get())) {
+      foreign->SayTo(context.log);
+    }
+    return history;
   }
   return std::make_unique<HistoryReader>(DataOf(context).history());
 }
@@ -67,6 +80,17 @@ EpisodeFilter EpisodeOptions::Filter(const Context& context) const {
   filter.limit = limit;
   filter.now_ns = NowNs();
   return filter;
+}
+
+void RequireSaneClock(const std::string& what, std::int64_t newest_ns) {
+  constexpr std::int64_t kFarNs = 31 * kNsPerDay;
+  const std::int64_t now_ns = NowNs();
+  if (newest_ns != 0 && now_ns - newest_ns > kFarNs) {
+    throw DataError("prune: nothing is deleted, because the clock says " +
+                    FormatTime(now_ns, true) + ", and the newest of " + what +
+                    " came at " + FormatTime(newest_ns, true) +
+                    ". If the clock is right, give --trust-clock");
+  }
 }
 
 void NoteOptions::AddTo(CLI::App& verb) {
@@ -123,14 +147,31 @@ std::string Hex(std::uint64_t value) {
 
 const std::vector<std::string>& EpisodeKeys() {
   static const std::vector<std::string> keys = {
-      "episode_id",     "valve_id", "detected_utc", "isolated_utc",
-      "cleared_utc",    "fault",    "peak_factor",  "model_set",
-      "end_reason",     "label",    "acked_by",     "strength",
-      "worst_strength", "severity", "priority",     "unconfirmed_utc"};
+      "episode_id",       "valve_id",  "detected_utc", "isolated_utc",
+      "cleared_utc",      "fault",     "peak_factor",  "model_set",
+      "end_reason",       "label",     "acked_by",     "strength",
+      "worst_strength",   "severity",  "priority",     "unconfirmed_utc",
+      "fault_name",       "acked_utc", "ack_comment",  "alarm_state",
+      "shelved_until_utc"};
   return keys;
 }
 
-Json EpisodeJson(const Episode& episode) {
+void NameFaults(std::vector<Episode>& episodes, const Context& context) {
+  std::optional<report::FaultTexts> texts;
+  for (Episode& episode : episodes) {
+    const bool named = episode.fault_name.has_value();
+    if (episode.fault && (!named || !context.options.fault_catalogue.empty())) {
+      if (!texts) {
+        texts = report::LoadFaultTexts(context.options);
+      }
+      episode.fault_name = texts->Words(*episode.fault, episode.strength).name;
+    }
+  }
+}
+
+Json EpisodeJson(const Alarm& alarm) {
+  const Episode& episode = alarm.episode;
+  const bool named = IsNamed(episode);
   const auto severity = episode.priority ? SeverityOf(*episode.priority)
                                          : std::optional<Severity>();
   return {
@@ -146,12 +187,17 @@ Json EpisodeJson(const Episode& episode) {
       {"end_reason", TextJson(episode.end_reason)},
       {"label", TextJson(episode.label)},
       {"acked_by", TextJson(episode.acked_by)},
-      {"strength", episode.isolated_ns ? NumberJson(episode.strength) : Json()},
-      {"worst_strength",
-       episode.worst_strength ? NumberJson(*episode.worst_strength) : Json()},
+      {"strength", named ? NumberJson(episode.strength) : Json()},
+      {"worst_strength", named ? NumberJson(episode.worst_strength) : Json()},
       {"severity", severity ? Json(SeverityName(*severity)) : Json()},
       {"priority", severity ? Json(PriorityOf(*severity)) : Json()},
-      {"unconfirmed_utc", TimeJson(episode.unconfirmed_ns)}};
+      {"unconfirmed_utc", TimeJson(episode.unconfirmed_ns)},
+      {"fault_name", TextJson(episode.fault_name)},
+      {"acked_utc", TimeJson(episode.acked_ns)},
+      {"ack_comment", TextJson(episode.ack_comment)},
+      {"alarm_state", AlarmStateName(alarm.state)},
+      {"shelved_until_utc",
+       alarm.shelf ? TimeJson(alarm.shelf->until_ns) : Json()}};
 }
 
 Json ShelfJson(const Shelf& shelf) {

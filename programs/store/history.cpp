@@ -1,11 +1,13 @@
 // fdi-store history: list, show, export, plot. The other verbs of the group are
 // in figures.cpp and alarms.cpp.
+#include <algorithm>
 #include <map>
 
 #include "base/csv_cells.h"
 #include "programs/store/verbs.h"
 #include "report/fault_texts.h"
 #include "report/plot/episode_figure.h"
+#include "report/plot/episode_page.h"
 #include "report/text_table.h"
 #include "storage/history/certainty.h"
 #include "storage/history/history_reader.h"
@@ -14,25 +16,31 @@
 namespace fdi::storage {
 namespace {
 
+using plot::IntervalText;
 using report::Align;
 using report::Column;
 using report::Format;
 using report::Tone;
 
-Tone ToneOf(AlarmState state) {
-  switch (state) {
-    case AlarmState::kUnacked:
-    case AlarmState::kAcked:
-      return Tone::kAlarm;
-    case AlarmState::kReturnedUnacked:
-      return Tone::kWarning;
-    case AlarmState::kNormal:
-      return Tone::kPlain;
-    case AlarmState::kShelved:
-      return Tone::kQuiet;
-  }
-  return Tone::kPlain;
+// A shelf hides any other state.
+std::string AlarmText(const Json& row) {
+  return row["shelved_until_utc"].is_null()
+             ? row["alarm_state"].get<std::string>()
+             : std::string(AlarmStateName(AlarmState::kShelved));
 }
+
+Tone ToneOf(const Json& row) {
+  const std::string state = AlarmText(row);
+  return state == AlarmStateName(AlarmState::kShelved)  ? Tone::kQuiet
+         : state == AlarmStateName(AlarmState::kNormal) ? Tone::kPlain
+         : state == AlarmStateName(AlarmState::kReturnedUnacked)
+             ? Tone::kWarning
+             : Tone::kAlarm;
+}
+
+// Of the list, where no terminal says how wide it is; of a fault's name.
+constexpr std::size_t kWidest = 100;
+constexpr std::size_t kLeastName = 12;
 
 // "20 s", or "-" if it has not happened yet.
 std::string After(std::int64_t from_ns, std::optional<std::int64_t> to_ns) {
@@ -40,8 +48,9 @@ std::string After(std::int64_t from_ns, std::optional<std::int64_t> to_ns) {
 }
 
 // Rows of the plant history also have host and monitor.
-Json ListedJson(const Episode& e) {
-  Json row = EpisodeJson(e);
+Json ListedJson(const Alarm& alarm) {
+  const Episode& e = alarm.episode;
+  Json row = EpisodeJson(alarm);
   if (!e.monitor.empty()) {
     row.update({{"host", e.host}, {"monitor", e.monitor}});
   }
@@ -56,22 +65,27 @@ std::string RowKey(const Json& row) {
 
 // What the text output shows beside the columns of fault_history.
 struct EpisodeText {
-  AlarmState state;  // Shelved, or else the episode's.
-  std::string fault_name;
+  std::string detected;  // "2026-11-20 14:56:11", by the clock on the wall.
   std::string isolated_after;
   std::string lasted;
 };
 using EpisodeTexts = std::map<std::string, EpisodeText>;  // By RowKey().
 
+std::string WallClock(std::int64_t stamp_ns, const Context& context) {
+  const bool utc = context.options.utc;
+  std::string text = FormatTime(stamp_ns / 1'000'000'000 * 1'000'000'000, utc);
+  text.resize(std::min(text.size(), std::size_t{19}));
+  std::replace(text.begin(), text.end(), 'T', ' ');
+  return text + (utc ? "Z" : "");
+}
+
 EpisodeTexts TextsOf(const std::vector<Alarm>& alarms, const Context& context) {
-  const report::FaultTexts words = report::LoadFaultTexts(context.options);
   EpisodeTexts texts;
   for (const Alarm& alarm : alarms) {
     const Episode& e = alarm.episode;
-    texts[RowKey(ListedJson(e))] = {
-        alarm.shelf ? AlarmState::kShelved : alarm.state,
-        e.fault ? words.Words(*e.fault, e.strength).name : "-",
-        After(e.detected_ns, e.isolated_ns), After(e.detected_ns, e.ended_ns)};
+    texts[RowKey(ListedJson(alarm))] = {WallClock(e.detected_ns, context),
+                                        After(e.detected_ns, e.isolated_ns),
+                                        After(e.detected_ns, e.ended_ns)};
   }
   return texts;
 }
@@ -79,22 +93,23 @@ EpisodeTexts TextsOf(const std::vector<Alarm>& alarms, const Context& context) {
 Report ListEpisodes(const HistoryOptions& options, const Context& context) {
   const auto history = OpenHistory(options.plant, context);
   auto episodes = history->List(options.filter.Filter(context));
+  NameFaults(episodes, context);
+  const std::vector<Alarm> alarms =
+      history->Alarms(std::move(episodes), NowNs());
   Report report;
-  report.document["episodes"] = Rows(episodes, ListedJson);
+  report.document["episodes"] = Rows(alarms, ListedJson);
   std::vector<std::string> keys = EpisodeKeys();
   if (options.plant.asked()) {
     keys.insert(keys.end(), {"host", "monitor"});
   }
   report.Csv("episodes", keys);
-  const auto texts = std::make_shared<const EpisodeTexts>(
-      TextsOf(history->Alarms(std::move(episodes), NowNs()), context));
+  const auto texts =
+      std::make_shared<const EpisodeTexts>(TextsOf(alarms, context));
   const auto of = [texts](const Json& row) -> const EpisodeText& {
     return texts->at(RowKey(row));
   };
-  Column alarm = TextColumn("alarm", [of](const Json& row) {
-    return std::string(AlarmStateName(of(row).state));
-  });
-  alarm.tone = [of](const Json& row) { return ToneOf(of(row).state); };
+  Column alarm = TextColumn("alarm", AlarmText);
+  alarm.tone = ToneOf;
   const auto end = [](const Json& row) {
     return row["end_reason"].is_null() ? "open"
                                        : row["end_reason"].get<std::string>();
@@ -102,14 +117,15 @@ Report ListEpisodes(const HistoryOptions& options, const Context& context) {
   std::vector<Column> columns = {
       {"episode", "episode_id"},
       {"valve", "valve_id"},
-      {"detected", "detected_utc", Format::kTime},
+      TextColumn("detected",
+                 [of](const Json& row) { return of(row).detected; }),
       alarm,
+      {"severity", "severity", Format::kPlain, 0, 1},
       {"fault", "fault"},
-      TextColumn(
-          "which is", [of](const Json& row) { return of(row).fault_name; }, 2),
-      {"how sure", "certainty", Format::kPlain, 0, 3},
-      {"severity", "severity", Format::kPlain, 0, 3},
-      {"strength [-]", "strength", Format::kPlain, 3, 4},
+      {"which is", "fault_name", Format::kPlain, 0, 0, kLeastName},
+      {"how sure", "certainty", Format::kPlain, 0, 2},
+      {"now [-]", "strength", Format::kPlain, 2, 3},
+      {"worst [-]", "worst_strength", Format::kPlain, 2, 4},
       TextColumn(
           "isolated after",
           [of](const Json& row) { return of(row).isolated_after; }, 5,
@@ -125,7 +141,7 @@ Report ListEpisodes(const HistoryOptions& options, const Context& context) {
     columns.insert(columns.begin() + 1, {{"host", "host", Format::kPlain, 0, 9},
                                          {"monitor", "monitor"}});
   }
-  return report.Table("episodes", columns, "no episode matches");
+  return report.Table("episodes", columns, "no episode matches", kWidest);
 }
 
 // Transitions have faults and a factor; operator actions have a who.
@@ -222,19 +238,6 @@ void AddLook(const std::optional<EpisodeLook>& look, const Context& context,
   AddTextTable(report, table);
 }
 
-// "0.42 (0.38 to 0.46)", "9.6 days (7.2 to 14.5)"; an interval without width
-// is not known.
-std::string IntervalText(double value, double lowest, double highest,
-                         int decimals, const std::string& unit = "") {
-  const auto number = [decimals](double x) {
-    return report::FormatNumber(x, decimals);
-  };
-  return number(value) + unit +
-         (lowest < highest
-              ? " (" + number(lowest) + " to " + number(highest) + ")"
-              : "");
-}
-
 // In a unit of which there is one at least.
 std::string TimeToFullText(const TimeToFull& full) {
   const auto [unit_s, unit] =
@@ -320,79 +323,6 @@ void AddGrowth(const Episode& episode,
   }
 }
 
-// "likely: Flow transmitter wrong (f19), by simulation of the valve"
-std::string FaultLine(const Episode& e, const std::string& name) {
-  std::string certainty(CertaintyName(CertaintyOf(e)));
-  if (!e.fault || e.fault == "unknown") {
-    return certainty;
-  }
-  return certainty + ": " + name + " (" + *e.fault + ")" +
-         (ByPhysics(e.layer.value_or("")) ? std::string(", ") + kByPhysics
-                                          : "");
-}
-
-std::string AlarmLine(const Alarm& alarm, const Context& context) {
-  std::string line(AlarmStateName(alarm.state));
-  if (const auto since = alarm.episode.unconfirmed_ns) {
-    line += ", not confirmed since " + TimeText(since, context);
-  }
-  if (alarm.shelf) {
-    const Shelf& shelf = *alarm.shelf;
-    line += ", shelved by " + shelf.who + " until " +
-            TimeText(shelf.until_ns, context) +
-            (shelf.comment.empty() ? "" : ": " + shelf.comment);
-  }
-  return line;
-}
-
-// "0.42 (0.38 to 0.46), 0.55 at its worst"
-std::string StrengthLine(const Episode& e) {
-  if (!e.isolated_ns) {
-    return "-";
-  }
-  std::string line = e.lowest && e.highest
-                         ? IntervalText(e.strength, *e.lowest, *e.highest, 3)
-                         : report::FormatNumber(e.strength, 3);
-  if (e.worst_strength && *e.worst_strength != e.strength) {
-    line += ", " + report::FormatNumber(*e.worst_strength, 3) + " at its worst";
-  }
-  return line;
-}
-
-std::vector<Column> EpisodeFields(const Alarm& alarm, const Context& context) {
-  const Episode& e = alarm.episode;
-  const report::FaultWords words =
-      report::LoadFaultTexts(context.options)
-          .Words(e.fault.value_or(""), e.strength, e.priority);
-  const auto when = [&](std::optional<std::int64_t> stamp_ns) {
-    return TimeText(stamp_ns, context) +
-           (stamp_ns ? ", after " + After(e.detected_ns, stamp_ns) : "");
-  };
-  return {{"episode", "episode_id"},
-          {"valve", "valve_id"},
-          {"source", "source_id"},
-          TextField("fault", FaultLine(e, words.name)),
-          TextField("check", words.check),
-          TextField("severity",
-                    std::string(SeverityName(words.severity)) + ", priority " +
-                        std::to_string(PriorityOf(words.severity)) + " (" +
-                        words.discipline + "; NAMUR NE 107 " +
-                        std::string(NamurName(words.namur)) + ")"),
-          TextField("alarm", AlarmLine(alarm, context)),
-          {"detected", "detected_utc", Format::kTime},
-          TextField("isolated", when(e.isolated_ns)),
-          TextField("cleared", when(e.cleared_ns)),
-          TextField("ended", TimeText(e.ended_ns, context) + " " +
-                                 e.end_reason.value_or("(open)")),
-          TextField("strength", StrengthLine(e)),
-          TextField("model set", e.model_set + " " + Hex(e.model_hash)),
-          {"label", "label"},
-          {"acked by", "acked_by"},
-          TextColumn("trace", [](const Json& episode) {
-            return episode["trace_instants"].dump() + " instants";
-          })};
-}
-
 struct ShowOptions {
   std::string id;
   PlantOptions plant;
@@ -400,11 +330,12 @@ struct ShowOptions {
 
 Report ShowEpisode(const ShowOptions& options, const Context& context) {
   const auto history = OpenHistory(options.plant, context);
-  const Alarm alarm =
-      history->Alarms({history->Show(options.id)}, NowNs()).front();
+  std::vector<Episode> shown{history->Show(options.id)};
+  NameFaults(shown, context);
+  const Alarm alarm = history->Alarms(std::move(shown), NowNs()).front();
   const Episode& e = alarm.episode;
   Report report;
-  report.document = ListedJson(e);
+  report.document = ListedJson(alarm);
   report.document.update(
       {{"source_id", Hex(e.source_id)},
        {"model_hash", Hex(e.model_hash)},
@@ -413,14 +344,14 @@ Report ShowEpisode(const ShowOptions& options, const Context& context) {
        {"unknown_kind", TextJson(e.unknown_kind)},
        {"layer", TextJson(e.layer)},
        {"ended_utc", TimeJson(e.ended_ns)},
-       {"acked_utc", TimeJson(e.acked_ns)},
-       {"alarm_state", AlarmStateName(alarm.state)},
        {"shelf", alarm.shelf ? ShelfJson(*alarm.shelf) : Json()},
        {"trace_instants", history->Trace(e.id).size()}});
   if (!e.monitor.empty()) {
     report.Fields("", {TextField("monitor", e.host + "/" + e.monitor)});
   }
-  report.Fields("", EpisodeFields(alarm, context));
+  report.Fields(
+      "", plot::EpisodeFields(alarm, report::LoadFaultTexts(context.options),
+                              context.options.utc));
   AddEvents(history->Events(e.id), context, report);
   AddLook(history->Look(e.id), context, report);
   AddGrowth(e, history->Strengths(e.id), context, report);
@@ -544,6 +475,32 @@ Report PlotEpisode(const PlotOptions& options, const Context& context) {
   return report.Line("drawn to " + path.string());
 }
 
+struct EpisodePageOptions {
+  std::string id;
+  std::string output;
+  PlantOptions plant;
+};
+
+Report WriteEpisodePage(const EpisodePageOptions& options,
+                        const Context& context) {
+  const auto history = OpenHistory(options.plant, context);
+  const plot::EpisodeEvidence evidence =
+      plot::LoadEvidence(*history, options.id, DataOf(context).models());
+  const Alarm alarm = history->Alarms({evidence.episode}, NowNs()).front();
+  const report::FaultTexts texts = report::LoadFaultTexts(context.options);
+  const bool utc = context.options.utc;
+  const Report page = plot::EpisodePage(evidence, alarm, texts, utc);
+  const std::string& id = evidence.episode.episode_id;
+  const std::filesystem::path path =
+      options.output.empty() ? id + ".html" : options.output;
+  report::WriteOutput(path, [&](std::ostream& out) {
+    page.PrintHtml(out, plot::EpisodeTitle(evidence.episode, texts), {utc});
+  });
+  Report report;
+  report.document = {{"episode_id", id}, {"file", path.string()}};
+  return path == "-" ? report : report.Line("written to " + path.string());
+}
+
 }  // namespace
 
 void AddHistoryVerbs(report::Program& program) {
@@ -584,6 +541,16 @@ void AddHistoryVerbs(report::Program& program) {
                   "Start of the picture in s after detection");
   plot.add_option("--to", plotted.figure.to_s,
                   "End of the picture in s after detection");
+
+  auto [page, paged] = AddVerb(
+      program, group, "report",
+      "Write the page of an episode to print: story, what to check, lines "
+      "for what was found, picture",
+      WriteEpisodePage);
+  AddEpisode(page, paged.id);
+  page.add_option("-o,--output", paged.output,
+                  "FILE.html, or - for stdout (ID.html)");
+  paged.plant.AddTo(page);
 }
 
 }  // namespace fdi::storage

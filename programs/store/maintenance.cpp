@@ -1,8 +1,10 @@
 // fdi-store doctor, backup, migrate, prune: the files of the data directory.
 #include <chrono>
+#include <string_view>
 #include <thread>
 
 #include "base/error.h"
+#include "programs/store/clock.h"
 #include "programs/store/verbs.h"
 #include "storage/database/locks.h"
 #include "storage/history/history_database.h"
@@ -257,12 +259,27 @@ struct AgeAndSize {
   std::optional<std::uint64_t> bytes;
 };
 
+// When what is newest in the database came.
+std::int64_t NewestNs(const char* name, const std::filesystem::path& path) {
+  const bool runs = std::string_view(name) == "runs.db";
+  Database database(path, runs ? RunsSchema() : HistorySchema(),
+                    Access::kReader);
+  return database
+      .QueryInt64(
+          runs ? "SELECT max(created_ns) FROM run"
+               : "SELECT max(coalesce((SELECT max(alive_ns) FROM "
+                 "monitor_session), 0), coalesce((SELECT recorded_ns FROM "
+                 "episode_event ORDER BY event_id DESC LIMIT 1), 0))")
+      .value_or(0);
+}
+
 struct PruneOptions {
   AgeAndSize runs;
   AgeAndSize history;
   AgeAndSize health;
   AgeAndSize shadow;
   bool dry_run{false};
+  bool trust_clock{false};
 };
 
 // One row per kind of record that has a limit.
@@ -291,6 +308,9 @@ Json PruneAll(const PruneOptions& options, const DataDirectory& data) {
     }
     RetentionLimits limits;
     if (!task.asked.age.empty()) {
+      if (!options.dry_run && !options.trust_clock) {
+        RequireSaneClock(task.path.string(), NewestNs(task.name, task.path));
+      }
       limits.before_ns = NowNs() - ParseDuration(task.asked.age);
     }
     limits.max_bytes = task.asked.bytes;
@@ -373,6 +393,8 @@ void AddPrune(report::Program& program) {
                   "this: 90d, ...");
   verb.add_flag("--dry-run", options.dry_run,
                 "Only print what would be deleted");
+  verb.add_flag("--trust-clock", options.trust_clock,
+                "Delete by age also if nothing was recorded for a month");
 }
 
 }  // namespace

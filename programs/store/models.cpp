@@ -10,6 +10,7 @@
 #include "report/models/lineage_text.h"
 #include "report/text_table.h"
 #include "simulator/valve_parameters.h"
+#include "storage/models/plant_loops.h"
 
 namespace fdi::storage {
 namespace {
@@ -215,11 +216,34 @@ struct ModelImportOptions {
   bool activate{false};
 };
 
+// The data directory of one --shard of a plant: valves, sets, types, loops.
+Report ImportShard(const std::string& folder, ModelStore& store) {
+  const DataDirectory shard{folder};
+  if (!std::filesystem::exists(shard.models())) {
+    throw NotFoundError(folder +
+                        " has no models.db; expected the --data "
+                        "directory of fdi-trainer onboard --shard, or a file "
+                        "of fdi-store models export");
+  }
+  ModelStore other(shard.models());
+  if (std::filesystem::equivalent(shard.models(), store.database().path())) {
+    throw ConfigError(folder + " is the data directory itself");
+  }
+  Report report;
+  const std::size_t loops = store.TakeLoops(other);
+  report.document = {{"from", folder}, {"loops", loops}};
+  return report.Line(std::to_string(loops) + " loops of " + folder +
+                     " are here with their model sets");
+}
+
 Report ImportModel(const ModelImportOptions& options, const Context& context) {
   if (!std::filesystem::exists(options.file)) {
     throw NotFoundError("no file " + options.file);
   }
   ModelStore store = WritableModels(context);
+  if (std::filesystem::is_directory(options.file)) {
+    return ImportShard(options.file, store);
+  }
   const ModelSet models =
       store.ImportFile(options.file, options.activate ? Activation::kAlways
                                                       : Activation::kIfFirst);
@@ -307,8 +331,13 @@ void AddModelsVerbs(report::Program& program) {
 
   auto [importing, imported] =
       AddVerb(program, group, "import",
-              "Store a file as the next version of its model set", ImportModel);
-  importing.add_option("file", imported.file, "File written by export")
+              "Store a file as the next version of its model set, or all that "
+              "one --shard of a plant has made",
+              ImportModel);
+  importing
+      .add_option("file", imported.file,
+                  "File written by export, or the data directory of a "
+                  "shard")
       ->required();
   importing.add_flag("--activate", imported.activate,
                      "Make it the active version of its name");

@@ -51,6 +51,17 @@ std::string ChannelsText(const Json& hour) {
   return text.empty() ? "-" : text;
 }
 
+// "maintenance required: dead_band"
+std::string StatusText(const Json& hour) {
+  std::string text = hour["status"];
+  const char* separator = ": ";
+  for (const Json& figure : hour["exceeded"]) {
+    text += separator + figure.get<std::string>();
+    separator = ", ";
+  }
+  return text;
+}
+
 // The CSV has a row per hour and channel, unlike the text table, whose row is
 // an hour. An hour without channels gets a row, too.
 Report CsvOf(const Json& hours, bool of_plant) {
@@ -65,10 +76,14 @@ Report CsvOf(const Json& hours, bool of_plant) {
     }
   }
   std::vector<std::string> keys = {
-      "hour_utc", "epoch",          "model_hash", "seen_h",
-      "live_h",   "alarm_h",        "open_h",     "shut_h",
-      "d0",       "travel_strokes", "reversals",  "signal",
-      "unit",     "mean",           "rms",        "percent"};
+      "hour_utc",       "epoch",        "model_hash", "seen_h",     "live_h",
+      "alarm_h",        "auto_h",       "open_h",     "shut_h",     "d0",
+      "travel_strokes", "path_strokes", "reversals",  "slip_jumps", "turns",
+      "steps",          "status"};
+  for (std::size_t i = 0; i < loop::kFigureCount; ++i) {
+    keys.emplace_back(loop::FigureName(static_cast<loop::Figure>(i)));
+  }
+  keys.insert(keys.end(), {"signal", "unit", "mean", "rms", "percent"});
   if (of_plant) {
     keys.insert(keys.end(), {"host", "monitor"});
   }
@@ -80,7 +95,8 @@ Report ShowHealth(const HealthOptions& options, const Context& context) {
   if (!options.hourly) {
     hours = planner::DaysOf(hours);
   }
-  const Json rows = planner::HealthHoursJson(hours);
+  const Json rows =
+      planner::HealthHoursJson(hours, report::LoadFaultTexts(context.options));
   if (options.csv->count() > 0) {
     return CsvOf(rows, options.plant.asked());
   }
@@ -91,11 +107,16 @@ Report ShowHealth(const HealthOptions& options, const Context& context) {
       {"seen [h]", "seen_h"},
       {"LIVE [h]", "live_h"},
       {"alarm [h]", "alarm_h"},
+      {"AUTO [h]", "auto_h"},
       {"open [h]", "open_h"},
       {"shut [h]", "shut_h"},
       {"d_0", "d0", Format::kPlain, 3},
       {"strokes", "travel_strokes"},
       {"turns", "reversals"},
+      {"at limit [%]", "at_limit", Format::kPlain, 1},
+      {"dead band [%]", "dead_band", Format::kPlain, 2},
+      {"T63 [s]", "t63", Format::kPlain, 1},
+      TextColumn("NE 107", StatusText),
       TextColumn("residual mean (rms)", ChannelsText)};
   if (options.plant.asked()) {
     columns.insert(columns.begin() + 1, {{"host", "host", Format::kPlain, 0, 9},
@@ -151,8 +172,8 @@ void AddPlannerVerbs(report::Program& program) {
       "How a valve has changed over months, and when it may reach a limit");
   auto [show, shown] = AddVerb(
       program, group, "show",
-      "Days or hours of a valve: time, travel, d_0, residuals of the normal "
-      "model, means and (rms)",
+      "Days or hours of a valve: time, travel, dead band, status (NAMUR NE "
+      "107), d_0, residuals of the normal model, means and (rms)",
       ShowHealth);
   auto [trend, limits] =
       AddVerb(program, group, "trend",
@@ -195,6 +216,7 @@ void AddPlannerVerbs(report::Program& program) {
       ->type_name("DAYS");
   options.plant.AddTo(list);
   program.AllowCsv(list, "CSV, one line per valve");
+  AddFleetVerb(program);
 }
 
 }  // namespace fdi::storage

@@ -182,6 +182,21 @@ void CheckValve(const std::string& valve) {
   }
 }
 
+// The same file again would count twice in a training.
+void WarnIfRepeated(const std::vector<RunInfo>& earlier, const RunInfo& stored,
+                    const Context& context) {
+  for (const RunInfo& run : earlier) {
+    if (run.run.valve_id == stored.run.valve_id &&
+        run.run.origin == RunOrigin::kImported &&
+        run.run.start_ns == stored.run.start_ns &&
+        run.samples == stored.samples) {
+      context.log(LogLevel::kWarning,
+                  "import_repeated run=" + stored.id + " same_as=" + run.id);
+      return;
+    }
+  }
+}
+
 Report ImportRuns(const RunImportOptions& options, const Context& context) {
   CheckValve(options.valve);
   const std::int64_t start_ns =
@@ -214,6 +229,7 @@ Report ImportRuns(const RunImportOptions& options, const Context& context) {
   }
   run.software = context.software;
   RunStore store(WritableDataOf(context).runs(), Access::kOccasionalWriter);
+  const std::vector<RunInfo> earlier = store.List({});
   std::vector<RunInfo> stored;
   std::int64_t samples = 0;
   Report report;
@@ -222,6 +238,7 @@ Report ImportRuns(const RunImportOptions& options, const Context& context) {
       store.Label(id, 0, 0.0);
     }
     stored.push_back(store.Info(id));
+    WarnIfRepeated(earlier, stored.back(), context);
     samples += stored.back().samples;
     report.Line("run " + id + ": " + std::to_string(stored.back().samples) +
                 " samples of " + options.valve);

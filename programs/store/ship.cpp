@@ -11,6 +11,7 @@
 #include "base/log.h"
 #include "plant/plant_reader.h"
 #include "plant/shipper.h"
+#include "programs/store/clock.h"
 #include "programs/store/verbs.h"
 
 namespace fdi::storage {
@@ -29,6 +30,7 @@ struct ShipOptions {
   std::string history_age;
   std::string health_age;
   bool dry_run{false};
+  bool trust_clock{false};
 };
 
 std::string HostName() {
@@ -37,13 +39,55 @@ std::string HostName() {
                                                         : "localhost";
 }
 
-Report InitPlant(const ShipOptions& options) {
-  const PlantDatabase plant = PlantDatabase::Init(options.url);
+// A line while PostgreSQL lets us wait.
+PlantLimits Limits(const Context& context, std::chrono::seconds statement) {
+  PlantLimits limits;
+  limits.statement = statement;
+  limits.log = context.log;
+  return limits;
+}
+constexpr std::chrono::seconds kShipping{120};
+// Of the owner: indices of a large history are built, or rows of years deleted.
+constexpr std::chrono::seconds kOwnerWork{3600};
+
+Report InitPlant(const ShipOptions& options, const Context& context) {
+  PlantDatabase plant =
+      PlantDatabase::Init(options.url, Limits(context, kOwnerWork));
+  const std::int64_t unsound =
+      plant.Run("SELECT count(*) FROM fdi.unsound").Int64(0, 0);
   Report report;
-  report.document = {{"plant", plant.name()}, {"plant_id", plant.plant_id()}};
+  report.document = {{"plant", plant.name()},
+                     {"plant_id", plant.plant_id()},
+                     {"unsound", unsound}};
+  if (unsound > 0) {
+    report.Line(std::to_string(unsound) +
+                " rows that cannot be right are in fdi.unsound, where nobody "
+                "reads them");
+  }
   return report.Line("schema fdi is in " + plant.name() +
                      "; grant fdi_writer to the monitors' accounts and "
                      "fdi_reader to those who read");
+}
+
+std::int64_t LeftOut(const Shipped& shipped) {
+  std::int64_t rows = 0;
+  for (const auto& [table, count] : shipped.left_out) {
+    rows += count;
+  }
+  return rows;
+}
+
+// "left out 2 rows that the checks of the plant refuse: 2 of shelf"
+std::string LeftOutText(const Shipped& shipped) {
+  std::string tables;
+  for (const auto& [table, count] : shipped.left_out) {
+    tables +=
+        (tables.empty() ? "" : ", ") + std::to_string(count) + " of " + table;
+  }
+  return tables.empty()
+             ? ""
+             : "left out " + std::to_string(LeftOut(shipped)) +
+                   " rows that the checks of the plant refuse: " + tables;
 }
 
 Report ShipReport(const ShipOptions& options, const std::string& plant,
@@ -59,9 +103,13 @@ Report ShipReport(const ShipOptions& options, const std::string& plant,
                      {"host", options.host},
                      {"monitor", options.monitor},
                      {"rows", rows},
+                     {"left_out", LeftOut(shipped)},
                      {"tables", tables}};
   report.Line("shipped " + std::to_string(rows) + " new or changed rows to " +
               plant + " as " + options.host + "/" + options.monitor);
+  if (const std::string text = LeftOutText(shipped); !text.empty()) {
+    report.Line(text);
+  }
   return report.Table("tables", {{"table", "table"}, {"rows", "rows"}},
                       "nothing was new");
 }
@@ -85,9 +133,14 @@ Report ShipReport(const ShipOptions& options, const std::string& plant,
       // A history that was restored from a backup is another file.
       if (!shipper || !shipper->InPlace()) {
         shipper.emplace(data, options.url,
-                        ShipSource{options.host, options.monitor});
+                        ShipSource{options.host, options.monitor},
+                        Limits(context, kShipping));
       }
-      shipper->Ship();
+      const Shipped shipped = shipper->Ship();
+      if (const std::string text = LeftOutText(shipped); !text.empty()) {
+        context.log(LogLevel::kWarning,
+                    EventLine("ship_left_out", {{"reason", text}}));
+      }
     } catch (const DataError& error) {
       failure = error.what();
     } catch (const SqliteError& error) {
@@ -111,7 +164,7 @@ Report ShipReport(const ShipOptions& options, const std::string& plant,
   }
 }
 
-Report PrunePlant(const ShipOptions& options) {
+Report PrunePlant(const ShipOptions& options, const Context& context) {
   struct Rule {
     const std::string& age;
     const char* items;
@@ -122,7 +175,10 @@ Report PrunePlant(const ShipOptions& options) {
         "ship --prune: choose what may be deleted: --history-age or "
         "--health-age");
   }
-  PlantDatabase plant(options.url);
+  PlantDatabase plant(options.url, Limits(context, kOwnerWork));
+  if (!options.dry_run && !options.trust_clock) {
+    RequireSaneClock("the plant's history", NewestInPlant(plant));
+  }
   Json rows = Json::array();
   for (const Rule& rule :
        {Rule{options.history_age, "episodes", PrunePlantEpisodes},
@@ -171,15 +227,16 @@ Report Ship(const ShipOptions& given, const Context& context) {
     throw ConfigError("ship: say where to: --to postgresql://user@host/plant");
   }
   if (options.init) {
-    return InitPlant(options);
+    return InitPlant(options, context);
   }
   if (options.prune) {
-    return PrunePlant(options);
+    return PrunePlant(options, context);
   }
   if (!options.every.empty()) {
     ShipForEver(options, context);
   }
-  Shipper shipper(data, options.url, {options.host, options.monitor});
+  Shipper shipper(data, options.url, {options.host, options.monitor},
+                  Limits(context, kShipping));
   return ShipReport(options, shipper.plant().name(), shipper.Ship());
 }
 
@@ -214,6 +271,9 @@ void AddShipVerb(report::Program& program) {
       ->needs(prune);
   verb.add_flag("--dry-run", options.dry_run,
                 "Only print what would be deleted")
+      ->needs(prune);
+  verb.add_flag("--trust-clock", options.trust_clock,
+                "Delete also if nothing came for a month")
       ->needs(prune);
   verb.add_flag("--forget", options.forget,
                 "Stop shipping for good: changes are no longer logged, and "

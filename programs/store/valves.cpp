@@ -1,9 +1,16 @@
 // fdi-store valves: list, show, add, assign, event, remove.
 #include <algorithm>
+#include <cerrno>
 #include <cstdio>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+#include <map>
 
+#include "base/csv_cells.h"
 #include "base/error.h"
 #include "diagnosis/records/valve_glob.h"
+#include "import/plant_table.h"
 #include "programs/store/verbs.h"
 #include "report/signal_list.h"
 #include "storage/database/locks.h"
@@ -11,6 +18,8 @@
 #include "storage/history/history_reader.h"
 #include "storage/history/valve_move.h"
 #include "storage/models/models.h"
+#include "storage/models/plant_loops.h"
+#include "trainer/fleet/plant_rows.h"
 
 namespace fdi::storage {
 namespace {
@@ -36,19 +45,43 @@ Json EntryJson(const ValveEntry& entry) {
           {"model_set", SetJson(entry.model_set)}};
 }
 
+// What the table of the plant says about a valve, and what watches it.
+Json LoopJson(const PlantLoop& loop) {
+  return {{"loop", loop.name},
+          {"service", loop.service.empty() ? Json() : Json(loop.service)},
+          {"type", loop.type.empty() ? Json() : Json(loop.type)},
+          {"grade", loop.grade ? Json(*loop.grade) : Json()},
+          {"group", loop.group.empty() ? Json() : Json(loop.group)},
+          {"watched_by", LoopWatchName(loop.watch)},
+          {"state", LoopStateName(loop.state)},
+          {"finding", loop.finding},
+          {"checked_utc", TimeJson(loop.checked_ns)}};
+}
+
 Report ListValves(const NoOptions&, const Context& context) {
   Report report;
-  report.document["valves"] =
-      Rows(ModelStore(DataOf(context).models()).Valves(), EntryJson);
-  return report.Table("valves", {{"valve", "valve"},
-                                 {"type", "type"},
-                                 {"flow in", "flow_unit"},
-                                 {"% of", "sense"},
-                                 {"signals", "signals"},
-                                 {"Ts [s]", "period_s", Format::kPlain, 3},
-                                 {"epoch", "epoch"},
-                                 {"baseline", "baseline"},
-                                 {"model set", "model_set"}});
+  ModelStore store(DataOf(context).models());
+  report.document["valves"] = Rows(store.Valves(), EntryJson);
+  report.document["loops"] = Rows(store.Loops(), LoopJson);
+  report.Table("valves", {{"valve", "valve"},
+                          {"type", "type"},
+                          {"flow in", "flow_unit"},
+                          {"% of", "sense"},
+                          {"signals", "signals"},
+                          {"Ts [s]", "period_s", Format::kPlain, 3},
+                          {"epoch", "epoch"},
+                          {"baseline", "baseline"},
+                          {"model set", "model_set"}});
+  if (!report.document["loops"].empty()) {
+    report.Line("").Table("loops",
+                          {{"loop of the plant", "loop"},
+                           {"group", "group", Format::kPlain, 0, 2},
+                           {"grade", "grade", Format::kPlain, 0, 2},
+                           {"watched by", "watched_by"},
+                           {"state", "state"},
+                           {"finding", "finding", Format::kPlain, 0, 1}});
+  }
+  return report;
 }
 
 Json ValveEventJson(const ValveEvent& event) {
@@ -227,9 +260,120 @@ struct AddOptions {
   std::string model_set;
   double period_s{1.0};
   std::uint32_t epoch{0};
+  std::string plant;
 };
 
+// The first line of a file of groups that may be written again.
+constexpr std::string_view kMadeBy =
+    "# Made by fdi-store valves add --plant from ";
+
+std::string TomlText(const std::string& text) {
+  return Json(text).dump();  // A basic string of TOML is one of JSON.
+}
+
+// One group of valves for each group of the table with two loops or more;
+// nothing is written over a file that a person made.
+Json WriteGroups(const importer::PlantTable& table,
+                 const std::filesystem::path& path) {
+  std::map<std::string, std::vector<std::string>> groups;
+  for (const importer::PlantRow& row : table.rows) {
+    if (row.error.empty() && !row.group.empty()) {
+      groups[row.group].push_back(row.name);
+    }
+  }
+  std::erase_if(groups, [](const auto& g) { return g.second.size() < 2; });
+  if (std::filesystem::exists(path)) {
+    if (!ReadTextFile(path).starts_with(kMadeBy)) {
+      return {{"file", path.string()}, {"groups", 0}, {"written", false}};
+    }
+  } else if (groups.empty()) {
+    return nullptr;
+  }
+  const std::filesystem::path made = path.string() + ".new";
+  {
+    std::ofstream file(made);
+    file << kMadeBy << table.source
+         << ":\n# without this line it is not written again.\n";
+    for (const auto& [name, valves] : groups) {
+      file << "\n[[group]]\nname = " << TomlText(name) << "\nvalves = [";
+      for (std::size_t i = 0; i < valves.size(); ++i) {
+        file << (i == 0 ? "" : ", ") << TomlText(GlobOf(valves[i]));
+      }
+      file << "]\n";
+    }
+    if (!file.flush()) {
+      throw DataError(made.string() +
+                      " cannot be written: " + std::strerror(errno));
+    }
+  }
+  std::filesystem::rename(made, path);
+  return {
+      {"file", path.string()}, {"groups", groups.size()}, {"written", true}};
+}
+
+// The loops that ought to be there, and the groups of common causes.
+Report AddPlant(const std::string& file, const Context& context) {
+  const importer::PlantTable table = importer::ReadPlantTable(file);
+  ModelStore store = WritableModels(context);
+  std::map<std::string, PlantLoop> before;
+  for (PlantLoop& loop : store.Loops()) {
+    before.emplace(loop.name, std::move(loop));
+  }
+  Json rows = Json::array();
+  for (const importer::PlantRow& row : table.rows) {
+    PlantLoop loop = trainer::LoopOf(row);
+    if (const auto found = before.find(row.name); found != before.end()) {
+      loop.watch = found->second.watch;
+      loop.state = found->second.state;
+      loop.finding = found->second.finding;
+      loop.input_hash = found->second.input_hash;
+    }
+    if (row.error.empty()) {
+      store.PutLoop(loop, trainer::EntryOf(row));
+    }
+    rows.push_back({{"loop", row.name},
+                    {"row", row.place},
+                    {"refused", TextJson(row.error)},
+                    {"known", before.contains(row.name)}});
+  }
+  Report report;
+  report.document = {
+      {"plant", table.source},
+      {"rows", rows},
+      {"groups", WriteGroups(table, DataOf(context).path / "groups.toml")}};
+  Json refused = Json::array();
+  std::ranges::copy_if(rows, std::back_inserter(refused), [](const Json& row) {
+    return !row["refused"].is_null();
+  });
+  report.document["refused"] = refused;
+  report.Line(std::to_string(rows.size() - refused.size()) + " loops of " +
+              table.source + " are expected");
+  const Json& groups = report.document["groups"];
+  if (!groups.is_null()) {
+    report.Line(groups["written"] == true
+                    ? std::to_string(groups["groups"].get<std::size_t>()) +
+                          " groups written to " +
+                          groups["file"].get<std::string>()
+                    : groups["file"].get<std::string>() +
+                          " was made by hand and stays as it is");
+  }
+  if (!refused.empty()) {
+    report.Line("").Table(
+        "refused",
+        {{"row", "row"}, {"loop", "loop"}, {"refused because", "refused"}});
+  }
+  report.exit_code =
+      refused.size() == rows.size() ? report::kExitData : report::kExitOk;
+  return report;
+}
+
 Report AddValves(const AddOptions& options, const Context& context) {
+  if (!options.plant.empty()) {
+    return AddPlant(options.plant, context);
+  }
+  if (options.pattern.empty()) {
+    throw ConfigError("valves add: an id or glob, or --plant FILE, is needed");
+  }
   ValveEntry entry;
   entry.pattern = options.pattern;
   entry.type = options.type;
@@ -395,7 +539,12 @@ void AddAdd(report::Program& program, CLI::App& group) {
   auto [verb, options] = AddVerb(
       program, group, "add",
       "Describe a valve, or all valves whose ids match a glob", AddValves);
-  verb.add_option("valve", options.pattern, "Id or glob")->required();
+  auto* valve = verb.add_option("valve", options.pattern, "Id or glob");
+  verb.add_option("--plant", options.plant,
+                  "All loops of a table of the plant, and its groups as "
+                  "groups.toml of the data directory (docs/plant.md)")
+      ->type_name("FILE.toml|FILE.csv")
+      ->excludes(valve);
   verb.add_option("--type", options.type, "Free text");
   verb.add_option("--flow-unit", options.flow_unit, "m3/h or t/h")
       ->check(CLI::IsMember({"m3/h", "t/h"}));

@@ -48,6 +48,7 @@ void AddMaintenanceVerbs(report::Program& program);
 void AddKeysVerbs(report::Program& program);
 // Of optional components; in a build without them, left_out.cpp defines these.
 void AddPlannerVerbs(report::Program& program);  ///< health, worklist
+void AddFleetVerb(report::Program& program);     ///< report
 void AddShipVerb(report::Program& program);
 
 /// Examples for --help and the manual pages.
@@ -161,7 +162,10 @@ Json Rows(const Items& items, RowOf row_of) {
 
 /// The columns of the view fault_history, in its order.
 const std::vector<std::string>& EpisodeKeys();
-Json EpisodeJson(const Episode& episode);
+/// Puts the names of the fault catalogue where the history has none, or
+/// everywhere if --fault-catalogue is given.
+void NameFaults(std::vector<Episode>& episodes, const Context& context);
+Json EpisodeJson(const Alarm& alarm);
 Json ShelfJson(const Shelf& shelf);
 
 /// {"V1": {"LIVE": 12.5, ...}, ...}: hours by valve and quality.

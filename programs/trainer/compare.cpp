@@ -28,7 +28,7 @@ report::Report CompareSets(const CompareOptions& options,
   // Sets of two flow units have no run in common: scoring refuses that of b.
   const auto runs = LoadScoredRuns(options.selection,
                                    RequiredSignals(*a) | RequiredSignals(*b),
-                                   a->flow_unit, context);
+                                   EngineDetector(a).flow, context);
   return ComparisonReport(Compare(a, b, runs, {options.assume_normal}),
                           options.all);
 }

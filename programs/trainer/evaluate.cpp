@@ -105,7 +105,7 @@ report::Report RunEvaluate(const EvaluateOptions& options,
   const auto models = LoadModels(options, context);
   const Detector detector = EngineDetector(models);
   const auto runs = LoadScoredRuns(options.selection, detector.required,
-                                   detector.flow_unit, context);
+                                   detector.flow, context);
   return EvaluationReport(
       detector, ScoreAndWrite(options, context, detector, *models, runs));
 }

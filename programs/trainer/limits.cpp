@@ -248,8 +248,7 @@ report::Report Run(const LimitsOptions& options,
   }
   // What else the set reads is asked of its channels: not every valve has it.
   const importer::CsvOptions csv{.map = options.table.Read(context.options.utc),
-                                 .required = static_cast<SignalMask>(
-                                     MaskOf(Signal::kCv) | MaskOf(Signal::kX)),
+                                 .required = MaskOf(Signal::kCv),
                                  .log = context.log};
   for (const std::string& file : options.files) {
     request.files.push_back(ReadRunFile(file, csv));

@@ -3,25 +3,22 @@
 #include <cmath>
 #include <memory>
 #include <optional>
-#include <span>
 
 #include <CLI/CLI.hpp>
 
 #include "base/csv_cells.h"
 #include "base/error.h"
 #include "base/time_text.h"
-#include "base/toml_reader.h"
 #include "diagnosis/fault_catalogue.h"
 #include "import/tag_map.h"
 #include "programs/trainer/model_report.h"
+#include "programs/trainer/onboard_plant.h"
 #include "programs/trainer/verbs.h"
 #include "report/program.h"
 #include "report/progress.h"
 #include "report/report.h"
 #include "report/signal_list.h"
 #include "report/stop_signals.h"
-#include "simulator/scenario/scenario_toml.h"
-#include "simulator/valve_parameters.h"
 #include "storage/database/data_directory.h"
 #include "storage/models/model_codec.h"
 #include "storage/models/models.h"
@@ -29,11 +26,12 @@
 #include "trainer/campaign/campaign_runs.h"
 #include "trainer/campaign/file_runs.h"
 #include "trainer/campaign/run_input.h"
+#include "trainer/fleet/valve_types.h"
 #include "trainer/learning/labelled_episodes.h"
 #include "trainer/onboarding/onboarding.h"
+#include "trainer/onboarding/record_verdict.h"
 #include "trainer/rule_text.h"
 #include "trainer/scoring/evaluated_run.h"
-#include "trainer/statistics.h"
 
 // The verbs `onboard` and `coverage`: both make difference observers for a
 // valve type, one from the data of a valve, the other from a simulation.
@@ -68,99 +66,8 @@ struct OnboardOptions : TypeOptions {
   bool fit{true};
   bool assess{true};
   bool gains{false};
+  PlantVerbOptions plant;
 };
-
-struct FoundType {
-  ValveType type;
-  bool stored{false};       // In models.db: made for this type, taken as it is.
-  std::string model_set{};  // Of the valve it was saved from, NAME@VERSION.
-};
-
-// A stored type is a scenario in TOML that has the parameters, behind a line
-// `levels = [CV, P1, P2, T1]`, the delay of the command and the model set that
-// it was saved with. A sine is the one excitation that may be continuous
-// without a file.
-std::string TypeText(const ValveType& type, const std::string& model_set) {
-  simulator::Scenario scenario;
-  scenario.config.parameters = type.parameters;
-  scenario.config.excitation = simulator::SineExcitation{};
-  scenario.config.continuous_inputs = type.interpolated_command;
-  const simulator::InputRow& levels = type.levels;
-  return "levels = [" + NumberText(levels.cv_pct) + ", " +
-         NumberText(levels.p1_kpa) + ", " + NumberText(levels.p2_kpa) + ", " +
-         NumberText(levels.t1_degc) +
-         "]\ncommand_delay = " + std::to_string(type.command_delay) +
-         "\nmodel_set = \"" + model_set + "\"\n" + ScenarioText(scenario);
-}
-
-FoundType ParseType(const std::string& text, const std::string& name) {
-  TomlReader reader(text, "valve type " + name);
-  const std::vector<double> levels = reader.Numbers("levels");
-  if (levels.size() != 4) {
-    throw DataError("valve type " + name + ": levels must be 4 numbers");
-  }
-  const auto delay = reader.Integer("command_delay");
-  const auto model_set = reader.Text("model_set");
-  simulator::Scenario scenario;
-  ApplyScenario(reader, {}, scenario);
-  reader.Finish();
-  ValveType type;
-  type.name = name;
-  type.parameters = scenario.config.parameters;
-  type.interpolated_command = scenario.config.continuous_inputs;
-  type.command_delay = static_cast<int>(delay.value_or(0));
-  type.levels = {levels[0], levels[1], levels[2], levels[3]};
-  return {std::move(type), true, model_set.value_or("")};
-}
-
-// The type called `name`: one stored in models.db, a shipped parameter set, or
-// the parameters in FILE.toml.
-FoundType FindType(const std::string& name, storage::ModelStore& store) {
-  for (const storage::ValveType& stored : store.ListTemplates()) {
-    if (stored.name == name) {
-      const std::vector<std::byte> bytes = store.LoadTemplate(name).bytes;
-      return ParseType(
-          {reinterpret_cast<const char*>(bytes.data()), bytes.size()}, name);
-    }
-  }
-  ValveType type;
-  type.name = name;
-  type.parameters = simulator::FindParameters(name);
-  // A file that leaves the flow transmitter to the record does not tell a size
-  // either.
-  type.of_any_size = std::ranges::any_of(
-      simulator::ParameterSetNames(), [&](const std::string& shipped) {
-        return type.parameters.instruments.flow ==
-               simulator::ParameterSet(shipped).instruments.flow;
-      });
-  if (type.parameters.medium.is_gas()) {
-    const simulator::InventoryLoopExcitation loop;
-    type.levels = {loop.initial_cv_pct, loop.p1_kpa, loop.p2_kpa, loop.t1_degc};
-  }
-  return {std::move(type), false};
-}
-
-// Nothing if the set of the type is not there any more.
-std::optional<ModelSet> SetOf(const FoundType& found,
-                              storage::ModelStore& store) {
-  if (found.model_set.empty()) {
-    return std::nullopt;
-  }
-  try {
-    return store.Load(found.model_set);
-  } catch (const NotFoundError&) {
-    return std::nullopt;
-  }
-}
-
-void SaveType(const ValveType& type, const std::string& model_set,
-              storage::ModelStore& store) {
-  const std::string text = TypeText(type, model_set);
-  store.SaveTemplate(type.name, std::as_bytes(std::span(text)),
-                     type.parameters.name + ": " + Describe(type.parameters) +
-                         ", command " +
-                         (type.interpolated_command ? "interpolated" : "held"));
-}
 
 Json CoverageJson(const CoverageTable& table) {
   Json json = {{"signals", report::SignalsJson(table.signals)},
@@ -268,15 +175,49 @@ void AddFit(const simulator::ValveFit& fit, report::Report& report) {
               FormatNumber(fit.fitted.flow_rmse, 3) + "\n");
 }
 
+// What signals and period of the record keep from being seen.
+std::vector<std::string> LimitsOfRecord(const Onboarding& onboarding) {
+  constexpr double kSlowS = 5.0;
+  std::vector<std::string> lines;
+  const auto has = [&](Signal signal) {
+    return (onboarding.signals & MaskOf(signal)) != 0;
+  };
+  if (!has(Signal::kX)) {
+    lines.push_back(
+        "no position (X): faults of the rod, the trim, the flow meter and the "
+        "pressures are seen in F alone, which tells few of them apart; play, "
+        "friction and the position transmitter are not told at all");
+  }
+  if (has(Signal::kF) && !(has(Signal::kP1) && has(Signal::kP2))) {
+    lines.push_back(
+        "no pressures on both sides (P1, P2): a change of pressure is taken "
+        "for a change of the flow at the same opening (f2, f3, f17, f19), and "
+        "the force on the rod is not known (f1, f10, f16)");
+  }
+  const double period_s = onboarding.models.sample_period_s;
+  if (period_s >= kSlowS) {
+    lines.push_back(
+        "one sample in " + FormatNumber(period_s, 0) +
+        " s: how the rod moves between two samples is not seen (f4, f8, f9, "
+        "f15); what lasts is: F and X at rest. An episode is looked at by "
+        "simulation " +
+        FormatNumber(20.0 * period_s / 60.0, 0) + " min after its detection");
+  }
+  return lines;
+}
+
 // Physical parameters, fit of the normal observer against a naive model, model
 // set, coverage.
 report::Report ReportOf(const Onboarding& onboarding,
                         const std::optional<ModelSet>& of_type,
+                        const RecordVerdict& verdict,
                         const std::string& title) {
   const ModelSet& models = onboarding.models;
   report::Report report;
   report.document = OnboardingJson(onboarding, of_type);
-  report.Line(title + "\n");
+  report.document["verdict"] = verdict.word;
+  report.document["verdict_text"] = verdict.sentence;
+  report.Line(title + "\n" + verdict.sentence + "\n");
   if (onboarding.fit) {
     AddFit(*onboarding.fit, report);
   }
@@ -311,6 +252,9 @@ report::Report ReportOf(const Onboarding& onboarding,
                 std::string(FlowUnitName(i.flow_unit)) +
                 ": --type FILE.toml states another end");
   }
+  for (const std::string& line : LimitsOfRecord(onboarding)) {
+    report.Line(line);
+  }
   report.Line(AlarmRateText(models));
   if (onboarding.left_out_s > 0.0) {
     report.Line(FormatNumber(onboarding.left_out_s, 0) +
@@ -331,7 +275,10 @@ report::Report ReportOf(const Onboarding& onboarding,
   return report;
 }
 
+// Runs in several flow units are converted to that of the first, by the type's
+// medium.
 std::vector<TrainingRun> LoadRuns(const OnboardOptions& options,
+                                  const ValveType& type,
                                   const report::Context& context) {
   if (options.runs.empty() && options.files.empty()) {
     throw ConfigError("healthy data are needed: --runs ID,... or --file CSV");
@@ -339,15 +286,18 @@ std::vector<TrainingRun> LoadRuns(const OnboardOptions& options,
   if (options.files.empty() && options.table.given()) {
     throw ConfigError("--map, --zone and --resample are of --file");
   }
+  const simulator::Medium& medium = type.parameters.medium;
   importer::CsvOptions csv{.map = options.table.Read(context.options.utc),
                            .log = context.log};
-  csv.required =
-      static_cast<SignalMask>(MaskOf(Signal::kCv) | MaskOf(Signal::kX));
+  importer::CheckGasFlow(csv.map, simulator::MolarMass(medium));
+  csv.required = MaskOf(Signal::kCv);
   std::vector<storage::StoredRun> stored = LoadRunsAndFiles(
       options.runs, options.files, {context.options.data_dir}, csv);
   std::vector<TrainingRun> runs;
   for (storage::StoredRun& run : stored) {
-    ConvertFlow(run, stored.front().info.run.flow_unit, context.log);
+    ConvertFlow(
+        run, simulator::FlowTarget{stored.front().info.run.flow_unit, medium},
+        context.log);
     runs.push_back(ToTrainingRun(run, true));
     if (!options.signals.empty()) {
       runs.back() =
@@ -358,49 +308,8 @@ std::vector<TrainingRun> LoadRuns(const OnboardOptions& options,
   return runs;
 }
 
-// The epoch of the valve; one that is not in the table yet is added.
-std::uint32_t EpochOf(const std::string& valve, const Onboarding& onboarding,
-                      storage::ModelStore& store) {
-  for (const storage::ValveEntry& entry : store.Valves()) {
-    if (entry.pattern == valve) {
-      return entry.epoch;
-    }
-  }
-  storage::ValveEntry entry;
-  entry.pattern = valve;
-  entry.type = onboarding.type.name;
-  entry.flow_unit = onboarding.models.flow_unit;
-  entry.signals = onboarding.signals;
-  entry.period_s = onboarding.models.sample_period_s;
-  store.PutValve(entry);
-  return entry.epoch;
-}
-
-// Stores the set, assigns it to the valve, and keeps how the valve was found
-// beside earlier onboardings.
-void Store(const OnboardOptions& options, Onboarding& onboarding,
-           storage::ModelStore& store) {
-  onboarding.models =
-      store.Save(onboarding.models, storage::Activation::kAlways);
-  if (!options.save_type.empty()) {
-    onboarding.type.name = options.save_type;
-    SaveType(onboarding.type, NameOf(onboarding.models), store);
-  }
-  storage::BaselineRecord record;
-  record.epoch = EpochOf(options.valve, onboarding, store);
-  record.model_set = onboarding.models.name;
-  record.version = onboarding.models.version;
-  record.hours = onboarding.hours;
-  if (onboarding.fit) {
-    for (const simulator::FittedParameter& value : onboarding.fit->values) {
-      record.parameters.emplace_back(value.name, value.value);
-    }
-  }
-  for (const ChannelFit& fit : onboarding.channels) {
-    record.channels.push_back({fit.name, fit.rmse, fit.bias, fit.vaf});
-  }
-  store.SetBaseline(options.valve, record);
-}
+// Ctrl-C is answered within a second, whatever step the work is at.
+constexpr std::chrono::milliseconds kOnboardPatience{800};
 
 // Moves the bar, and ends the work where the user asked for it.
 Progress Reporting(report::Progress& bar, const report::StopSignals& signals) {
@@ -412,19 +321,35 @@ Progress Reporting(report::Progress& bar, const report::StopSignals& signals) {
   };
 }
 
+Onboarding OnboardOrSayWhyNot(const std::vector<TrainingRun>& runs,
+                              const OnboardingOptions& settings,
+                              const Progress& progress) {
+  try {
+    return Onboard(runs, settings, progress);
+  } catch (const DataError& error) {
+    throw DataError(std::string("not usable: ") + error.what());
+  }
+}
+
 report::Report OnboardValve(const OnboardOptions& options,
                             const report::Context& context) {
+  if (options.valve.empty()) {
+    throw ConfigError("onboard: --valve ID or --plant FILE is needed");
+  }
+  if (options.plant.dry_run || !options.plant.shard.empty()) {
+    throw ConfigError("--dry-run and --shard are of --plant");
+  }
   const std::string name = options.name.empty() ? options.valve : options.name;
   RequireStorable(name, "--name");
   if (!options.save_type.empty()) {
     RequireStorable(options.save_type, "--save-type");
   }
   const storage::DataDirectory directory{context.options.data_dir};
-  const std::vector<TrainingRun> runs = LoadRuns(options, context);
   storage::EnsureExists(directory);
   storage::ModelStore store(directory.models(),
                             storage::Access::kOccasionalWriter);
-  const FoundType found = FindType(options.type, store);
+  const FoundType found = FindType(options.type, &store);
+  const std::vector<TrainingRun> runs = LoadRuns(options, found.type, context);
   OnboardingOptions settings;
   settings.name = name;
   settings.type = found.type;
@@ -435,10 +360,13 @@ report::Report OnboardValve(const OnboardOptions& options,
   settings.assess = options.assess;
   settings.software = context.software;
   settings.created_ns = NowNs();
-  const report::StopSignals signals;
+  report::StopSignals signals;
+  signals.EndWithin(kOnboardPatience,
+                    "\nfdi-trainer: error: interrupted: nothing was stored\n");
   report::Progress bar("onboard");
   const auto start = std::chrono::steady_clock::now();
-  Onboarding onboarding = Onboard(runs, settings, Reporting(bar, signals));
+  Onboarding onboarding =
+      OnboardOrSayWhyNot(runs, settings, Reporting(bar, signals));
   if (options.gains && onboarding.coverage) {
     onboarding.coverage->gains =
         AssessType(onboarding.type, onboarding.coverage->signals, true,
@@ -446,14 +374,16 @@ report::Report OnboardValve(const OnboardOptions& options,
             .gains;
   }
   bar.Finish();
-  Store(options, onboarding, store);
+  signals.EndWithin(std::chrono::milliseconds(0));
+  onboarding.models =
+      *store.Store(ResultOf(options.valve, onboarding, options.save_type));
   const std::chrono::duration<double> seconds =
       std::chrono::steady_clock::now() - start;
-  return ReportOf(onboarding, settings.of_type,
-                  "valve " + options.valve + ": " +
-                      FormatNumber(onboarding.hours, 2) +
-                      " h of healthy data, onboarded in " +
-                      std::to_string(std::lround(seconds.count())) + " s");
+  return ReportOf(
+      onboarding, settings.of_type, JudgeRecord(runs, onboarding.hours),
+      "valve " + options.valve + ": " + FormatNumber(onboarding.hours, 2) +
+          " h of healthy data, onboarded in " +
+          std::to_string(std::lround(seconds.count())) + " s");
 }
 
 report::Report Assess(const CoverageOptions& options,
@@ -467,10 +397,11 @@ report::Report Assess(const CoverageOptions& options,
   OnboardingOptions settings;
   settings.name = "coverage";
   settings.threads = options.threads;
-  const report::StopSignals stop;
+  report::StopSignals stop;
+  stop.EndWithin(kOnboardPatience, "\nfdi-trainer: error: interrupted\n");
   report::Progress bar("coverage");
   const CoverageTable table =
-      AssessType(FindType(options.type, store).type, signals, options.gains,
+      AssessType(FindType(options.type, &store).type, signals, options.gains,
                  settings, Reporting(bar, stop));
   bar.Finish();
   report::Report report;
@@ -496,8 +427,8 @@ CLI::Option* AddTypeOptions(CLI::App& verb, const char* signals,
 void AddOptions(CLI::App& verb, OnboardOptions& options) {
   verb.add_option("--valve", options.valve,
                   "Id of the valve that the set is assigned to")
-      ->required()
       ->type_name("ID");
+  options.plant.AddTo(verb);
   verb.add_option("--runs", options.runs,
                   "Healthy runs, or stretches of them [s]")
       ->delimiter(',')
@@ -540,15 +471,28 @@ void AddOnboardVerb(report::Program& program) {
       "Make models for a valve that has only ever been healthy, and assign "
       "them",
       [options](const report::Context& context) -> report::Report {
-        return OnboardValve(*options, context);
+        return options->plant.plant.empty()
+                   ? OnboardValve(*options, context)
+                   : OnboardFromTable(options->plant, options->files,
+                                      options->table, options->threads,
+                                      options->false_alarms_per_hour, context);
       });
   AddOptions(verb, *options);
+  // The rows of a table state these.
+  for (const char* option : {"--valve", "--runs", "--type", "--signals",
+                             "--save-type", "--name", "--gains"}) {
+    verb.get_option("--plant")->excludes(verb.get_option(option));
+  }
   program.AddExamples(
       {{"onboard",
         {{"A valve of the plant that has only ever been healthy",
           "fdi-trainer onboard --valve FV-101 --runs 1a2b,3c4d"},
          {"From a CSV file, with what it would gain by more transmitters",
-          "fdi-trainer onboard --valve FV-101 --file fv101.csv --gains"}}}});
+          "fdi-trainer onboard --valve FV-101 --file fv101.csv --gains"},
+         {"All loops of a plant: what the table matches, then the work",
+          "fdi-trainer onboard --plant plant.toml --dry-run"},
+         {"The work; after an interruption the same command goes on",
+          "fdi-trainer onboard --plant plant.toml"}}}});
 }
 
 void AddCoverageVerb(report::Program& program) {

@@ -1,4 +1,5 @@
 #include <charconv>
+#include <chrono>
 #include <cmath>
 #include <memory>
 #include <optional>
@@ -90,6 +91,12 @@ Campaign MakeCampaign(const TrainOptions& options) {
   return campaign;
 }
 
+// Ctrl-C is answered within a second, whatever step the work is at: what is in
+// the files is whole after any end.
+constexpr std::chrono::milliseconds kTrainPatience{800};
+constexpr const char* kLastWords =
+    "\nfdi-trainer: error: interrupted: no model set was stored\n";
+
 void ThrowIfStopped(const report::StopSignals& signals) {
   if (signals.stop_requested()) {
     throw Interrupted("interrupted: no model set was stored");
@@ -138,7 +145,7 @@ std::vector<TrainingRun> LoadTrainingRuns(
 report::Report TrainAndStore(const std::vector<TrainingRun>& runs,
                              TrainingOptions training, bool activate,
                              storage::Lineage lineage,
-                             const report::StopSignals& signals,
+                             report::StopSignals& signals,
                              const report::Context& context) {
   const storage::DataDirectory directory{context.options.data_dir};
   // Opened first: a database that cannot be written costs no training.
@@ -154,6 +161,7 @@ report::Report TrainAndStore(const std::vector<TrainingRun>& runs,
         progress.Update(share, std::string(stage));
       });
   ThrowIfStopped(signals);
+  signals.EndWithin(std::chrono::milliseconds(0));
   progress.Finish();
   const ModelSet models = store.Save(
       trained,
@@ -256,7 +264,8 @@ report::Report TrainFromLabels(const TrainOptions& options,
     return PlanReport(plan);
   }
   RequireTrainable(plan, options.drop_missing, options.skip_refused);
-  const report::StopSignals signals;
+  report::StopSignals signals;
+  signals.EndWithin(kTrainPatience, kLastWords);
   for (const LabelledEpisode& episode : plan.refused) {
     context.log(
         LogLevel::kWarning,
@@ -293,7 +302,8 @@ report::Report Train(const TrainOptions& options,
     report.Line(text);
     return report;
   }
-  const report::StopSignals signals;
+  report::StopSignals signals;
+  signals.EndWithin(kTrainPatience, kLastWords);
   const std::vector<TrainingRun> runs = LoadTrainingRuns(
       Collect(campaign, context, signals), {context.options.data_dir},
       campaign.training.dataset.assume_normal);

@@ -137,6 +137,11 @@ std::string GnuplotScript(const Figure& figure, Format format,
 std::string DrawFigure(const Figure& figure, Format format,
                        const GnuplotLimits& limits = {});
 
+/// The same as an <svg> element for Report::Picture(). Of figures without
+/// Shape::kPoints only.
+/// @throws as DrawFigure().
+std::string SvgElement(const Figure& figure, const GnuplotLimits& limits = {});
+
 /// Draws to the file `output`, whose extension gives the format. The file is
 /// created only if drawing succeeds.
 /// @throws as above; ConfigError for another extension; DataError if the file

@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::size_t kBefore = 120;   // rows before the detection
 constexpr std::size_t kMaxRows = 420;  // rows in all
-constexpr std::size_t kMinMeasuredRows = 20;
+constexpr std::ptrdiff_t kMinMeasuredRows = 20;
 constexpr std::int64_t kEarlyAge = 20 * kNsPerSecond;
 constexpr std::int64_t kFirstAge = 40 * kNsPerSecond;
 constexpr std::int64_t kLastAge = 300 * kNsPerSecond;  // Then twice each.
@@ -31,11 +31,20 @@ constexpr double kAlike = 0.06;
 // Healthy windows have about 1.
 constexpr double kGoodMisfit = 2.0;
 
+// Of a sample a second.
 std::int64_t AgeAfter(std::int64_t age_ns) {
   return age_ns < kFirstAge            ? kFirstAge
          : age_ns < 150 * kNsPerSecond ? 150 * kNsPerSecond
          : age_ns < kLastAge           ? kLastAge
                                        : 2 * age_ns;
+}
+
+// Rows in which the valve's answer was measured: X, or F of a valve without a
+// position transmitter.
+std::ptrdiff_t MeasuredRows(const LookWindow& window) {
+  const bool has_x = (window.signals & MaskOf(Signal::kX)) != 0;
+  return std::ranges::count_if(
+      window.rows, has_x ? &RecordRow::x_measured : &RecordRow::flow_measured);
 }
 
 std::int64_t PeriodOf(const ValvePhysics& physics) {
@@ -57,8 +66,9 @@ bool IsAlike(Alike alike, const SecondLook& look, const Explanation& e,
       return e.distance <= kAlike * nothing;
     case Alike::kUnfit:
       // Where the best leaves no more than a healthy valve does, it needs no
-      // such excuse.
-      return look.misfit > kGoodMisfit && e.distance <= kAlike * nothing;
+      // such excuse, unless the force on the rod is not known.
+      return (look.misfit > kGoodMisfit || !look.complete) &&
+             e.distance <= kAlike * nothing;
     case Alike::kNever:
       break;
   }
@@ -103,6 +113,10 @@ std::optional<LookAnswer> TakeGrowthLook(const ValvePhysics& physics,
 }
 
 }  // namespace
+
+std::int64_t SlownessOf(double period_s) {
+  return std::max<std::int64_t>(1, std::llround(period_s));
+}
 
 LookAnswer AnswerOf(const SecondLook& look, bool early) {
   LookAnswer answer;
@@ -170,13 +184,11 @@ std::optional<LookAnswer> TakeLook(const ValvePhysics& physics,
 }
 
 bool LookTask::early() const {
-  return occasion == LookOccasion::kEpisode &&
-         stamp_ns - detection_stamp_ns < kFirstAge;
+  return occasion == LookOccasion::kEpisode && age_ns() < slowness * kFirstAge;
 }
 
 bool LookTask::late() const {
-  return occasion == LookOccasion::kEpisode &&
-         stamp_ns - detection_stamp_ns > kLastAge;
+  return occasion == LookOccasion::kEpisode && age_ns() > slowness * kLastAge;
 }
 
 bool ObserversName(const ModelSet& models, FaultSet isolated) {
@@ -208,7 +220,9 @@ std::optional<std::vector<int>> NamesOf(const LookAnswer& answer,
 }
 
 EpisodeLooks::EpisodeLooks(const ValvePhysics& physics)
-    : physics_(physics), period_ns_(PeriodOf(physics)) {}
+    : physics_(physics),
+      period_ns_(PeriodOf(physics)),
+      slowness_(SlownessOf(physics.drive.period_s)) {}
 
 // One row a period; up to three missing ones are held, a longer gap begins
 // anew. So does another set of signals, because a window has one for all rows.
@@ -233,8 +247,12 @@ void EpisodeLooks::AddRow(const Sample& sample) {
   constexpr double kMaxPressureKpa = 2e4;
   const bool is_water = physics_.parameters.medium.fluid == Fluid::kWater;
   const SignalMask uncertain = sample.uncertain();
-  // A command is needed as much as a position, to compare that with.
-  const bool follows = sample.Has(Signal::kCv) && sample.Has(Signal::kX);
+  // A command is needed as much as a position, to compare that with. Without a
+  // position, the flow is compared with it.
+  const bool has_x = sample.Has(Signal::kX);
+  const bool follows = sample.Has(Signal::kCv) && has_x;
+  const bool flows =
+      has_x || (sample.Has(Signal::kCv) && sample.Has(Signal::kF));
   const RecordRow row{
       {sample[Signal::kCv],
        value(Signal::kP1, physics_.p1.mean, 0.0, kMaxPressureKpa),
@@ -244,7 +262,7 @@ void EpisodeLooks::AddRow(const Sample& sample) {
       sample[Signal::kX],
       sample.Has(Signal::kF) ? sample[Signal::kF] : 0.0,
       follows && (uncertain & MaskOf(Signal::kX)) == 0,
-      (uncertain & MaskOf(Signal::kF)) == 0};
+      flows && (uncertain & MaskOf(Signal::kF)) == 0};
   for (std::int64_t held = 1; !rows_.empty() && held < step; ++held) {
     rows_.push_back({rows_.back().stamp_ns + period_ns_, rows_.back().row});
     rows_.back().row.x_measured = rows_.back().row.flow_measured = false;
@@ -258,25 +276,25 @@ void EpisodeLooks::AddRow(const Sample& sample) {
 std::optional<LookTask> EpisodeLooks::Task() const {
   LookTask task;
   task.detection_stamp_ns = *detection_ns_;
+  task.set_back_ns = set_back_ns_;
   task.window.signals = signals_;
+  task.slowness = slowness_;
+  const std::int64_t begin_ns = *detection_ns_ - set_back_ns_;
   // A routine look finds what has been there for minutes.
   const std::int64_t from_ns =
-      by_routine_
-          ? rows_.front().stamp_ns
-          : *detection_ns_ - static_cast<std::int64_t>(kBefore) * period_ns_;
+      by_routine_ ? rows_.front().stamp_ns
+                  : begin_ns - static_cast<std::int64_t>(kBefore) * period_ns_;
   for (const Row& row : rows_) {
     if (row.stamp_ns < from_ns) {
       continue;
     }
-    if (row.stamp_ns < *detection_ns_ && !by_routine_) {
+    if (row.stamp_ns < begin_ns && !by_routine_) {
       task.window.detection = task.window.rows.size() + 1;
     }
     task.window.rows.push_back(row.row);
     task.stamp_ns = row.stamp_ns;
   }
-  const auto measured = static_cast<std::size_t>(
-      std::ranges::count_if(task.window.rows, &RecordRow::x_measured));
-  if (measured < kMinMeasuredRows ||
+  if (MeasuredRows(task.window) < kMinMeasuredRows ||
       task.window.detection + 10 > task.window.rows.size()) {
     return std::nullopt;
   }
@@ -288,11 +306,11 @@ std::optional<LookTask> EpisodeLooks::RoutineTask(bool suspected) const {
   task.occasion = suspected ? LookOccasion::kStill : LookOccasion::kRoutine;
   task.stamp_ns = rows_.back().stamp_ns;
   task.window.signals = signals_;
+  task.slowness = slowness_;
   for (const Row& row : rows_) {
     task.window.rows.push_back(row.row);
   }
-  if (std::ranges::count_if(task.window.rows, &RecordRow::x_measured) <
-      kRoutineMeasured) {
+  if (MeasuredRows(task.window) < kRoutineMeasured) {
     return std::nullopt;
   }
   return task;
@@ -319,6 +337,7 @@ std::optional<LookTask> EpisodeLooks::Step(const Sample& sample,
   for (const Transition& transition : verdict.Transitions()) {
     if (transition.kind == TransitionKind::kDetected) {
       detection_ns_ = transition.detection_stamp_ns;
+      set_back_ns_ = 0;
       by_routine_ = suspected;
       // A suspected valve has a name already, that of the routine look.
       next_age_ns_ = suspected ? kLastAge : kEarlyAge;
@@ -330,12 +349,20 @@ std::optional<LookTask> EpisodeLooks::Step(const Sample& sample,
   if (verdict.intake != Intake::kAccepted) {
     return std::nullopt;
   }
+  // With a clock that was set back the episode would be as young, or not have
+  // begun, and no look would be due.
+  if (!rows_.empty() && sample.stamp_ns <= rows_.back().stamp_ns) {
+    set_back_ns_ += rows_.back().stamp_ns + period_ns_ - sample.stamp_ns;
+  }
   AddRow(sample);
   std::optional<LookTask> due;
-  if (detection_ns_ && sample.stamp_ns - *detection_ns_ >= next_age_ns_) {
+  const std::int64_t age_ns =
+      detection_ns_ ? sample.stamp_ns + set_back_ns_ - *detection_ns_ : 0;
+  const auto is_due = [&] { return age_ns >= slowness_ * next_age_ns_; };
+  if (detection_ns_ && is_due()) {
     // After a gap one look stands for all that it passed over. A look for which
     // too little was measured is left out, not put off.
-    while (sample.stamp_ns - *detection_ns_ >= next_age_ns_) {
+    while (is_due()) {
       next_age_ns_ = AgeAfter(next_age_ns_);
     }
     due = Task();
@@ -346,7 +373,7 @@ std::optional<LookTask> EpisodeLooks::Step(const Sample& sample,
                       (!detection_ns_ || suspected) &&
                       rows_.size() > std::min(judged_, kMaxRows - 1);
   judged_ = judged ? judged_ + 1 : 0;
-  const std::int64_t slot = sample.stamp_ns / kRoutineNs;
+  const std::int64_t slot = sample.stamp_ns / (slowness_ * kRoutineNs);
   // The exchange comes first in the condition, because slot_ has to follow
   // every sample; otherwise a look would be due late in its slot.
   if (std::exchange(slot_, slot) != slot && judged_ >= kMaxRows && !due) {
@@ -374,8 +401,7 @@ void LookBook::Enter(const LookTask& task, LookAnswer answer) {
   }
   // Comes last, because it changes the doubt: a look that was refused above
   // leaves the doubt of the one before it.
-  if (task.stamp_ns - task.detection_stamp_ns > kLastAge &&
-      !AcceptsLate(answer)) {
+  if (task.age_ns() > task.slowness * kLastAge && !AcceptsLate(answer)) {
     return;
   }
   answer.stamp_ns = task.stamp_ns;
@@ -525,7 +551,8 @@ void ValveLooks::EnterInBook(const LookTask& task, LookAnswer answer) {
                       static_cast<std::int64_t>(task.window.detection);
   const std::int64_t from_ns = task.stamp_ns - behind * period_ns_;
   for (Explanation& e : answer.faults) {
-    e.start += static_cast<int>((from_ns - detection_ns_) / period_ns_);
+    e.start += static_cast<int>((from_ns + task.set_back_ns - detection_ns_) /
+                                period_ns_);
   }
   book_.Enter(task, std::move(answer));
 }

@@ -29,7 +29,14 @@ struct LookTask {
   std::int64_t detection_stamp_ns{0};  ///< Key of the episode.
   LookOccasion occasion{LookOccasion::kEpisode};
   std::vector<Explanation> known{};  ///< Of kGrowth: EstimateStrengths().
+  std::int64_t slowness{1};          ///< See SlownessOf().
+  /// By how much the stamps of the valve were set back since the detection.
+  std::int64_t set_back_ns{0};
 
+  /// Of the episode, at the last row.
+  std::int64_t age_ns() const {
+    return stamp_ns + set_back_ns - detection_stamp_ns;
+  }
   /// So little of the episode is there that the physics, which is off by some
   /// per cent, may find the wrong fault: see LookAnswer::early.
   bool early() const;
@@ -37,6 +44,11 @@ struct LookTask {
   /// LookAnswer::late.
   bool late() const;
 };
+
+/// The ages and intervals of looks are for a sample a second. Slower data give
+/// as few rows in them as would tell nothing, so all of them grow with the
+/// period: this is the factor, at least 1.
+std::int64_t SlownessOf(double period_s);
 
 /// What a second look makes of the name of an episode.
 enum class LookOutcome : std::uint8_t {
@@ -114,7 +126,8 @@ inline constexpr std::int64_t kRoutineDelayNs = 60'000'000'000;
 /// should look at an episode that is open: 20 (early), 40, 150 and 300 s after
 /// its detection, then at twice the age each time. While there is none, or
 /// one that a routine look opened, a routine look is due every 300 s, at the
-/// same stamps whenever a program was started. Keeps the last 420 samples.
+/// same stamps whenever a program was started. All of these are longer by
+/// SlownessOf() the period. Keeps the last 420 samples.
 class EpisodeLooks {
  public:
   /// `physics` must outlive it.
@@ -141,13 +154,15 @@ class EpisodeLooks {
 
   const ValvePhysics& physics_;
   std::int64_t period_ns_;
+  std::int64_t slowness_;
   SignalMask signals_{0};
   std::deque<Row> rows_{};
   std::optional<std::int64_t> detection_ns_{};
   std::int64_t next_age_ns_{0};
-  bool by_routine_{false};  // The open episode.
-  std::size_t judged_{0};   // Rows in a row that a routine look may have.
-  std::int64_t slot_{0};    // Of 300 s.
+  std::int64_t set_back_ns_{0};  // See LookTask.
+  bool by_routine_{false};       // The open episode.
+  std::size_t judged_{0};        // Rows in a row that a routine look may have.
+  std::int64_t slot_{0};         // Of a routine look.
 };
 
 /// The answer of the layer that speaks last: that of the last look at the open

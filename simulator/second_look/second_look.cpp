@@ -53,6 +53,10 @@ struct Hypothesis {
   double strength{0.0};                      // and its |strength|.
 };
 
+constexpr double kNoHypothesis = 1e6;  // of cost
+// What a line that loses its flow pays as long as the loop has not answered.
+constexpr double kUnanswered = 30.0;
+
 // X is that of the healthy valve, and so is what drives the flow.
 bool ActsOnFlowAlone(int fault) {
   return fault != 0 && (FaultFactsOf(fault).acts_on == ActsOn::kFlow ||
@@ -80,7 +84,7 @@ class Looker {
     // of every fault is the difference from it.
     healthy_ = Simulate(0, 0.0, {0, false});
     FindUsualInputs();
-    command_cost_ = CommandCost();
+    command_away_ = CommandAway();
   }
 
   SecondLook Run(const std::stop_token& stop);
@@ -97,6 +101,7 @@ class Looker {
   double StrengthAt(int row, double strength, Course course) const;
   void FindUsualInputs();
   InputRow InputAt(int row, int fault, double strength) const;
+  bool IsSeenInInputs(const Hypothesis& h) const;
   Trajectory Simulate(int fault, double strength, Course course,
                       double supply = 1.0);
   Trajectory FlowOnly(int fault, double strength, Course course) const;
@@ -106,7 +111,7 @@ class Looker {
   double Readings() const;
   double InputCost(int fault, double strength, Course course,
                    const Trajectory& answers) const;
-  double CommandCost() const;
+  std::optional<double> CommandAway() const;
   double Cost(int fault, double strength, Course course,
               const Trajectory& answers) const;
   double CostOf(const Hypothesis& hypothesis, double strength,
@@ -128,7 +133,7 @@ class Looker {
   int rows_;
   int detection_;
   InputRow usual_{};  // Mean inputs before the detection, or in onboarding.
-  double command_cost_{0.0};  // Of f19.
+  std::optional<double> command_away_{};
   Trajectory healthy_;
 };
 
@@ -172,8 +177,27 @@ InputRow Looker::InputAt(int row, int fault, double strength) const {
     input.p1_kpa = usual_.p1_kpa;
   } else if (hidden == Signal::kP2) {
     input.p2_kpa = usual_.p2_kpa;
+  } else if (ActsOnInputs(fault) && strength != 0.0) {
+    // What is measured has moved already; what is not is the usual value still.
+    FaultEffects effects;
+    ApplyFault(fault, strength, effects);
+    input.p1_kpa *= Measures(Signal::kP1) ? 1.0 : effects.inlet_factor;
+    input.p2_kpa *= Measures(Signal::kP2) ? 1.0 : effects.outlet_factor;
   }
   return input;
+}
+
+// The fault acts on an input that is measured, where it would be seen. Without
+// that transmitter nothing but the flow tells.
+bool Looker::IsSeenInInputs(const Hypothesis& h) const {
+  FaultEffects effects;
+  ApplyFault(h.fault, h.sign, effects);
+  const FaultEffects none;
+  return (effects.temperature_rise_c > 0.0 && Measures(Signal::kT1)) ||
+         (effects.inlet_factor != none.inlet_factor && Measures(Signal::kP1)) ||
+         (effects.outlet_factor != none.outlet_factor &&
+          Measures(Signal::kP2)) ||
+         TransmitterOf(h.fault).has_value();
 }
 
 Trajectory Looker::Simulate(int fault, double strength, Course course,
@@ -190,7 +214,7 @@ Trajectory Looker::Simulate(int fault, double strength, Course course,
   config.parameters = physics_.parameters;
   config.parameters.actuator.supply_pressure_gauge_pa *= supply;
   config.excitation = std::move(excitation);
-  config.period_s = physics_.drive.period_s;
+  config.period_s = SimulatedPeriod(physics_.drive.period_s);
   config.duration_s = rows_ * config.period_s;
   config.continuous_inputs = physics_.drive.interpolated_command;
   config.noise = false;
@@ -227,7 +251,12 @@ Trajectory Looker::FlowOnly(int fault, double strength, Course course) const {
   Trajectory answers = healthy_;
   for (int k = course.start; k < rows_; ++k) {
     FaultEffects effects;
-    ApplyFault(fault, StrengthAt(k, strength, course), effects);
+    const double now = StrengthAt(k, strength, course);
+    if (fault == kLowFlow) {
+      effects.flow_reading_factor = 1.0 - now;
+    } else {
+      ApplyFault(fault, now, effects);
+    }
     RecordAnswer& answer = answers[static_cast<std::size_t>(k)];
     answer.flow = FlowReading(physics_.parameters, effects,
                               window_.rows[static_cast<std::size_t>(k)].input,
@@ -377,14 +406,20 @@ double Looker::InputCost(int fault, double strength, Course course,
         return t1_degc + e.temperature_reading_step *
                              (i.temperature.high - i.temperature.low);
       }));
-  return fault != 0 && FaultFactsOf(fault).acts_on == ActsOn::kFlowReading
-             ? cost + command_cost_
-             : cost;
+  if (fault != 0 && FaultFactsOf(fault).acts_on == ActsOn::kFlowReading &&
+      !physics_.loop.reads_flow) {
+    return cost + command_away_.value_or(0.0);
+  }
+  if (fault == kLowFlow && command_away_) {
+    return cost + std::max(0.0, kUnanswered - *command_away_);
+  }
+  return cost;
 }
 
 // A flow transmitter that goes wrong moves no command, unless the loop reads
-// it. One that moved with the fault tells against it.
-double Looker::CommandCost() const {
+// it: one that moved with the fault tells against it. A line that loses its
+// flow does. How far it moved, in squared deviations.
+std::optional<double> Looker::CommandAway() const {
   // The gap is that of LoopObserver (valve_physics.cpp), which measures how far
   // this difference usually is from 0.
   constexpr int kMinRowsBefore = 60;
@@ -392,9 +427,9 @@ double Looker::CommandCost() const {
   constexpr int kMinRowsAfter = 10;
   const LoopHabit& loop = physics_.loop;
   const int first = detection_ + kGap;
-  if (loop.reads_flow || loop.command_sd <= 0.0 ||
-      detection_ < kMinRowsBefore || rows_ < first + kMinRowsAfter) {
-    return 0.0;
+  if (loop.command_sd <= 0.0 || detection_ < kMinRowsBefore ||
+      rows_ < first + kMinRowsAfter) {
+    return std::nullopt;
   }
   const auto mean = [&](int from, int to) {
     double sum = 0.0;
@@ -421,6 +456,9 @@ double Looker::Cost(int fault, double strength, Course course,
 double Looker::CostOf(const Hypothesis& h, double strength,
                       const Trajectory& answers) const {
   const double away = std::log(h.supply) / kSupplyDeviation;
+  if (h.fault == kLowFlow && strength < physics_.least_loss) {
+    return kNoHypothesis;
+  }
   return Cost(h.fault, h.sign * strength, h.course, answers) + away * away;
 }
 
@@ -428,10 +466,7 @@ std::vector<Hypothesis> Looker::Hypotheses() const {
   std::vector<Hypothesis> hypotheses;
   for (int fault = 1; fault <= kLastFault; ++fault) {
     const FaultFacts& facts = FaultFactsOf(fault);
-    // X is always there.
-    const auto measured =
-        static_cast<SignalMask>(window_.signals | MaskOf(Signal::kX));
-    if (facts.weak || !IsVisibleIn(fault, measured) ||
+    if (facts.weak || !IsVisibleIn(fault, window_.signals) ||
         !Exists(fault, physics_.parameters)) {
       continue;
     }
@@ -440,6 +475,9 @@ std::vector<Hypothesis> Looker::Hypotheses() const {
         hypotheses.push_back({fault, sign, {detection_, false}});
       }
     }
+  }
+  if (Measures(Signal::kF) && physics_.least_loss > 0.0) {
+    hypotheses.push_back({kLowFlow, 1.0, {detection_, false}});
   }
   return hypotheses;
 }
@@ -630,14 +668,14 @@ std::vector<Hypothesis> Looker::FitHypotheses(const std::stop_token& stop) {
     }
     // Faults of the inputs are sought where an input is unusual: one by three
     // deviations, or several by less.
-    if (ActsOnInputs(h.fault) && inputs < 9.0) {
+    if (ActsOnInputs(h.fault) && inputs < 9.0 && IsSeenInInputs(h)) {
       continue;
     }
     for (const double strength : {0.1, 0.3, 0.6, 1.0}) {
       Try(h, strength);
     }
     const Onset onset = FaultFactsOf(h.fault).onset;
-    if (onset == Onset::kStop) {
+    if (onset == Onset::kStop && Measures(Signal::kX)) {
       Try(h, ObservedStop());
     } else if (onset == Onset::kThreshold) {
       for (const double strength : {0.5, 0.7, 0.8, 0.9}) {
@@ -693,6 +731,8 @@ SecondLook Looker::Run(const std::stop_token& stop) {
   SecondLook look;
   look.best = faulty ? first.simulated.at(first.strength) : healthy_;
   look.readings = readings;
+  look.complete =
+      Measures(Signal::kP1) && Measures(Signal::kP2) && Measures(Signal::kX);
   look.misfit = (faulty ? ErrorsOf(look.best) : unmoved.errors) / readings;
   // Where nothing fits well, little is told apart.
   const double scale = std::max(1.0, look.misfit);

@@ -12,7 +12,7 @@ namespace fdi::simulator {
 
 /// Recorded rows about an episode, one period apart.
 struct LookWindow {
-  std::vector<RecordRow> rows;  ///< At least 20, with X measured in 20.
+  std::vector<RecordRow> rows;  ///< At least 20, with X or F measured in 20.
   std::size_t detection{0};     ///< Row of the first abnormal sample; 0 if it
                                 ///< lies before the window.
   SignalMask signals{0};        ///< That were measured.
@@ -42,6 +42,9 @@ struct SecondLook {
   /// ones; far above 1 where none fits.
   double misfit{0.0};
   double readings{0.0};  ///< Of X and F that count as independent.
+  /// Both pressures and X were measured: the force on the rod and what drives
+  /// the flow are known, and so is which of the two a fault changes.
+  bool complete{true};
   /// The valve's answer under the best explanation, one per row.
   std::vector<RecordAnswer> best;
 };

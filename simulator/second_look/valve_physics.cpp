@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <string>
 #include <string_view>
 #include <type_traits>
@@ -18,6 +19,7 @@ namespace {
 constexpr std::size_t kSettleRows = 60;  // The simulation starts at rest.
 constexpr std::size_t kMinStretchRows = 180;
 constexpr std::size_t kSlowRows = 600;
+constexpr double kLeastLoss = 0.5;
 
 double Mean(const std::vector<double>& values) {
   double sum = 0.0;
@@ -296,6 +298,7 @@ ValvePhysics DescribeValve(const ValveParameters& parameters,
   physics.p2 = BandOf(p2, level);
   physics.t1 = BandOf(t1, level);
   physics.loop = loop.Habit();
+  physics.least_loss = kLeastLoss;
   return physics;
 }
 
@@ -314,12 +317,13 @@ FDI_VISITABLE(Scatter, sd, correlation_time, slow_sd)
 FDI_VISITABLE(InputBand, mean, slope, sd)
 FDI_VISITABLE(LoopHabit, command_sd, reads_flow)
 FDI_VISITABLE(ValvePhysics, parameters, drive, x, flow, flow_mean, p1, p2, t1,
-              loop)
+              loop, least_loss)
 
 // Sets that were stored before there were these have the default: a water valve
 // whose spring opens it. A name with a dot at its end is that of all in it.
 constexpr std::string_view kAddedLater[] = {
     "loop.",
+    "least_loss",
     "parameters.medium.",
     "parameters.actuator.spring",
     "parameters.trim.shut_off",
@@ -348,6 +352,28 @@ struct Numbers {
 };
 
 using List = std::vector<double>;
+
+// A double beyond the range of what it becomes would be undefined behaviour.
+template <typename Field>
+Field FromNumber(const PhysicalValue& value) {
+  if constexpr (std::is_floating_point_v<Field>) {
+    return value.value;
+  } else {
+    constexpr double kMost =
+        std::is_same_v<Field, bool> ? 1.0
+        : std::is_enum_v<Field>
+            ? static_cast<double>(kEnumNames<Field>.size()) - 1.0
+            : static_cast<double>(std::numeric_limits<int>::max());
+    if (!(value.value >= 0.0 && value.value <= kMost &&
+          value.value == std::floor(value.value))) {
+      throw DataError(
+          "the physics of the model set has " + value.name + " = " +
+          std::to_string(value.value) + ", expected a whole number of 0 to " +
+          std::to_string(static_cast<int>(kMost)) + ": onboard the valve anew");
+    }
+    return static_cast<Field>(static_cast<int>(value.value));
+  }
+}
 
 }  // namespace
 
@@ -379,8 +405,8 @@ ValvePhysics PhysicsFrom(const std::vector<PhysicalValue>& values) {
         field.push_back(values[next++].value);
       }
     } else if (is_next(name)) {
-      field = static_cast<std::remove_reference_t<decltype(field)>>(
-          values[next++].value);
+      field =
+          FromNumber<std::remove_reference_t<decltype(field)>>(values[next++]);
     } else if (std::ranges::none_of(kAddedLater, [&](std::string_view added) {
                  return added.ends_with('.') ? name.starts_with(added)
                                              : name == added;
@@ -396,6 +422,19 @@ ValvePhysics PhysicsFrom(const std::vector<PhysicalValue>& values) {
   }
   Validate(physics.parameters);
   return physics;
+}
+
+FlowTarget FlowTargetOf(const ModelSet& models) {
+  if (models.physics.empty()) {
+    return {models.flow_unit};
+  }
+  const ValvePhysics physics = PhysicsFrom(models.physics);
+  FlowTarget target{models.flow_unit, physics.parameters.medium};
+  if (target.medium.is_gas()) {
+    target.p1_kpa = physics.p1.mean;
+    target.t1_degc = physics.t1.mean;
+  }
+  return target;
 }
 
 }  // namespace fdi::simulator

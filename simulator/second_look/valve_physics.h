@@ -4,6 +4,7 @@
 
 #include "diagnosis/model_set.h"
 #include "simulator/record_fit.h"
+#include "simulator/valve_equations.h"
 #include "simulator/valve_parameters.h"
 
 namespace fdi::simulator {
@@ -44,6 +45,10 @@ struct ValvePhysics {
   InputBand p2{};       ///< [kPa]
   InputBand t1{};       ///< [degC]
   LoopHabit loop{};
+  /// Less flow than the opening passes, whatever the cause in the line
+  /// (kLowFlow), is a hypothesis from this share on: a smaller loss cannot be
+  /// told from a fault of the valve. 0: none (older sets).
+  double least_loss{0.0};
 };
 
 /// Simulates the healthy records and measures the differences.
@@ -53,10 +58,15 @@ ValvePhysics DescribeValve(const ValveParameters& parameters,
                            const std::vector<std::vector<RecordRow>>& records);
 
 /// The physics as it is stored in a model set, and back. That of a valve that
-/// was onboarded before there was `loop` knows nothing of it.
+/// was onboarded before there was `loop` or `least_loss` knows nothing of it.
 /// @throws DataError naming a value that is missing or unknown; ConfigError if
 ///   a parameter is out of its range.
 std::vector<PhysicalValue> ToValues(const ValvePhysics& physics);
 ValvePhysics PhysicsFrom(const std::vector<PhysicalValue>& values);
+
+/// What the flow of the valve is converted to: by the medium, P1 and T1 of an
+/// onboarded valve, else by water, for which alone sets are trained without
+/// physics. @throws as PhysicsFrom().
+FlowTarget FlowTargetOf(const ModelSet& models);
 
 }  // namespace fdi::simulator

@@ -126,6 +126,26 @@ std::filesystem::path FreeBackupName(const std::filesystem::path& path,
   return name;
 }
 
+// The copy on the way: it gets its name once the migration is committed, so
+// that one that is killed and tried again leaves no copy for each attempt.
+std::filesystem::path UnfinishedBackup(const std::filesystem::path& path,
+                                       int version) {
+  return path.string() + ".v" + std::to_string(version) + ".backup.unfinished";
+}
+
+// Names the copies of migrations that were committed: those of versions before
+// that of the file. Who made one may have been killed since.
+void FinishBackups(const std::filesystem::path& path, int version,
+                   std::optional<std::filesystem::path>& backup) {
+  for (int before = 1; before < version; ++before) {
+    const std::filesystem::path copy = UnfinishedBackup(path, before);
+    if (std::filesystem::exists(copy)) {
+      backup = FreeBackupName(path, before);
+      std::filesystem::rename(copy, *backup);
+    }
+  }
+}
+
 // SQLiteCpp does not expose its statement handle, so it is found by its text;
 // of several statements with that text, any gives the answer. SQLite counts
 // BEGIN and COMMIT as reading, so a Snapshot can step them, but BEGIN IMMEDIATE
@@ -226,6 +246,8 @@ Database::Database(const std::filesystem::path& path, const Schema& schema,
     Configure(schema);
     if (version_ < static_cast<int>(schema.migrations.size())) {
       Migrate(schema, version_);
+    } else {
+      FinishBackups(path_, version_, migration_backup_);
     }
   }
   // A connection that has read in WAL mode keeps its WAL until it is closed.
@@ -352,9 +374,10 @@ void Database::Configure(const Schema& schema) {
 void Database::Migrate(const Schema& schema, int from) {
   // VACUUM INTO cannot run inside a transaction: the caller holds the gate, so
   // that nobody writes between the copy and the migration.
+  const std::filesystem::path copy = UnfinishedBackup(path_, from);
   if (from > 0) {
-    migration_backup_ = FreeBackupName(path_, from);
-    BackupTo(*migration_backup_);
+    std::filesystem::remove(copy);
+    BackupTo(copy);
   }
   // One transaction for all versions. application_id and user_version are in
   // the header of the file and are rolled back with the rest.
@@ -376,12 +399,11 @@ void Database::Migrate(const Schema& schema, int from) {
     connection_->tryExec("ROLLBACK");
     // The file is as before, and a service tries again and again: each attempt
     // would leave a copy of it.
-    if (migration_backup_) {
-      std::error_code ignored;
-      std::filesystem::remove(*migration_backup_, ignored);
-    }
+    std::error_code ignored;
+    std::filesystem::remove(copy, ignored);
     throw;
   }
+  FinishBackups(path_, version_, migration_backup_);
 }
 
 Statement& Database::Cached(std::string_view sql) {

@@ -1,8 +1,10 @@
 #include "storage/history/alarm.h"
 
 #include <algorithm>
+#include <iterator>
 #include <map>
 
+#include "base/stamps.h"
 #include "base/time_units.h"
 #include "storage/database/record.h"
 #include "storage/history/sql.h"
@@ -23,14 +25,63 @@ struct Stretch {
   }
 };
 
-void AddDays(const Stretch& stretch, std::map<std::int64_t, DayAlarms>& days) {
-  for (std::int64_t from = stretch.from_ns; from < stretch.to_ns;) {
-    const std::int64_t day = from / kNsPerDay;
-    const std::int64_t to = std::min(stretch.to_ns, (day + 1) * kNsPerDay);
-    days[day].alarm_s += static_cast<double>(to - from) * 1e-9;
-    from = to;
-  }
+// The number of a day since 1970; also of one before.
+std::int64_t DayOf(std::int64_t stamp_ns) {
+  return stamp_ns / kNsPerDay - (stamp_ns % kNsPerDay < 0 ? 1 : 0);
 }
+
+// Time in alarm by day. The work for a stretch does not grow with its length:
+// its whole days are added by Finish().
+class DaySums {
+ public:
+  void Add(const Stretch& stretch) {
+    if (stretch.from_ns >= stretch.to_ns) {
+      return;
+    }
+    const std::int64_t first = DayOf(stretch.from_ns);
+    const std::int64_t last = DayOf(stretch.to_ns - 1);
+    if (first == last) {
+      days_[first].alarm_s +=
+          static_cast<double>(stretch.to_ns - stretch.from_ns) * 1e-9;
+      return;
+    }
+    days_[first].alarm_s +=
+        static_cast<double>((first + 1) * kNsPerDay - stretch.from_ns) * 1e-9;
+    days_[last].alarm_s +=
+        static_cast<double>(stretch.to_ns - last * kNsPerDay) * 1e-9;
+    ++whole_[first + 1];
+    --whole_[last];
+  }
+  void CountEpisode(std::int64_t stamp_ns) {
+    ++days_[DayOf(stamp_ns)].episodes;
+  }
+
+  /// In order; days without an alarm are not among them.
+  std::vector<DayAlarms> Finish() {
+    std::int64_t stretches = 0;
+    for (auto step = whole_.begin(); step != whole_.end(); ++step) {
+      stretches += step->second;
+      const auto next = std::next(step);
+      for (std::int64_t day = step->first;
+           stretches > 0 && next != whole_.end() && day < next->first; ++day) {
+        days_[day].alarm_s += static_cast<double>(stretches) * kSecondsPerDay;
+      }
+    }
+    std::vector<DayAlarms> days;
+    for (auto& [day, alarms] : days_) {
+      alarms.day = day;
+      days.push_back(alarms);
+    }
+    return days;
+  }
+
+ private:
+  static constexpr double kSecondsPerDay = 86'400.0;
+  std::map<std::int64_t, DayAlarms> days_;
+  // By day: stretches that cover it whole and not the day before, minus those
+  // the other way round.
+  std::map<std::int64_t, std::int64_t> whole_;
+};
 
 void AddLabel(const AlarmSpan& span, AlarmStatistics& statistics) {
   FaultAlarms& fault = statistics.faults[span.fault];
@@ -89,8 +140,7 @@ std::int64_t MaxCountWithin(const std::vector<std::int64_t>& stamps,
 }  // namespace
 
 bool IsActive(const Shelf& shelf, std::int64_t now_ns) {
-  return shelf.from_ns <= now_ns && now_ns < shelf.until_ns &&
-         (!shelf.ended_ns || now_ns < *shelf.ended_ns);
+  return now_ns < shelf.until_ns && !shelf.ended_ns;
 }
 
 bool Covers(const Shelf& shelf, const Episode& episode) {
@@ -183,40 +233,39 @@ AlarmStatistics ComputeAlarmStatistics(const std::vector<AlarmSpan>& spans,
                                        std::int64_t now_ns,
                                        const AlarmCriteria& criteria) {
   AlarmStatistics statistics;
-  std::map<std::int64_t, DayAlarms> days;
+  DaySums days;
   std::map<std::string, std::vector<std::int64_t>> by_valve;
   std::vector<std::int64_t> all;
   for (const AlarmSpan& span : spans) {
+    // Clamped, so that no difference overflows.
+    const std::int64_t detected_ns = ClampStamp(span.detected_ns);
     const std::int64_t end_ns =
-        std::max(span.detected_ns, span.ended_ns.value_or(std::max(
-                                       now_ns, span.last_ns.value_or(now_ns))));
-    if (end_ns < since_ns || span.detected_ns >= until_ns) {
+        std::max(detected_ns, ClampStamp(span.ended_ns.value_or(std::max(
+                                  now_ns, span.last_ns.value_or(now_ns)))));
+    if (end_ns < since_ns || detected_ns >= until_ns) {
       continue;
     }
     // An episode detected before the period adds its time in alarm, but it is
     // not counted as an episode of the period.
-    const Stretch stretch{std::max(span.detected_ns, since_ns),
+    const Stretch stretch{std::max(detected_ns, since_ns),
                           std::min(end_ns, until_ns)};
     ValveAlarms& valve = statistics.valves[span.valve_id];
     valve.alarm_s += stretch.seconds();
-    AddDays(stretch, days);
+    days.Add(stretch);
     valve.open += span.ended_ns ? 0 : 1;
     valve.standing +=
-        end_ns - span.detected_ns > Nanoseconds(criteria.standing_s) ? 1 : 0;
-    if (span.detected_ns < since_ns) {
+        end_ns - detected_ns > Nanoseconds(criteria.standing_s) ? 1 : 0;
+    if (detected_ns < since_ns) {
       continue;
     }
     ++valve.episodes;
-    valve.last_detected_ns = std::max(valve.last_detected_ns, span.detected_ns);
-    ++days[span.detected_ns / kNsPerDay].episodes;
+    valve.last_detected_ns = std::max(valve.last_detected_ns, detected_ns);
+    days.CountEpisode(detected_ns);
     AddLabel(span, statistics);
-    by_valve[span.valve_id].push_back(span.detected_ns);
-    all.push_back(span.detected_ns);
+    by_valve[span.valve_id].push_back(detected_ns);
+    all.push_back(detected_ns);
   }
-  for (auto& [day, alarms] : days) {
-    alarms.day = day;
-    statistics.days.push_back(alarms);
-  }
+  statistics.days = days.Finish();
   for (const auto& [valve, stamps] : by_valve) {
     statistics.valves[valve].chattering = Chattering(stamps, criteria);
   }

@@ -35,7 +35,9 @@ struct Shelf {
 std::vector<Shelf> ReadShelves(Database& database,
                                std::optional<std::int64_t> in_force_at_ns = {});
 
-/// [from, until), or less if it was ended early.
+/// Until its end, unless somebody has ended it. Whether now is before its
+/// beginning does not matter: then a clock was set back, or that of the other
+/// monitor of a pair is ahead, and what somebody has shelved stays shelved.
 bool IsActive(const Shelf& shelf, std::int64_t now_ns);
 
 /// Whether `shelf` applies to this valve and diagnosis. A shelved fault covers

@@ -3,11 +3,10 @@
 namespace fdi::storage {
 
 Certainty CertaintyOf(const Episode& episode) {
-  const bool physics = episode.layer == LayerName(Layer::kPhysics);
   const bool outside =
       episode.unknown_kind == UnknownName(Unknown::kOutsideKnown);
   return fdi::CertaintyOf(
-      episode.fault.value_or(""), physics ? Layer::kPhysics : Layer::kObservers,
+      episode.fault.value_or(""), ParseLayer(episode.layer.value_or("")),
       episode.peak_factor,
       outside ? Unknown::kOutsideKnown : Unknown::kTooEarly);
 }

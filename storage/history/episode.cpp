@@ -29,6 +29,10 @@ constexpr std::array<std::pair<std::string_view, EpisodeState>, 11> kStates = {{
 
 }  // namespace
 
+bool IsNamed(const Episode& episode) {
+  return episode.fault && *episode.fault != "unknown";
+}
+
 std::string EpisodeIdText(std::uint64_t episode_id) {
   char text[17];
   std::snprintf(text, sizeof text, "%016llx",

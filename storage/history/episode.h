@@ -79,7 +79,14 @@ struct Episode {
   std::optional<std::int64_t> priority;
   /// The data ended then, and the fault has not been seen to be gone since.
   std::optional<std::int64_t> unconfirmed_ns;
+  /// In plain words, as the monitor's catalogue has them; nothing before a name
+  /// or where no monitor has said so.
+  std::optional<std::string> fault_name;
+  std::optional<std::string> ack_comment;
 };
+
+/// Whether its faults have a name, and with it a strength.
+bool IsNamed(const Episode& episode);
 
 /// One run of the monitor process.
 struct MonitorSession {
@@ -159,7 +166,8 @@ FDI_FIELDS(fdi::storage::Episode, episode_id, valve_id, detected_utc,
            label, acked_by, source_id, model_hash, detected_ns, isolated_ns,
            cleared_ns, ended_ns, acked_ns, trace_end_ns, session_id, fault_bits,
            strength, unknown_kind, layer, flow_unit, channels, faults, lowest,
-           highest, worst_strength, priority, unconfirmed_ns)
+           highest, worst_strength, priority, unconfirmed_ns, fault_name,
+           ack_comment)
 
 FDI_FIELDS(fdi::storage::MonitorSession, session_id, start_ns, alive_ns,
            stop_ns, clean, software, config)

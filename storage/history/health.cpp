@@ -12,11 +12,14 @@
 namespace fdi::storage {
 namespace sql = history_sql;
 
-// The bytes of an hour, format 1:
+// The bytes of an hour, format 2; format 1 had no counts:
 //
 //   hour     = head seen alarm open shut live_samples normal_factor travel
-//              reversals  channels channel*  filled bin*  strength* 0
+//              reversals  counts  channels channel*  filled bin*  strength* 0
 //   head     = uint8: the format, with 0x80 if flow is in t/h
+//   counts   = present number*: bit i of `present` is set if number i of
+//              loop::ValveCounts follows; that of the time in automatic is
+//              what it lacks of `seen`
 //   channel  = uint8 signal, int8 exponent
 //   filled   = uint16: bit b is set if bin b has samples
 //   bin      = for each channel: samples [residual square output]
@@ -26,8 +29,9 @@ namespace sql = history_sql;
 // are omitted if it has no samples.
 namespace {
 
-constexpr std::uint8_t kFormat = 1;
-constexpr std::uint8_t kTonnes = 0x80;  // beside the format: flow in t/h
+constexpr std::uint8_t kFormat = 2;
+constexpr std::uint8_t kWithoutCounts = 1;  // The format before.
+constexpr std::uint8_t kTonnes = 0x80;      // beside the format: flow in t/h
 
 // LEB128 with zigzag coding: 0, -1, 1, -2, ... become 0, 1, 2, 3, ...
 void PutNumber(ByteWriter& out, std::int64_t value) {
@@ -61,6 +65,34 @@ std::size_t GetCount(ByteReader& in, std::int64_t limit, const char* what) {
               " is not in 0.." + std::to_string(limit));
   }
   return static_cast<std::size_t>(count);
+}
+
+void PutCounts(ByteWriter& out, const HealthHour& hour) {
+  loop::ValveCounts counts = hour.counts;
+  counts.auto_ms = hour.seen_ms - counts.auto_ms;  // Mostly 0.
+  std::int64_t present = 0;
+  for (std::size_t i = 0; i < loop::kValveCounts.size(); ++i) {
+    const bool some = counts.*loop::kValveCounts[i] != 0;
+    present |= some ? std::int64_t{1} << i : 0;
+  }
+  PutNumber(out, present);
+  for (const auto count : loop::kValveCounts) {
+    if (counts.*count != 0) {
+      PutNumber(out, counts.*count);
+    }
+  }
+}
+
+// After the times.
+void GetCounts(ByteReader& in, HealthHour& hour) {
+  constexpr std::size_t kCounts = loop::kValveCounts.size();
+  const std::size_t present =
+      GetCount(in, (std::int64_t{1} << kCounts) - 1, "counts");
+  for (std::size_t i = 0; i < kCounts; ++i) {
+    hour.counts.*loop::kValveCounts[i] =
+        (present >> i & 1U) != 0 ? GetNumber(in) : 0;
+  }
+  hour.counts.auto_ms = hour.seen_ms - hour.counts.auto_ms;
 }
 
 void PutBins(ByteWriter& out, const HealthHour& hour) {
@@ -138,6 +170,7 @@ std::vector<std::byte> PackHealth(const HealthHour& hour) {
   out.Put(static_cast<std::uint8_t>(
       kFormat | (hour.flow_unit == FlowUnit::kTPerHour ? kTonnes : 0)));
   ForEachNumber(hour, [&out](std::int64_t value) { PutNumber(out, value); });
+  PutCounts(out, hour);
   PutNumber(out, static_cast<std::int64_t>(hour.channels.size()));
   for (const HealthChannel& channel : hour.channels) {
     out.Put(static_cast<std::uint8_t>(channel.output));
@@ -156,13 +189,18 @@ std::vector<std::byte> PackHealth(const HealthHour& hour) {
 void UnpackHealth(std::span<const std::byte> bytes, HealthHour& hour) {
   ByteReader in(bytes, "health of " + hour.valve_id);
   const auto head = in.Get<std::uint8_t>();
-  if ((head & ~kTonnes) != kFormat) {
-    in.Refuse("format " + std::to_string(head & ~kTonnes) +
+  const int format = head & ~kTonnes;
+  if (format != kFormat && format != kWithoutCounts) {
+    in.Refuse("format " + std::to_string(format) +
               " is not known to this program");
   }
   hour.flow_unit =
       (head & kTonnes) != 0 ? FlowUnit::kTPerHour : FlowUnit::kM3PerHour;
   ForEachNumber(hour, [&in](std::int64_t& value) { value = GetNumber(in); });
+  hour.counts = {};
+  if (format == kFormat) {
+    GetCounts(in, hour);
+  }
   hour.channels.resize(GetCount(in, kMaxChannels, "channels"));
   for (HealthChannel& channel : hour.channels) {
     const auto signal = in.Get<std::uint8_t>();

@@ -13,6 +13,7 @@
 #include "diagnosis/records/strength_point.h"
 #include "diagnosis/records/trace_point.h"
 #include "storage/history/alarm.h"
+#include "storage/history/common_cause.h"
 #include "storage/history/episode.h"
 #include "storage/history/health.h"
 
@@ -78,6 +79,9 @@ class History {
   virtual std::vector<HealthHour> Health(const HealthFilter& filter) = 0;
   /// Ids of valves that have stored hours, sorted; `glob` is a shell pattern.
   virtual std::vector<std::string> HealthValves(const std::string& glob) = 0;
+
+  /// Common causes that have not ended, ordered by opening.
+  virtual std::vector<CommonCause> OpenCauses() = 0;
 
   /// Changes whenever something was stored since the last call on this object.
   virtual std::string Version() = 0;

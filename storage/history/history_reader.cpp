@@ -1,6 +1,7 @@
 #include "storage/history/history_reader.h"
 
 #include <iterator>
+#include <limits>
 
 #include "base/error.h"
 #include "base/time_units.h"
@@ -159,11 +160,23 @@ EpisodeCondition ConditionOf(const EpisodeFilter& filter) {
           FaultOf(filter)};
 }
 
+// Of an open end also what arrived since the beginning and is stamped far off:
+// the clock of a publisher may be wrong by years.
+//
 // The inner query walks an index, newest first, and stops at the limit; only
 // these episodes are read as a whole and put in order of time.
 std::string ListQuery(const EpisodeFilter& filter) {
-  return std::string(sql::episodes) + " e.episode_id IN (" + NewestIds(filter) +
-         " LIMIT ?6) ORDER BY e.detected_ns, e.valve_id";
+  std::string ids = NewestIds(filter) + " LIMIT ?6";
+  if (filter.since_ns != std::numeric_limits<std::int64_t>::min() &&
+      filter.until_ns == std::numeric_limits<std::int64_t>::max()) {
+    ids = "SELECT episode_id FROM (" + ids +
+          ") UNION SELECT episode_id FROM (" + std::string(sql::arrived) + " " +
+          ValveCondition(filter) + StateCondition(filter.state) + " AND " +
+          std::string(FaultCondition(filter)) +
+          " ORDER BY v.event_id DESC LIMIT ?6)";
+  }
+  return std::string(sql::episodes) + " e.episode_id IN (" + ids +
+         ") ORDER BY e.detected_ns, e.valve_id";
 }
 
 std::string StatisticsQuery(const EpisodeFilter& filter) {
@@ -304,6 +317,11 @@ AlarmStatistics HistoryReader::AlarmFigures(const EpisodeFilter& filter,
 std::vector<Shelf> HistoryReader::Shelves(
     std::optional<std::int64_t> in_force_at_ns) {
   return ReadShelves(database_, in_force_at_ns);
+}
+
+std::vector<CommonCause> HistoryReader::OpenCauses() {
+  const Snapshot snapshot(database_);
+  return ReadCommonCauses(database_, {.open_only = true});
 }
 
 std::vector<HealthHour> HistoryReader::Health(const HealthFilter& filter) {

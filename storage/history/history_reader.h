@@ -38,6 +38,7 @@ class HistoryReader : public History {
       std::optional<std::int64_t> in_force_at_ns = {}) override;
   std::vector<HealthHour> Health(const HealthFilter& filter) override;
   std::vector<std::string> HealthValves(const std::string& glob) override;
+  std::vector<CommonCause> OpenCauses() override;
   /// Opens the file of this name again if it was deleted or replaced.
   std::string Version() override;
 

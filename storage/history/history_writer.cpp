@@ -280,8 +280,7 @@ OpenEpisode ReadOpen(const Statement& row) {
   row.Read(1, episode.valve_id, episode.source_id, episode.detection_stamp_ns,
            episode.last_stamp_ns, episode.faults, episode.isolated, layer,
            model_set, episode.model_hash, names, factor, strength);
-  episode.layer =
-      layer == LayerName(Layer::kPhysics) ? Layer::kPhysics : Layer::kObservers;
+  episode.layer = ParseLayer(layer);
   std::vector<std::string> isolated;
   for (std::size_t bit = 0; bit < names.size(); ++bit) {
     if (Has(episode.faults, bit)) {
@@ -336,9 +335,9 @@ bool HistoryWriter::Refresh() {
   return true;
 }
 
-SessionStart HistoryWriter::BeginSession(std::int64_t now_ns,
-                                         const std::string& software,
-                                         const std::string& config) {
+SessionStart HistoryWriter::BeginSession(
+    std::int64_t now_ns, const std::string& software, const std::string& config,
+    const std::map<std::string, std::string>& fault_names) {
   SessionStart start;
   Transaction transaction(database_);
   // This is read before the next statement gives the dead session an end.
@@ -349,6 +348,11 @@ SessionStart HistoryWriter::BeginSession(std::int64_t now_ns,
   database_.Run(sql::end_dead_sessions);
   database_.Run(sql::insert_session, now_ns, software, config);
   start.session_id = database_.LastInsertRowid();
+  for (const auto& [fault, name] : fault_names) {
+    database_.Cached(sql::put_fault_name)
+        .Bind(ParseFinding(fault).value_or(0), fault, name)
+        .Run();
+  }
   transaction.Commit();
   session_id_ = start.session_id;
   alive_ns_ = now_ns;

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <optional>
 #include <span>
 #include <string>
@@ -54,8 +55,11 @@ class HistoryWriter {
   bool Refresh();
 
   /// Closes sessions that were left open, as not clean. Commits.
-  SessionStart BeginSession(std::int64_t now_ns, const std::string& software,
-                            const std::string& config);
+  /// @param fault_names plain names by fault, for the view fault_history.
+  SessionStart BeginSession(
+      std::int64_t now_ns, const std::string& software,
+      const std::string& config,
+      const std::map<std::string, std::string>& fault_names = {});
   /// Commits everything pending and checkpoints the file.
   void EndSession(std::int64_t now_ns, bool clean);
 

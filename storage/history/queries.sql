@@ -11,7 +11,8 @@ SELECT v.episode_id, v.valve_id, v.detected_utc, v.isolated_utc,
   (SELECT max(last_ns) FROM episode_trace t
    WHERE t.episode_id = e.episode_id), e.session_id, e.fault_bits, e.strength,
   e.unknown_kind, e.layer, e.flow_unit, e.channels, e.faults, e.lowest,
-  e.highest, e.worst_strength, e.priority, e.unconfirmed_ns
+  e.highest, e.worst_strength, e.priority, e.unconfirmed_ns, v.fault_name,
+  v.ack_comment
 FROM episode e CROSS JOIN fault_history v USING (episode_id)
 WHERE
 -- name: newest_episode
@@ -52,14 +53,22 @@ FROM episode_fault f INDEXED BY episode_fault_by_fault
   CROSS JOIN episode e USING (episode_id)
 WHERE f.fault = ?4 AND f.held = 1
   AND f.detected_ns >= ?2 AND f.detected_ns < ?3 AND
+-- What arrived in the time and was stamped at another one. Events are stored in
+-- the order in which they came: the walk back from the newest ends at ?2.
+-- name: arrived
+SELECT e.episode_id
+FROM episode_event v CROSS JOIN episode e USING (episode_id)
+WHERE v.event_id > coalesce((SELECT event_id FROM episode_event
+    WHERE recorded_ns < ?2 ORDER BY event_id DESC LIMIT 1), 0)
+  AND v.kind = 'DETECTED' AND v.recorded_ns >= ?2 AND v.recorded_ns < ?3
+  AND abs(v.recorded_ns - e.detected_ns) > 3600000000000 AND
 -- name: holds_fault
 EXISTS (SELECT 1 FROM episode_fault f
   WHERE f.episode_id = e.episode_id AND f.fault = ?4 AND f.held = 1)
 -- As Covers() and IsActive() of alarm.h say.
 -- name: is_shelved
 EXISTS (SELECT 1 FROM shelf s
-  WHERE s.valve_id = e.valve_id AND s.until_ns > ?5 AND s.from_ns <= ?5
-    AND (s.ended_ns IS NULL OR s.ended_ns > ?5)
+  WHERE s.valve_id = e.valve_id AND s.until_ns > ?5 AND s.ended_ns IS NULL
     AND (s.fault IS NULL OR s.fault = e.fault))
 -- The columns are kFieldsOf<EpisodeStatistics>. A label is right if it says
 -- true or names a fault of the answer.
@@ -268,6 +277,9 @@ UPDATE monitor_session SET stop_ns = alive_ns, clean = 0 WHERE stop_ns IS NULL
 -- name: insert_session
 INSERT INTO monitor_session (start_ns, alive_ns, software, config)
 VALUES (?1, ?1, ?2, ?3)
+-- name: put_fault_name
+INSERT INTO fault_name (number, fault, name) VALUES (?, ?, ?)
+ON CONFLICT (number) DO UPDATE SET fault = excluded.fault, name = excluded.name
 -- name: end_session
 UPDATE monitor_session SET alive_ns = ?1, stop_ns = ?1, clean = ?2
 WHERE session_id = ?3
@@ -320,7 +332,7 @@ ORDER BY from_ns DESC, difference_id DESC LIMIT ?5
 FROM shelf ORDER BY shelf_id
 -- name: shelves_in_force
 FROM shelf
-WHERE until_ns > ?1 AND from_ns <= ?1 AND (ended_ns IS NULL OR ended_ns > ?1)
+WHERE until_ns > ?1 AND ended_ns IS NULL
 ORDER BY shelf_id
 -- name: insert_shelf
 INSERT INTO shelf (valve_id, fault, from_ns, until_ns, who, comment, origin)
@@ -381,11 +393,15 @@ WHERE f.fault = ?1 AND f.held = 1 AND f.detected_ns >= ?2 - ?4
 
 -- ---- Retention. Row id, first stamp and stored bytes of what is not
 -- ---- protected: first stamp from ?1 on, ended before ?2, the oldest ?3.
+-- Stamps are those of a publisher, whose clock may be wrong by years: what
+-- ended long before it arrived is as old as its arrival, and so is what ended
+-- more than two days after (a run lasts a day).
 -- name: run_candidates
 SELECT run_id, start_ns, (SELECT coalesce(sum(length(bytes)), 0)
   FROM chunk c WHERE c.run_id = r.run_id)
 FROM run r
-WHERE start_ns >= ?1 AND max(created_ns, coalesce(last_stamp_ns, 0)) < ?2
+WHERE start_ns >= ?1 AND iif(last_stamp_ns > created_ns + 172800000000000,
+    created_ns, max(created_ns, coalesce(last_stamp_ns, 0))) < ?2
   AND state <> 'recording' AND origin = 'recorded'
   AND NOT EXISTS (SELECT 1 FROM run_label l WHERE l.run_id = r.run_id)
 ORDER BY start_ns LIMIT ?3
@@ -398,7 +414,10 @@ SELECT rowid, detected_ns, (SELECT
   coalesce(sum(length(samples) + length(vectors)), 0)
   FROM episode_trace t WHERE t.episode_id = e.episode_id)
 FROM episode e
-WHERE detected_ns >= ?1 AND ended_ns < ?2 AND acked_by IS NOT NULL
+WHERE detected_ns >= ?1 AND acked_by IS NOT NULL
+  AND (SELECT iif(e.ended_ns > max(v.recorded_ns) + 172800000000000,
+      max(v.recorded_ns), max(e.ended_ns, coalesce(max(v.recorded_ns), 0)))
+    FROM episode_event v WHERE v.episode_id = e.episode_id) < ?2
   AND unconfirmed_ns IS NULL AND label IS NULL AND NOT EXISTS (
     SELECT 1 FROM event_outbox JOIN episode_event v USING (event_id)
     WHERE v.episode_id = e.episode_id)

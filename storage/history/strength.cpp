@@ -58,8 +58,7 @@ std::vector<StrengthPoint> HistoryReader::Strengths(std::uint64_t episode_id) {
     p.episode_id = episode_id;
     p.fault = *fault;
     rows.Read(1, p.stamp_ns, p.strength, p.lowest, p.highest);
-    p.layer = rows.Text(5) == LayerName(Layer::kPhysics) ? Layer::kPhysics
-                                                         : Layer::kObservers;
+    p.layer = ParseLayer(rows.Text(5));
   }
   return points;
 }

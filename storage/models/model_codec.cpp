@@ -23,10 +23,11 @@ namespace fdi::storage {
 //   file    = "FDIM" format:uint32 length:uint64 payload crc:uint32
 //   format  = 3, + 1 with physics, + 2 with a floor, + 4 with drift limits,
 //             + 8 with an interpolation allowance, + 16 with names before t_k,
-//             + 32 with the trim of a floor
+//             + 32 with the trim of a floor, + 64 with a share of the flow that
+//             is too little
 //   payload = the fields of ModelSet in the order of Fields() below, the floor
 //             last; then [physics: list] [drift: of each channel] [allowance]
-//             [early_error] [flow shape of the floor: list]
+//             [early_error] [flow shape of the floor: list] [flow_share]
 //
 // The CRC-32 covers all bytes before it. Encoding: a double as its 64 bits; int
 // as int32; int64 unchanged; bool and enumerations as uint8; a text as uint32
@@ -44,9 +45,10 @@ constexpr std::uint32_t kWithDrift = 4;
 constexpr std::uint32_t kWithAllowance = 8;
 constexpr std::uint32_t kWithEarlyNames = 16;
 constexpr std::uint32_t kWithFlowShape = 32;
-constexpr std::uint32_t kLastFormat = kFormat + kWithPhysics + kWithFloor +
-                                      kWithDrift + kWithAllowance +
-                                      kWithEarlyNames + kWithFlowShape;
+constexpr std::uint32_t kWithFlowShare = 64;
+constexpr std::uint32_t kLastFormat =
+    kFormat + kWithPhysics + kWithFloor + kWithDrift + kWithAllowance +
+    kWithEarlyNames + kWithFlowShape + kWithFlowShare;
 constexpr std::uint32_t kMaxPhysics = 256;
 constexpr std::size_t kFrame =
     2 * sizeof(std::uint32_t) + sizeof(std::uint64_t) + sizeof(std::uint32_t);
@@ -93,11 +95,12 @@ void Fields(A& a, T& rod) {
   a(share, rate);
 }
 
+// Without the share of the flow, which is appended behind the other fields.
 template <typename A, Of<FloorLimits> T>
 void Fields(A& a, T& floor) {
   auto& [delay, quick, slow, deviation, deviation_samples, stuck_travel,
          flow_gain, flow_exponent, flow_shape, dp_level, flow_high, flow_factor,
-         flow_margin, flow_samples] = floor;
+         flow_margin, flow_samples, flow_share] = floor;
   a(delay, quick, slow, deviation, deviation_samples, stuck_travel, flow_gain,
     flow_exponent, dp_level, flow_high, flow_factor, flow_margin, flow_samples);
 }
@@ -365,13 +368,17 @@ std::vector<std::byte> EncodeModelSet(const ModelSet& models) {
   if (shaped) {
     payload(models.floor->flow_shape);
   }
+  const bool low_flow = models.floor && models.floor->flow_share > 0.0;
+  if (low_flow) {
+    payload(models.floor->flow_share);
+  }
   ByteWriter writer;
   writer.Put(kMagic);
   writer.Put(kFormat + (models.physics.empty() ? 0U : kWithPhysics) +
              (models.floor ? kWithFloor : 0U) + (drifts ? kWithDrift : 0U) +
              (allowance > 0.0 ? kWithAllowance : 0U) +
              (early_error > 0.0 ? kWithEarlyNames : 0U) +
-             (shaped ? kWithFlowShape : 0U));
+             (shaped ? kWithFlowShape : 0U) + (low_flow ? kWithFlowShare : 0U));
   writer.Put(static_cast<std::uint64_t>(payload.writer.size()));
   writer.Append(payload.writer.view().data(), payload.writer.size());
   writer.Put(Checksum(writer.view()));
@@ -421,6 +428,12 @@ ModelSet DecodeModelSet(std::span<const std::byte> bytes,
   }
   if (((format - kFormat) & kWithFlowShape) != 0 && models.floor) {
     decoder(models.floor->flow_shape);
+  }
+  if (((format - kFormat) & kWithFlowShare) != 0) {
+    if (!models.floor) {
+      payload.Refuse("a share of the flow without a floor");
+    }
+    decoder(models.floor->flow_share);
   }
   payload.ExpectEnd();
   models.content_hash = ContentHash(models);  // Of what is stored.

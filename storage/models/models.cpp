@@ -187,6 +187,14 @@ ModelStore::ModelStore(const std::filesystem::path& path, Access access)
 
 ModelSet ModelStore::Save(const ModelSet& models, Activation activation,
                           const Lineage& lineage) {
+  Transaction transaction(database_);
+  ModelSet saved = Insert(models, activation, lineage);
+  transaction.Commit();
+  return saved;
+}
+
+ModelSet ModelStore::Insert(const ModelSet& models, Activation activation,
+                            const Lineage& lineage) {
   Validate(models);
   if (ParseModelReference(models.name).version) {
     throw ConfigError("model set \"" + models.name +
@@ -199,8 +207,7 @@ ModelSet ModelStore::Save(const ModelSet& models, Activation activation,
   }
   const std::vector<std::byte> bytes = EncodeModelSet(saved);
   saved.content_hash = ContentHash(saved);
-  Transaction transaction(database_);
-  // Inside the transaction, so that no other writer takes the same version.
+  // Within the transaction, so that no other writer takes the same version.
   saved.version = static_cast<int>(
       database_.QueryInt64(sql::newest_version, saved.name).value_or(0) + 1);
   const bool activate = activation == Activation::kAlways ||
@@ -220,7 +227,6 @@ ModelSet ModelStore::Save(const ModelSet& models, Activation activation,
   if (activate) {
     BumpGeneration();
   }
-  transaction.Commit();
   return saved;
 }
 

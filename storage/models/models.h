@@ -18,7 +18,7 @@ namespace fdi::storage {
 
 /// Schema of models.db: tables model_set, observer, channel, training_run,
 /// valve, valve_event, baseline, valve_type, lineage, training_episode,
-/// generation and the view model_summary; see docs/data.md.
+/// plant_loop, generation and the view model_summary; see docs/data.md.
 const Schema& ModelsSchema();
 
 /// `NAME`, meaning its active version, or `NAME@VERSION`.
@@ -170,6 +170,9 @@ enum class Activation {
   kAlways,
 };
 
+struct PlantLoop;    // plant_loops.h
+struct ValveResult;  // plant_loops.h
+
 /// Model sets and valves. Any number of readers; open it as an occasional
 /// writer for changes. One thread at a time.
 class ModelStore {
@@ -263,6 +266,18 @@ class ModelStore {
                                           const std::string& valve_id,
                                           std::optional<std::uint64_t> in_use);
 
+  /// Stores a model set, valve entry, baseline, type and loop in one
+  /// transaction. @returns the set as Save() would.
+  std::optional<ModelSet> Store(const ValveResult& result);
+  /// Adds a loop or replaces the one of that name, with `entry` for its valve
+  /// unless it has one.
+  void PutLoop(const PlantLoop& loop, const ValveEntry& entry);
+  /// The loops of the plant by name.
+  std::vector<PlantLoop> Loops();
+  /// Copies the loops of `other` with their valves, as TakeValve() does, and
+  /// its valve types that are not here. Idempotent. @returns how many loops.
+  std::size_t TakeLoops(ModelStore& other);
+
   /// Incremented by changes of active sets, assignments and valve entries.
   std::int64_t Generation();
 
@@ -274,11 +289,17 @@ class ModelStore {
   /// Call within a transaction or a snapshot.
   ModelSummary ReadSummaryOf(const ModelReference& reference);
   ValveEntry RequireEntry(std::string_view pattern);
+  bool IsEntry(std::string_view pattern);
   /// The entry of `pattern`, or a new one with the model set's requirements.
   ValveEntry EntryOrNew(std::string_view pattern,
                         const std::optional<ModelReference>& reference);
-  /// Call within a transaction.
+  /// Call these within a transaction.
   void StoreEntry(const ValveEntry& entry);
+  void StoreLoop(const PlantLoop& loop);
+  void StoreBaseline(std::string_view pattern, const BaselineRecord& record);
+  void StoreType(const ValveType& type);
+  ModelSet Insert(const ModelSet& models, Activation activation,
+                  const Lineage& lineage);
   std::optional<ModelReference> FindContent(std::uint64_t hash);
   ModelReference TakeModelSet(ModelStore& other,
                               const ModelReference& reference);

@@ -367,8 +367,14 @@ ValveEventKind ParseValveEventKind(std::string_view name) {
 
 void ModelStore::SetBaseline(std::string_view pattern,
                              const BaselineRecord& record) {
-  const ModelReference reference{record.model_set, record.version};
   Transaction transaction(database_);
+  StoreBaseline(pattern, record);
+  transaction.Commit();
+}
+
+void ModelStore::StoreBaseline(std::string_view pattern,
+                               const BaselineRecord& record) {
+  const ModelReference reference{record.model_set, record.version};
   ValveEntry entry = EntryOrNew(pattern, reference);
   if (record.epoch != entry.epoch) {
     throw ConfigError("baseline of " + entry.pattern + " is of epoch " +
@@ -382,7 +388,6 @@ void ModelStore::SetBaseline(std::string_view pattern,
   BaselineRecord stored = record;
   stored.created_ns = UtcNow();
   InsertBaseline(database_, entry.pattern, stored);
-  transaction.Commit();
 }
 
 std::vector<BaselineRecord> ModelStore::Baselines(std::string_view pattern) {
@@ -430,12 +435,20 @@ std::vector<ValveEvent> ModelStore::ValveEvents(std::string_view pattern) {
 void ModelStore::SaveTemplate(const std::string& name,
                               std::span<const std::byte> bytes,
                               const std::string& summary) {
-  if (ParseModelReference(name).version) {
-    throw ConfigError("valve type '" + name + "': expected a name without @");
-  }
   Transaction transaction(database_);
-  database_.Run(sql::put_valve_type, name, UtcNow(), bytes, summary);
+  StoreType({.name = name,
+             .summary = summary,
+             .bytes = {bytes.begin(), bytes.end()}});
   transaction.Commit();
+}
+
+void ModelStore::StoreType(const ValveType& type) {
+  if (ParseModelReference(type.name).version) {
+    throw ConfigError("valve type '" + type.name +
+                      "': expected a name without @");
+  }
+  database_.Run(sql::put_valve_type, type.name, UtcNow(), type.bytes,
+                type.summary);
 }
 
 ValveType ModelStore::LoadTemplate(std::string_view name) {

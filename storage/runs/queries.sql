@@ -40,6 +40,8 @@ UPDATE run SET samples = samples + ?2, truth_samples = truth_samples + ?3,
   intake_unit = intake_unit + ?14,
   intake_period = intake_period + ?15
 WHERE run_id = ?1
+-- name: set_period
+UPDATE run SET period_s = ? WHERE run_id = ?
 -- name: set_state
 UPDATE run SET state = ?, recorder_id = NULL WHERE run_id = ?
 -- name: insert_tail

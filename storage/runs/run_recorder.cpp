@@ -119,6 +119,13 @@ const std::string& RunRecorder::Id(Key key) const {
   return found->second.id;
 }
 
+void RunRecorder::SetPeriod(Key key, double period_s) {
+  Require(period_s > 0.0, "the sample period is positive");
+  ActiveRun& active = Active(key);
+  active.run.period_s = period_s;
+  Touch(key, active);
+}
+
 void RunRecorder::Append(Key key, const StoredSample& sample) {
   ActiveRun& active = Active(key);
   if (std::exchange(active.moved, false)) {
@@ -215,7 +222,10 @@ RunRecorder::Committed RunRecorder::Store(ActiveRun& active) {
   }
   if (after.run_id == 0) {
     after.run_id = InsertRun(database_, active.id, active.run, recorder_id_);
+  } else if (after.period_s != active.run.period_s) {
+    database_.Run(sql::set_period, active.run.period_s, after.run_id);
   }
+  after.period_s = active.run.period_s;
   if (!active.pending.empty()) {
     RunCounters counters;
     for (const StoredSample& sample : active.pending) {

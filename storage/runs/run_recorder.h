@@ -43,6 +43,9 @@ class RunRecorder {
   /// @throws std::invalid_argument for a run that has ended.
   const std::string& Id(Key run) const;
 
+  /// Corrects the sample period that Begin() was given.
+  void SetPeriod(Key run, double period_s);
+
   void Append(Key run, const StoredSample& sample);
   void Append(Key run, const LabelledSample& sample);
 
@@ -75,6 +78,7 @@ class RunRecorder {
   struct Committed {
     std::int64_t run_id{0};  ///< 0: no row yet.
     std::int64_t samples{0};
+    double period_s{0.0};
     std::size_t tail{0};       ///< Of these, in the tail table.
     std::size_t threshold{0};  ///< Tail length that triggers compaction.
     bool ended{false};

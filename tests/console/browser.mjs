@@ -21,8 +21,36 @@ export function launch() {
  * what they tried in vain, its `hosts` whom it asked for anything.
  */
 export async function open(browser, address, hash, options = {}) {
-  const context = await browser.newContext({
+  return show(await contextOf(browser, options), address, hash);
+}
+
+const shared = new Map();
+
+/**
+ * As open(), in a context that stays for tests with the same options: it has
+ * read the files of the page already. End it with close().
+ */
+export async function openShared(browser, address, hash, options = {}) {
+  const key = JSON.stringify(options);
+  if (!shared.has(key)) shared.set(key, await contextOf(browser, options));
+  return show(shared.get(key), address, hash);
+}
+
+/** Closes a page, and forgets what it had stored. */
+export async function close(page) {
+  await page.evaluate(() => {
+    localStorage.clear();
+    sessionStorage.clear();
+  });
+  await page.close();
+}
+
+function contextOf(browser, options) {
+  return browser.newContext({
     viewport: {width: 1600, height: 1000}, ...options});
+}
+
+async function show(context, address, hash) {
   const page = await context.newPage();
   page.faults = [];
   page.hosts = new Set();
@@ -39,10 +67,16 @@ export async function open(browser, address, hash, options = {}) {
   return page;
 }
 
-/** What axe has against the page: "rule: elements". */
-export async function accessibilityFaults(page) {
-  await page.evaluate(axe.source);
-  const {violations} = await page.evaluate(() => axe.run());
+/**
+ * What axe has against the page: "rule: elements". With `coloursOnly` what may
+ * differ between light and dark alone.
+ */
+export async function accessibilityFaults(page, coloursOnly = false) {
+  if (!await page.evaluate(() => 'axe' in window)) {
+    await page.evaluate(axe.source);
+  }
+  const {violations} = await page.evaluate((some) => axe.run(
+      some ? {runOnly: ['color-contrast']} : {}), coloursOnly);
   return violations.map(({id, nodes}) =>
     `${id}: ${nodes.slice(0, 3).map((node) => node.html).join(' ')}`);
 }

@@ -7,7 +7,7 @@ import {readFile} from 'node:fs/promises';
 import {createServer} from 'node:http';
 import {after, before, test} from 'node:test';
 
-import {accessibilityFaults, launch, open} from './browser.mjs';
+import {accessibilityFaults, close, launch, openShared} from './browser.mjs';
 import {until} from './programs.mjs';
 
 const kWeb = new URL('../../monitor/console/web/', import.meta.url);
@@ -86,8 +86,8 @@ class Monitor {
         .replace(/^uplot/, 'vendor/uplot');
     try {
       const bytes = await readFile(new URL(name, kWeb));
-      response.writeHead(200,
-          {'Content-Type': kTypes[name.split('.').at(-1)]}).end(bytes);
+      response.writeHead(200, {'Cache-Control': 'max-age=600',
+        'Content-Type': kTypes[name.split('.').at(-1)]}).end(bytes);
     } catch {
       response.writeHead(404).end();
     }
@@ -129,7 +129,7 @@ after(async () => {
 test('a new valve leaves the worst ones first', async () => {
   monitor.reset([tile('A', 'NORMAL'), tile('C', 'NORMAL'),
     tile('Z', 'ISOLATED', ['f19'], {severity: 'high'})]);
-  const page = await open(browser, address, '#/');
+  const page = await openShared(browser, address, '#/');
   await page.locator('.tile').first().waitFor();
 
   await monitor.push('tiles', {tiles: [tile('B', 'NORMAL')]});
@@ -138,14 +138,14 @@ test('a new valve leaves the worst ones first', async () => {
 
   await until(async () => (await page.locator('.tile .tile-id')
       .allTextContents()).join('') === 'ZCAB', 'Z, C, A, B', 5000);
-  await page.context().close();
+  await close(page);
 });
 
 test('what to check appears with the name of the fault', async () => {
   const episode = '0000000000000001';
   monitor.reset([tile('V', 'DETECTED', [], {episode})],
       [alarm(episode, 'V', null, {state: 'DETECTED'})]);
-  const page = await open(browser, address, '#/valve/V');
+  const page = await openShared(browser, address, '#/valve/V');
   const state = page.locator('.state-line');
   await state.getByText('fault detected').waitFor();
 
@@ -156,7 +156,7 @@ test('what to check appears with the name of the fault', async () => {
   await state.getByText('fault named').waitFor();
 
   assert.match(await page.locator('.checks').textContent(), /Compare it/);
-  await page.context().close();
+  await close(page);
 });
 
 test('older episodes that are asked for twice come once', async () => {
@@ -170,7 +170,7 @@ test('older episodes that are asked for twice come once', async () => {
   monitor.answers.history = (search) => search.includes('before_ms') ?
     older.then(() => ({episodes: [row(2)], more: false})) :
     {episodes: [row(1)], more: true};
-  const page = await open(browser, address, '#/history');
+  const page = await openShared(browser, address, '#/history');
 
   const more = page.getByRole('button', {name: 'Older ones'});
   await more.click();
@@ -182,7 +182,7 @@ test('older episodes that are asked for twice come once', async () => {
   await more.waitFor({state: 'hidden'});
 
   assert.equal(await page.locator('tbody tr', {hasText: 'V2'}).count(), 1);
-  await page.context().close();
+  await close(page);
 });
 
 test('what is acknowledged is not acknowledged again by a second attempt',
@@ -194,7 +194,7 @@ test('what is acknowledged is not acknowledged again by a second attempt',
           {write: true, user: 'anna', role: 'acknowledge'});
       const ack = (n) => `episodes/${rows[n].episode}/ack`;
       monitor.answers[ack(0)] = {...rows[0], isa: 'ACKED'};
-      const page = await open(browser, address, '#/alarms');
+      const page = await openShared(browser, address, '#/alarms');
       await page.getByLabel('Select V1').click();
       await page.getByLabel('Select V2').click();
       await page.getByRole('button', {name: 'Acknowledge 2 selected'}).click();
@@ -209,7 +209,7 @@ test('what is acknowledged is not acknowledged again by a second attempt',
 
       const asked = monitor.asked.filter((each) => each.endsWith('/ack'));
       assert.deepEqual(asked, [ack(0), ack(1), ack(1)]);
-      await page.context().close();
+      await close(page);
     });
 
 test('the figures of a year count all its episodes', async () => {
@@ -221,13 +221,13 @@ test('the figures of a year count all its episodes', async () => {
       {day: day(kNowMs), episodes: 2, alarm_s: 60}],
     valves: [], faults: [], labelled: {true: 0, false: 0, none: 7},
     most_in_10_min: 1, gaps: []};
-  const page = await open(browser, address,
+  const page = await openShared(browser, address,
       `#/history?since=${kNowMs - 365 * kDayMs}`);
 
   const episodes = page.locator('.facts div', {hasText: /^Episodes/});
 
   assert.equal(await episodes.locator('dd').first().textContent(), '7');
-  await page.context().close();
+  await close(page);
 });
 
 /** A trend of `count` instants, each as `last` says. */
@@ -246,14 +246,14 @@ test('a healthy valve shows no fault, and no number for one', async () => {
   monitor.reset([tile('V', 'NORMAL')]);
   monitor.answers['valves/V/trend'] =
     trend({state: 'NORMAL', d0: 0.97, d: [1, 0.99]});
-  const page = await open(browser, address, '#/valve/V');
+  const page = await openShared(browser, address, '#/valve/V');
   const now = page.locator('.now-tables');
   await now.getByText('not excluded').waitFor();
 
   const text = await page.locator('.valve').innerText();
   assert.doesNotMatch(text, /Flow transmitter|f6|1\.00|0\.9/);
   assert.equal(await now.locator('tr.out').count(), 0);
-  await page.context().close();
+  await close(page);
 });
 
 test('words say how sure a name is; the number is a hint', async () => {
@@ -266,7 +266,7 @@ test('words say how sure a name is; the number is a hint', async () => {
   [alarm(episode, 'V', 'f19', {peak_factor: 0.93, strength: 0.004})]);
   monitor.answers['valves/V/trend'] =
     trend({state: 'ISOLATED', d0: 0, d: [0.93, 0.5]});
-  const page = await open(browser, address, '#/');
+  const page = await openShared(browser, address, '#/');
   const said = (id) => page.locator('.tile', {has:
     page.locator('.tile-id', {hasText: id})});
   await said('V').waitFor();
@@ -287,7 +287,7 @@ test('words say how sure a name is; the number is a hint', async () => {
   const row = page.locator('tr[data-episode]');
   await row.getByText('likely').waitFor();
   assert.doesNotMatch(await row.innerText(), /0\.93|\b0 %/);
-  await page.context().close();
+  await close(page);
 });
 
 test('what is judged in part only is said, with the reason', async () => {
@@ -298,7 +298,7 @@ test('what is judged in part only is said, with the reason', async () => {
   tile('mass', 'NOT_JUDGED', [], {quality: 'BAD_INPUT',
     refused: {reason: 'unit', signals: ['F'], flow_unit: 'm3/h'}}),
   tile('well', 'NORMAL')]);
-  const page = await open(browser, address, '#/');
+  const page = await openShared(browser, address, '#/');
   const said = (id) => page.locator('.tile', {hasText: id}).innerText();
   await page.locator('.tile', {hasText: 'half'}).waitFor();
 
@@ -312,7 +312,7 @@ test('what is judged in part only is said, with the reason', async () => {
   await page.goto(`${address}/#/valve/half`);
   await page.locator('.state-line').getByText('no P1; F not judged').waitFor();
   assert.doesNotMatch(await page.locator('.state-line').innerText(), /normal/);
-  await page.context().close();
+  await close(page);
 });
 
 test('a label reaches alarm list, tile and valve page, at once', async () => {
@@ -321,7 +321,7 @@ test('a label reaches alarm list, tile and valve page, at once', async () => {
   monitor.reset([tile('V', 'ISOLATED', ['f19'], {episode})], [row]);
   monitor.answers['valves/V/trend'] =
     trend({state: 'ISOLATED', d0: 0, d: [0.93, 0.5]});
-  const page = await open(browser, address, '#/');
+  const page = await openShared(browser, address, '#/');
   await page.locator('.tile', {hasText: 'V'}).waitFor();
 
   await monitor.push('alarm', {...row, label: 'f6'});
@@ -333,13 +333,13 @@ test('a label reaches alarm list, tile and valve page, at once', async () => {
   await page.locator('.state-line', {hasText: 'was Plug worn'}).waitFor();
   await page.goto(`${address}/#/alarms`);
   await page.locator('tr[data-episode]', {hasText: 'was Plug worn'}).waitFor();
-  await page.context().close();
+  await close(page);
 });
 
 test('the label dialog offers what is accepted, within its frame', async () => {
   monitor.reset([], [alarm('0000000000000001', 'V', 'x_stuck')]);
   Object.assign(monitor.answers.status, {write: true});
-  const page = await open(browser, address, '#/alarms',
+  const page = await openShared(browser, address, '#/alarms',
       {viewport: {width: 390, height: 800}});
   await page.getByRole('button', {name: 'Label V'}).click();
   const choice = page.getByLabel('What was it?');
@@ -349,7 +349,7 @@ test('the label dialog offers what is accepted, within its frame', async () => {
   const frame = await page.getByRole('dialog').boundingBox();
   const box = await choice.boundingBox();
   assert.ok(box.x >= frame.x && box.x + box.width <= frame.x + frame.width);
-  await page.context().close();
+  await close(page);
 });
 
 test('common causes stand above the alarms', async () => {
@@ -357,13 +357,13 @@ test('common causes stand above the alarms', async () => {
   monitor.answers.causes = {causes: [{cause: '1', group: 'air header 2',
     opened_ms: kNowMs, members: ['A', 'B', 'C'].map((valve) =>
       ({episode: '0000000000000001', valve, fault: 'f19'}))}]};
-  const page = await open(browser, address, '#/alarms');
+  const page = await openShared(browser, address, '#/alarms');
 
   await page.getByText('Common cause in air header 2').waitFor();
 
   assert.match(await page.locator('.cause').innerText(),
       /since \S+: 3 valves, A, B, C/);
-  await page.context().close();
+  await close(page);
 });
 
 test('a tile says since when and how strong, and cuts no id to sameness',
@@ -372,7 +372,7 @@ test('a tile says since when and how strong, and cuts no id to sameness',
       monitor.reset([tile(`${long}1`, 'ISOLATED', ['f19'],
           {since_ms: kNowMs - 60000, strength: 0.52, spark: [0, 0.9, 1]}),
       tile(`${long}2`, 'NORMAL', [], {spark: [0, 0.1, 0]})]);
-      const page = await open(browser, address, '#/');
+      const page = await openShared(browser, address, '#/');
       const first = page.locator('.tile', {hasText: `${long}1`});
       await first.waitFor();
 
@@ -386,13 +386,13 @@ test('a tile says since when and how strong, and cuts no id to sameness',
       assert.equal(await first.locator('.tile-id').getAttribute('title'),
           `${long}1`);
       assert.equal(await page.locator('.spark:not([hidden])').count(), 1);
-      await page.context().close();
+      await close(page);
     });
 
 test('groups have counts and select their valves', async () => {
   monitor.reset([tile('U1-FV-1', 'NORMAL'), tile('U1-FV-2', 'ISOLATED',
       ['f19']), tile('U2-LV-1A', 'NORMAL')]);
-  const page = await open(browser, address, '#/');
+  const page = await openShared(browser, address, '#/');
   const group = page.getByLabel('Group');
   await group.waitFor();
 
@@ -401,7 +401,7 @@ test('groups have counts and select their valves', async () => {
   await group.selectOption('U2-LV');
   await until(async () => await page.locator('.tile').count() === 1, 'one');
   assert.match(page.url(), /group=U2-LV/);
-  await page.context().close();
+  await close(page);
 });
 
 test('a narrow screen keeps what to check', async () => {
@@ -410,7 +410,7 @@ test('a narrow screen keeps what to check', async () => {
   monitor.answers.worklist = {rows: [{rank: 1, valve_id: 'V', why: 'w',
     fault: 'f19', name: 'n', discipline: 'air', check: 'Look here.',
     episode_id: '0000000000000001'}]};
-  const page = await open(browser, address, '#/alarms',
+  const page = await openShared(browser, address, '#/alarms',
       {viewport: {width: 390, height: 800}});
   await page.getByText('Check: Compare it.').waitFor();
   await page.goto(`${address}/#/worklist`);
@@ -422,19 +422,49 @@ test('a narrow screen keeps what to check', async () => {
     assert.ok(await page.evaluate(() =>
       document.documentElement.scrollWidth <= innerWidth), view);
   }
-  await page.context().close();
+  await close(page);
 });
+
+test('the report has the worst with their factors, and what nobody judges',
+    async () => {
+      monitor.reset();
+      const coverage = {loops: 3, named_faults: 1, audit: 1, nothing: 1};
+      monitor.answers.report = {
+        made_utc: '2026-11-25T12:00:00Z', since_utc: '2026-11-18T12:00:00Z',
+        coverage, others: [], shelved: [],
+        worst: [{rank: 1, valve_ids: ['V', 'W'], shares: 'cause: air header',
+          name: '<b>Plug worn', fault: 'f6', severity: 'high',
+          severity_points: 4, grade: 1, grade_factor: 2, certainty: 'likely',
+          confidence: 0.75, score: 6, open: true, check: 'Look.',
+          discipline: 'mechanical', acked_by: 'anna', label: null,
+          episode_id: '0000000000000001'}],
+        shared: [{shares: 'cause', group: 'air header', faults: ['f6'],
+          since_utc: '2026-11-25T11:00:00Z', ended_utc: null,
+          valve_ids: ['V', 'W']}],
+        unjudged: [{valve_id: 'X', judged_share: 0.25,
+          reason: 'no data came'}]};
+      const page = await openShared(browser, address, '#/report');
+      await page.getByText('<b>Plug worn (f6)').waitFor();
+      const text = await page.locator('main').innerText();
+      for (const part of ['2 of 3 loops are watched', 'high · 4', '1 · 2.0',
+        'likely · 0.75', '6.00', 'anna', 'air header', 'no data came',
+        '25.0 %']) {
+        assert.ok(text.includes(part), part);
+      }
+      assert.deepEqual(await accessibilityFaults(page), []);
+      await close(page);
+    });
 
 test('a valve page says what judges it and what that cannot see', async () => {
   monitor.reset([tile('V', 'NORMAL', [], {missing: ['P1']})]);
   monitor.answers.status.model_sets = [{model_set: 'm@1', faults: ['f19']}];
   monitor.answers['valves/V/trend'] =
     trend({state: 'NORMAL', d0: 0.97, d: [1, 0.99]});
-  const page = await open(browser, address, '#/valve/V');
+  const page = await openShared(browser, address, '#/valve/V');
 
   await page.getByText('Judged by model set m@1, without P1. Faults ' +
     'that it cannot name: Plug worn.').waitFor();
-  await page.context().close();
+  await close(page);
 });
 
 test('an interval without width is never shown', async () => {
@@ -446,12 +476,12 @@ test('an interval without width is never shown', async () => {
       strength: 0.5, lowest: 0.5, highest: 0.5, begins_ms: kNowMs,
       growing: false}]}, growth: [{fault: 'f19', strength: 0.5, lowest: 0.5,
       highest: 0.5, rate: null, full_in_ms: null, at_ms: kNowMs}]};
-  const page = await open(browser, address, `#/episode/${row.episode}`);
+  const page = await openShared(browser, address, `#/episode/${row.episode}`);
   await page.locator('.growth').waitFor();
 
   assert.doesNotMatch(await page.locator('.episode').innerText(),
       /50 % to 50 %/);
-  await page.context().close();
+  await close(page);
 });
 
 test('every kind of tile can be read, at any size, light and dark',
@@ -468,17 +498,19 @@ test('every kind of tile can be read, at any size, light and dark',
       [alarm(episode, 'FV-1', 'f19|f6', {label: 'f6', check: 'Look.'})]);
       monitor.answers['valves/FV-1/trend'] =
         trend({state: 'NORMAL', d0: 1, d: [1, 1]});
-      for (const [width, height] of [[1400, 900], [390, 800]]) {
-        const page = await open(browser, address, '#/',
+      monitor.answers.status.write = true;
+      for (const [width, height] of [[1400, 900], [1280, 800], [390, 800]]) {
+        const page = await openShared(browser, address, '#/',
             {viewport: {width, height}});
         for (const hash of ['#/', '#/alarms', '#/valve/FV-1']) {
           await page.goto(`${address}/${hash}`);
           await page.locator('main :is(.tile, tbody tr, .panel)').first()
               .waitFor();
-          for (const colorScheme of ['light', 'dark']) {
+          for (const colorScheme of width === 1280 ? [] : ['light', 'dark']) {
             await page.emulateMedia({colorScheme});
-            assert.deepEqual(await accessibilityFaults(page), [],
-                `${hash} ${width} ${colorScheme}`);
+            const faults = await accessibilityFaults(page,
+                colorScheme === 'dark');
+            assert.deepEqual(faults, [], `${hash} ${width} ${colorScheme}`);
           }
           const cut = await page.locator('.tile-how, .tile-what, .tag')
               .evaluateAll((nodes) => nodes.filter((node) =>
@@ -487,7 +519,13 @@ test('every kind of tile can be read, at any size, light and dark',
           assert.deepEqual(cut, [], `${hash} ${width}`);
           assert.ok(await page.evaluate(() =>
             document.documentElement.scrollWidth <= innerWidth), hash);
+          // What is there to act must not have to be scrolled to.
+          const hidden = await page.locator('.row-actions button')
+              .evaluateAll((nodes) => nodes.filter((node) =>
+                node.getBoundingClientRect().right > innerWidth)
+                  .map((node) => node.textContent));
+          assert.deepEqual(hidden, [], `${hash} ${width}`);
         }
-        await page.context().close();
+        await close(page);
       }
     });

@@ -30,6 +30,7 @@ ModelSet FlooredPlant() {
   floor.flow_exponent = 2.0;
   floor.dp_level = kDp;
   floor.flow_high = 60.0;
+  floor.flow_share = 0.5;
   AddFindings(models);
   return models;
 }
@@ -103,6 +104,12 @@ int Of(int finding, const std::vector<int>& first) {
 
 const std::vector<int> kNothing(Floor::kTests, -1);
 
+// What passes a rod at x [%], up to the end of the meter; little where it
+// shuts.
+double Passes(double x) {
+  return x > 95.0 ? 5.0 : std::min(100.0 * std::exp(-0.02 * x), 60.0);
+}
+
 // From stop to stop, as fast as any command, the rod as slow as it may be.
 TEST(FloorTest, CommandedTravelIsNoFinding) {
   for (const bool slow : {false, true}) {
@@ -115,7 +122,7 @@ TEST(FloorTest, CommandedTravelIsNoFinding) {
                                          : FloorLimits::Rod{1.0, 100.0},
                                     x, cv);
                 // A reading that is off by 6 % and noisy is still healthy.
-                return Valve{cv, x + 5.0 + 0.1 * (k % 3), 5.0};
+                return Valve{cv, x + 5.0 + 0.1 * (k % 3), Passes(x)};
               }),
               kNothing);
   }
@@ -128,7 +135,7 @@ TEST(FloorTest, BreakawayFromAStopIsNoFinding) {
     EXPECT_EQ(FirstFindings([&](int k) {
                 const double cv = k < start ? 0.0 : 90.0;
                 x = k < start + 4 ? 0.0 : NextRodPosition({0.4, 12.0}, x, cv);
-                return Valve{cv, x, 5.0};
+                return Valve{cv, x, Passes(x)};
               }),
               kNothing)
         << start;
@@ -183,6 +190,57 @@ TEST(FloorTest, FlowThatNoOpeningPasses) {
   EXPECT_EQ(Of(kExcessFlow, at(48.0)), 9);
 }
 
+TEST(FloorTest, LessFlowThanTheOpeningPasses) {
+  const auto at = [](double x, double flow) {
+    return FirstFindings([=](int k) {
+      return Valve{x, x, flow + 0.1 * (k % 2)};
+    });
+  };
+  // 27.3 at 65 %; half of that, less a tenth of 60.
+  EXPECT_EQ(at(60.0, 8.0), kNothing);
+  EXPECT_EQ(Of(kLowFlow, at(60.0, 7.0)), 9);
+  // Wide open it passes no less than the record has shown: 30 less 6.
+  EXPECT_EQ(at(0.0, 25.0), kNothing);
+  EXPECT_EQ(Of(kLowFlow, at(0.0, 23.0)), 9);
+  // Shut it passes nothing, whatever the straight line says.
+  EXPECT_EQ(at(99.5, 0.0), kNothing);
+  // A rod that does not follow may be anywhere.
+  EXPECT_EQ(Of(kLowFlow, FirstFindings([](int k) {
+                 return Valve{80.0, 30.0, 0.1 * (k % 2)};
+               })),
+            -1);
+}
+
+TEST(FloorTest, FlowThatWentWithThePressureIsLostUnlessTheValveIsParked) {
+  const auto first = [](double at) {
+    const ModelSet models = FlooredPlant();
+    Floor floor(models);
+    for (int k = 0; k < 100; ++k) {
+      Sample sample = ValveAt(k, {at, at, 0.0});
+      sample.Set(Signal::kP1, 2600.0);
+      sample.Set(Signal::kP2, 2600.0);
+      floor.Push(sample);
+    }
+    return FaultSetName(models, floor.findings());
+  };
+  EXPECT_EQ(first(40.0), "low_flow");
+  EXPECT_EQ(first(0.0), "unknown");
+}
+
+// Sets of before the test have one finding less.
+TEST(FloorTest, OlderSetsDoNotTestForTooLittleFlow) {
+  ModelSet models = FlooredPlant();
+  models.floor->flow_share = 0.0;
+  EXPECT_THROW(Validate(models), DataError);
+  models.faults.pop_back();
+  EXPECT_NO_THROW(Validate(models));
+  Floor floor(models);
+  for (int k = 0; k < 100; ++k) {
+    floor.Push(ValveAt(k, {40.0, 40.0, 0.0}));
+    EXPECT_EQ(floor.findings(), 0U);
+  }
+}
+
 TEST(FloorTest, ReadingsThatRepeatWhileTheyShouldMove) {
   const auto sine = [](int k) {
     return 50.0 + 20.0 * std::sin(2.0 * std::numbers::pi * k / 60.0);
@@ -207,6 +265,35 @@ TEST(FloorTest, ReadingsThatRepeatWhileTheyShouldMove) {
               return Valve{k % 2 == 0 ? -3.0 : 1.0, 0.0, 100.0};
             })[kPositionStuck - kTravelDeviation],
             -1);
+}
+
+// A valve without a position transmitter: its rod is somewhere in the range
+// that it may have.
+TEST(FloorTest, TestsTheFlowWithoutAPosition) {
+  const ModelSet models = FlooredPlant();
+  const auto first = [&](double cv, double flow, int moving) {
+    Floor floor(models);
+    for (int k = 0; k < 100; ++k) {
+      Sample sample = ValveAt(k, {cv, 0.0, flow + 0.1 * (k % 2)});
+      sample.Set(Signal::kCv, cv + (k % 40 < 20 ? 0.0 : moving));
+      sample.values[Index(Signal::kF)] = moving > 0 ? flow : sample[Signal::kF];
+      sample.present =
+          static_cast<SignalMask>(MaskOf(Signal::kCv) | MaskOf(Signal::kF));
+      floor.Push(sample);
+      if (floor.findings() != 0) {
+        return std::pair(
+            k, floor.findings() >> (models.faults.size() - Floor::kTests));
+      }
+    }
+    return std::pair(-1, FaultSet{0});
+  };
+  const auto bit = [](int finding) {
+    return FaultSet{1} << (finding - kTravelDeviation);
+  };
+  EXPECT_EQ(first(70.0, 46.0, 0).first, -1);
+  EXPECT_EQ(first(70.0, 48.0, 0), std::pair(9, bit(kExcessFlow)));
+  EXPECT_EQ(first(100.0, 8.0, 0), std::pair(9, bit(kShutFlow)));
+  EXPECT_EQ(first(40.0, 30.0, 30).second, bit(kFlowStuck));
 }
 
 TEST(FloorTest, HoldsInAutoOnlyAndNeverWithoutLimits) {
@@ -266,6 +353,54 @@ TEST(FloorTest, OpensAnEpisodeBeforeTheObserversMay) {
   EXPECT_EQ(FaultSetName(models, seen.transitions[1].faults),
             "travel_deviation");
   EXPECT_EQ(seen.qualities.back(), Quality::kLive);
+}
+
+// The flow is lost while the valve stands wide open, where nothing was trained;
+// or a stream begins like that.
+TEST(FloorTest, LostFlowOpensAnEpisodeAtTheEndOfTheTravel) {
+  ModelSet models = FlooredPlant();
+  models.validity.cv = {40.0, 60.0};
+  for (const int lost : {0, 200}) {
+    const Followed seen = Engine(models, 300, [&](int k) {
+      const double wave = 0.02 * (k % 2);
+      return Valve{wave, wave, k >= lost ? wave : 100.0 - wave};
+    });
+    ASSERT_GE(seen.transitions.size(), 2U) << lost;
+    EXPECT_EQ(seen.transitions[1].kind, TransitionKind::kIsolated);
+    EXPECT_LE(seen.transitions[1].stamp_ns, (lost + 60) * 1'000'000'000LL);
+    EXPECT_EQ(FaultSetName(models, seen.transitions[1].faults), "low_flow");
+  }
+}
+
+// A leak that takes all of the flow explains what is seen, and would be named
+// within seconds: before the floor has found the loss.
+TEST(FloorTest, LostFlowIsNeverAFaultOfTheValveAlone) {
+  ModelSet models = tests::LinearPlant();
+  models.observers.push_back({"f5",
+                              5,
+                              1.0,
+                              {tests::LinearModel(Signal::kX, 1.0, 0.0),
+                               tests::LinearModel(Signal::kF, 0.0, 0.0)}});
+  models.faults = {1, 3, 5, 6};
+  models.decision.isolation_samples = 20;
+  models.decision.early_error = 1e-3;
+  models.floor = FlooredPlant().floor;
+  AddFindings(models);
+  ValveEngine engine(std::make_shared<const ModelSet>(models));
+  tests::Noise noise(5);
+  FaultSet named = 0;
+  for (int k = 0; k < 200; ++k) {
+    Sample sample = tests::PlantSample(static_cast<std::uint64_t>(k));
+    noise.Add(sample);
+    if (k >= 60) {
+      sample.Set(Signal::kF, 0.01 * (k % 2));
+    }
+    for (const Transition& transition : engine.Step(sample).Transitions()) {
+      named = transition.faults;
+      EXPECT_NE(FaultSetName(models, named), "f5") << k;
+    }
+  }
+  EXPECT_EQ(FaultSetName(models, named), "f5|low_flow");
 }
 
 // The fault moves the command, by more than any step in training and out of

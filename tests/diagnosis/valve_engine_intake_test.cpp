@@ -1,5 +1,6 @@
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -77,6 +78,72 @@ TEST(ValveEngineIntakeTest, AnotherFlowUnitIsRefused) {
   Sample sample = PlantSample(0);
   sample.flow_unit = FlowUnit::kTPerHour;
   EXPECT_EQ(engine.Step(sample).intake, Intake::kUnit);
+}
+
+// Bar for kPa, or a decimal point elsewhere, is no fault of the valve. Any
+// other reading may be one.
+TEST(ValveEngineIntakeTest, APressureInAnotherUnitIsRefused) {
+  ModelSet models = tests::LinearPlant();
+  models.channels.push_back({"P1", Signal::kP1, -50.0, 50.0});
+  for (Observer& observer : models.observers) {
+    observer.channels.push_back(tests::LinearModel(Signal::kP1, 0.0, 3500.0));
+    observer.channels.back().model.output_max = 4000.0;
+  }
+  models.validity.p1 = {3200.0, 3800.0};
+  const struct {
+    double p1;
+    Intake intake;
+  } cases[] = {{3500.0, Intake::kAccepted}, {35.0, Intake::kUnit},
+               {350.0, Intake::kUnit},      {3.5, Intake::kUnit},
+               {0.0, Intake::kAccepted},    {2000.0, Intake::kAccepted},
+               {700.0, Intake::kAccepted}};
+  for (const auto& read : cases) {
+    ValveEngine engine(std::make_shared<const ModelSet>(models));
+    const Seen seen = StepRange(engine, 0, 100, [&](Sample& sample) {
+      sample.Set(Signal::kP1, sample.seq < 50 ? 3500.0 : read.p1);
+    });
+    EXPECT_EQ(seen.last.intake, read.intake) << read.p1;
+    EXPECT_EQ(seen.transitions.empty(),
+              read.intake == Intake::kUnit || read.p1 == 3500.0)
+        << read.p1;
+  }
+}
+
+// A pressure that falls passes a tenth of the usual one: no reason to stop.
+TEST(ValveEngineIntakeTest, InAnEpisodeAPressureIsJudgedAsItIs) {
+  ModelSet models = tests::LinearPlant();
+  models.channels.push_back({"P1", Signal::kP1, -50.0, 50.0});
+  for (Observer& observer : models.observers) {
+    observer.channels.push_back(tests::LinearModel(Signal::kP1, 0.0, 3500.0));
+    observer.channels.back().model.output_max = 4000.0;
+  }
+  models.validity.p1 = {3200.0, 3800.0};
+  ValveEngine engine(std::make_shared<const ModelSet>(models));
+  const Seen seen = StepRange(engine, 0, 100, [&](Sample& sample) {
+    sample.Set(Signal::kP1, sample.seq < 50   ? 3500.0
+                            : sample.seq < 70 ? 2000.0
+                                              : 350.0);
+  });
+  EXPECT_EQ(seen.last.intake, Intake::kAccepted);
+  EXPECT_TRUE(seen.last.detected);
+}
+
+// T1 in kelvin; but a medium may get as hot.
+TEST(ValveEngineIntakeTest, ATemperatureInKelvinIsRefusedWhereAStreamBegins) {
+  ModelSet models = tests::LinearPlant();
+  models.channels.push_back({"T1", Signal::kT1, -5.0, 5.0});
+  for (Observer& observer : models.observers) {
+    observer.channels.push_back(tests::LinearModel(Signal::kT1, 0.0, 20.0));
+  }
+  models.validity.t1 = {15.0, 25.0};
+  for (const std::uint64_t from : {0U, 50U}) {
+    ValveEngine engine(std::make_shared<const ModelSet>(models));
+    const Seen seen = StepRange(engine, 0, 100, [&](Sample& sample) {
+      sample.Set(Signal::kT1, sample.seq < from ? 20.0 : 293.0);
+    });
+    EXPECT_EQ(seen.last.intake, from == 0 ? Intake::kUnit : Intake::kAccepted);
+    EXPECT_EQ(seen.last.detected, from != 0);
+  }
 }
 
 TEST(ValveEngineIntakeTest, ChannelWithoutItsSignalAbstains) {

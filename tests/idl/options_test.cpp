@@ -4,8 +4,10 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
 #include "base/error.h"
+#include "base/passing_error.h"
 #include "idl/participant.h"
 #include "idl/profile_file.h"
 
@@ -41,12 +43,34 @@ TEST(DdsOptionsTest, EachOptionIsCheckedByNameValueAndRange) {
 TEST(DdsOptionsTest, AnAddressThatTheMachineLacksIsRefused) {
   DdsOptions options;
   options.interfaces = "127.0.0.1,192.0.2.7";
+  // It may come after us at boot.
   EXPECT_THAT([&] { Validate(options); },
-              RefusedAs("--interface", "192.0.2.7"));
+              ThrowsMessage<PassingError>(AllOf(
+                  HasSubstr("--interface: '192.0.2.7'"), HasSubstr("127.0"))));
+  options.interfaces = "eth0";
+  EXPECT_THAT([&] { Validate(options); }, RefusedAs("--interface", "eth0"));
   options.interfaces = "";
   EXPECT_THROW(Validate(options), ConfigError);
   options.interfaces = "all";
   EXPECT_NO_THROW(Validate(options));
+}
+
+// Nothing is wrong with the options where no file can be opened.
+TEST(DdsOptionsTest, WithoutDescriptorsTheAddressIsNotSaidToBeMissing) {
+  rlimit before{};
+  getrlimit(RLIMIT_NOFILE, &before);
+  const rlimit none{0, before.rlim_max};
+  DdsOptions options;
+  options.interfaces = "127.0.0.1";
+  setrlimit(RLIMIT_NOFILE, &none);
+  std::string what;
+  try {
+    Validate(options);
+  } catch (const PassingError& error) {
+    what = error.what();
+  }
+  setrlimit(RLIMIT_NOFILE, &before);
+  EXPECT_THAT(what, HasSubstr("cannot be listed: Too many open files"));
 }
 
 class ProfileFileTest : public ::testing::Test {

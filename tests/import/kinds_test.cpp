@@ -338,6 +338,41 @@ std::string Findings(const std::string& text) {
   return all;
 }
 
+ColumnMap FlowMap(const std::string& keys) {
+  const storage::TemporaryDirectory directory;
+  const auto path = directory.path() / "tags.toml";
+  std::ofstream(path) << "[signal.F]\ncolumn = \"FT3\"\n" << keys;
+  return ReadTagMap(path);
+}
+
+TEST(TagMapTest, GasAtStandardConditionsBecomesMassByItsMolarMass) {
+  struct Case {
+    std::string unit;
+    double molar_mass;
+    double t_h;  // of 1000 in `unit`
+  };
+  // CO2: 3800 Nm3/h are 7461 kg/h (IEC 60534-2-1, example E3). Air has 1.2923
+  // kg/Nm3, 1.2250 kg/Sm3 at 15 degC, and 1.2232 kg/m3 at 60 degF.
+  for (const Case& known :
+       {Case{"Nm3/h", 44.01, 7.461 / 3.8}, Case{"Nm³/h", 28.965, 1.2923},
+        Case{"Sm3/h", 28.965, 1.2250}, Case{"scfh", 28.965, 1.2232 * 0.0283168},
+        Case{"MMscfd", 28.965, 1e6 / 24 * 1.2232 * 0.0283168},
+        Case{"Nl/min", 28.965, 0.06 * 1.2923}}) {
+    const ColumnMap map =
+        FlowMap("unit = \"" + known.unit +
+                "\"\nmolar_mass = " + std::to_string(known.molar_mass) + "\n");
+    EXPECT_EQ(map.flow_unit, FlowUnit::kTPerHour);
+    EXPECT_NEAR(1e3 * map.columns.front().scale, known.t_h, 5e-4 * known.t_h)
+        << known.unit;
+    EXPECT_NO_THROW(CheckGasFlow(map, known.molar_mass));
+    EXPECT_THROW(CheckGasFlow(map, 0.0), ConfigError) << "a liquid";
+    EXPECT_THROW(CheckGasFlow(map, 18.015), ConfigError) << "another gas";
+  }
+  EXPECT_THROW(FlowMap("unit = \"Nm3/h\"\n"), ConfigError);
+  EXPECT_THROW(FlowMap("unit = \"m3/h\"\nmolar_mass = 28.96\n"), ConfigError);
+  EXPECT_NO_THROW(CheckGasFlow(FlowMap("unit = \"m3/h\"\n"), 0.0));
+}
+
 TEST(KindsTest, WhatSniffWritesTheImporterReads) {
   for (const Kind& kind : Kinds()) {
     SCOPED_TRACE(kind.name);

@@ -13,14 +13,14 @@ namespace fdi::monitor {
 /// A certificate that signs itself, of 127.0.0.1, and its key (P-256, 0600).
 inline void MakeCertificate(const std::filesystem::path& certificate_file,
                             const std::filesystem::path& key_file,
-                            int days = 365) {
+                            int days = 365, int from_days = -400) {
   const std::unique_ptr<EVP_PKEY, void (*)(EVP_PKEY*)> key(EVP_EC_gen("P-256"),
                                                            EVP_PKEY_free);
   const std::unique_ptr<X509, void (*)(X509*)> certificate(X509_new(),
                                                            X509_free);
   X509_set_version(certificate.get(), 2);
   ASN1_INTEGER_set(X509_get_serialNumber(certificate.get()), 1);
-  X509_gmtime_adj(X509_getm_notBefore(certificate.get()), -400L * 86400);
+  X509_gmtime_adj(X509_getm_notBefore(certificate.get()), from_days * 86400L);
   X509_gmtime_adj(X509_getm_notAfter(certificate.get()),
                   days * 86400L + 3600 * (days < 0 ? -1 : 1));
   X509_NAME* const name = X509_get_subject_name(certificate.get());

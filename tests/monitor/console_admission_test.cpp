@@ -164,7 +164,7 @@ TEST_F(ConsoleAdmissionTest, AnActionBearsTheNameOfItsUser) {
 TEST_F(ConsoleAdmissionTest, TheCookieIsForThisPageAlone) {
   StartWithUsers();
   ASSERT_EQ(LogIn("engineer"), 200);
-  EXPECT_THAT(set_cookie_, HasSubstr("fdi_" + std::to_string(port_) + "="));
+  EXPECT_THAT(set_cookie_, testing::MatchesRegex("fdi_[0-9a-f]{16}=.*"));
   EXPECT_THAT(set_cookie_, HasSubstr("; Path=/; HttpOnly; SameSite=Strict"));
   EXPECT_THAT(set_cookie_, Not(HasSubstr("Secure")));
   const std::string ack = episode_ + "/ack";
@@ -186,6 +186,48 @@ TEST_F(ConsoleAdmissionTest, TheCookieIsForThisPageAlone) {
               {{"Origin", "https://" + host}}),
       200);
   EXPECT_THAT(set_cookie_, HasSubstr("; Secure"));
+  // Where the proxy says that the browser uses https, a page of http is
+  // another.
+  EXPECT_EQ(PostFor("/api/v1/logout", Json::object(),
+                    {{"X-Forwarded-Proto", "https"}, {"Origin", Origin()}}),
+            403);
+  EXPECT_EQ(Refused("origin"), 8U);
+  EXPECT_EQ(
+      PostFor("/api/v1/logout", Json::object(),
+              {{"X-Forwarded-Proto", "https"}, {"Origin", "https://" + host}}),
+      200);
+}
+
+// Two consoles behind one host name, as /hall-1/ and /hall-2/ of a proxy: a
+// browser has one jar for both, and sends all its cookies to each.
+TEST_F(ConsoleAdmissionTest, ASecondConsoleDoesNotLogOutTheFirst) {
+  StartWithUsers();
+  ASSERT_EQ(LogIn("engineer"), 200);
+  const std::string first = set_cookie_.substr(0, set_cookie_.find(';'));
+  console_.reset();
+  ConsoleOptions other;
+  other.address.host = "127.0.0.2";
+  other.address.port = port_;
+  other.files = directory_.path() / "page";
+  other.admission.users_file = users();
+  console_.emplace(other, report::GlobalOptions{},
+                   [](LogLevel, std::string_view) {});
+  console_->Start({path_, directory_.path() / "models.db", "0.0", kDetected,
+                   [] {
+                     return MonitorFacts{"OK", {}, 1};
+                   },
+                   NowNs});
+  client_.emplace("127.0.0.2", port_);
+  const auto answer = client_->Post(
+      "/api/v1/login",
+      {{"Origin", "http://127.0.0.2:" + std::to_string(port_)}},
+      Json({{"user", "engineer"}, {"password", kPassword}}).dump(),
+      "application/json");
+  ASSERT_TRUE(answer);
+  ASSERT_EQ(answer->status, 200);
+  const std::string second = answer->get_header_value("Set-Cookie");
+  EXPECT_NE(second.substr(0, second.find('=')),
+            first.substr(0, first.find('=')));
 }
 
 TEST_F(ConsoleAdmissionTest, AWrongPasswordIsRefusedAndSlowed) {

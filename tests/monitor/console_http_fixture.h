@@ -95,9 +95,8 @@ class ConsoleRoutesTest : public storage::HistoryFixture {
   }
   Json Post(const std::string& path, const Json& body, int status = 200,
             const std::string& token = kToken) {
-    const httplib::Result answer =
-        client_->Post(path, {{"Authorization", "Bearer " + token}}, body.dump(),
-                      "application/json");
+    const httplib::Result answer = client_->Post(
+        path, {{"X-FDI-Token", token}}, body.dump(), "application/json");
     EXPECT_TRUE(answer) << path;
     if (!answer) {
       return {};

@@ -7,6 +7,7 @@
 #include <gmock/gmock.h>
 
 #include "base/error.h"
+#include "monitor/console/access.h"
 #include "monitor/console/logins.h"
 #include "monitor/console/users.h"
 #include "tests/storage/message_of.h"
@@ -118,6 +119,26 @@ TEST_F(UsersFileTest, ABadLineIsRefusedWithItsNumberAndWhatIsAccepted) {
   EXPECT_THAT(Complaint(), HasSubstr("users:2: the name stands in an earlier"));
 }
 
+// The login would wait, and so would the end of the monitor.
+TEST_F(UsersFileTest, AHashThatTakesMinutesIsRefused) {
+  const std::string salt = "$abcdefghijklmnop$";
+  for (const std::string& costly :
+       {"$2b$31$abcdefghijklmnopqrstuu" + std::string(31, 'a'),
+        "$6$rounds=999999999" + salt, "$6$rounds=1000001" + salt,
+        "$y$jFT" + salt, "$y$jDT" + salt, "$gy$jFT" + salt}) {
+    Write("anna:view:" + costly + "\n");
+    EXPECT_THAT(Complaint(), HasSubstr("users:1: the hash: expected one of"))
+        << costly;
+  }
+  for (const std::string& usual :
+       {"$y$j9T" + salt, "$y$jCT" + salt, "$y$j75" + salt, "$6" + salt,
+        "$6$rounds=656000" + salt, "$gy$j9T" + salt,
+        "$2b$12$abcdefghijklmnopqrstuu" + std::string(31, 'a')}) {
+    Write("anna:view:" + usual + "\n");
+    EXPECT_EQ(LoadUsers(file_).size(), 1U) << usual;
+  }
+}
+
 TEST_F(UsersFileTest, ThatOthersCanReadOrChangeIsRefused) {
   for (const unsigned mode : {0644U, 0660U, 0604U}) {
     Write("anna:view:*\n", mode);
@@ -148,7 +169,7 @@ class LoginsTest : public testing::Test {
   std::optional<Visitor> Visit() { return logins_.OfSession(session_, now_); }
 
   const User anna_{Role::kEngineer, HashPassword(kFirstPassword)};
-  Logins logins_{{{"anna", anna_}, {"proxied", {}}}};
+  Logins logins_{{{"anna", anna_}, {"bo", anna_}, {"proxied", {}}}};
   std::string session_;
   Logins::Clock::time_point now_{std::chrono::hours(1)};
 };
@@ -169,14 +190,33 @@ TEST_F(LoginsTest, OnlyTheRightPasswordOpensASession) {
   EXPECT_FALSE(Visit());
 }
 
-TEST_F(LoginsTest, GuessesAreSlowedByAddress) {
+TEST_F(LoginsTest, GuessesAreSlowedByNameAndAddress) {
   for (int i = 0; i < 5; ++i) {
     EXPECT_EQ(LogIn("anna", "no"), Outcome::kWrong);
   }
+  EXPECT_EQ(LogIn("bo", kFirstPassword), Outcome::kAdmitted)
+      << "behind a proxy, all come from one address";
   EXPECT_EQ(LogIn("anna", kFirstPassword), Outcome::kTooMany);
   EXPECT_EQ(LogIn("anna", kFirstPassword, "10.0.0.2"), Outcome::kAdmitted);
   now_ += std::chrono::seconds(1);
   EXPECT_EQ(LogIn("anna", kFirstPassword), Outcome::kAdmitted);
+}
+
+// Each name costs its inventor the time of a hash. No number of them locks out
+// who has a name, or frees the guesses at one.
+TEST_F(LoginsTest, ManyNamesLockNobodyOut) {
+  FailureLimit limit(FailureLimit::WhenFull::kReplaceOldest);
+  for (int i = 0; i < 1000; ++i) {
+    const std::string name = "n" + std::to_string(i);
+    EXPECT_TRUE(limit.Allows(name, now_));
+    limit.Add(name, now_);
+    now_ += std::chrono::milliseconds(1);
+  }
+  EXPECT_TRUE(limit.Allows("anna", now_));
+  for (int i = 0; i < 5; ++i) {
+    limit.Add("n999", now_);
+  }
+  EXPECT_FALSE(limit.Allows("n999", now_));
 }
 
 TEST_F(LoginsTest, ASessionEndsHalfAnHourAfterItsLastUse) {

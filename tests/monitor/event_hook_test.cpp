@@ -91,8 +91,20 @@ TEST_F(ProgramDeliveryTest, WordsAreNotForAShell) {
   EXPECT_TRUE(std::filesystem::remove(";"));
 }
 
+// At the start, and not at the first alarm.
+TEST_F(ProgramDeliveryTest, WhatCannotBeRunIsRefused) {
+  std::ofstream(Out()) << "#!/bin/sh\n";
+  for (const std::string& command :
+       {std::string("/no/such/program"), std::string("no-such-program -v"),
+        Out().string(), Out().parent_path().string()}) {
+    EXPECT_THROW(MakeEventDelivery(command, seconds(1)), ConfigError)
+        << command;
+  }
+  EXPECT_NO_THROW(MakeEventDelivery("/bin/true", seconds(1)));
+}
+
 TEST_F(ProgramDeliveryTest, FailureSaysWhy) {
-  EXPECT_THAT(*MakeEventDelivery("/no/such/program", seconds(1))->Deliver("x"),
+  EXPECT_THAT(*DeliverToProgram({"/no/such/program"}, seconds(1))->Deliver("x"),
               HasSubstr("No such file"));
   EXPECT_EQ(*MakeEventDelivery("false", seconds(10))->Deliver("x"),
             "exit status 1");

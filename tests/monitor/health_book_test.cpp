@@ -1,5 +1,6 @@
 #include "monitor/health_book.h"
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 
@@ -146,6 +147,37 @@ TEST(HealthBookTest, HourModelSetAndEpochEachBeginAnotherRow) {
   EXPECT_TRUE(Taken(book).empty());
 }
 
+// A rod of a play of 1.2 %: what is counted belongs to the hour, and a gap or
+// another source is no movement.
+TEST(HealthBookTest, CountsBelongToTheHourAndAreNotMadeOverAGap) {
+  HealthBook book;
+  const auto give = [&book](std::int64_t from_s, int seconds,
+                            std::uint64_t source) {
+    double x = 39.4;
+    for (int k = 0; k < seconds; ++k) {
+      const double cv = k < 200 ? 40.0 + 0.1 * k : 80.0 - 0.1 * k;
+      x = std::clamp(x, cv - 0.6, cv + 0.6);
+      Sample sample = At((from_s + k) * kSecond, cv, x);
+      sample.source_id = source;
+      sample.mode = k % 2 == 0 ? ValveMode::kAuto : ValveMode::kManual;
+      book.Add(sample, Live(0.0), nullptr, 1.0);
+    }
+  };
+  give(0, 400, 1);
+  const auto once = Taken(book);
+  ASSERT_EQ(once.size(), 1u);
+  EXPECT_EQ(once[0].counts.turns, 1);
+  EXPECT_NEAR(static_cast<double>(once[0].counts.dead_band), 1200.0, 2.0);
+  EXPECT_EQ(once[0].counts.auto_ms, 200'000);
+
+  give(500, 400, 1);
+  give(900, 400, 2);
+  const auto twice = Taken(book);
+  ASSERT_EQ(twice.size(), 1u);
+  EXPECT_EQ(twice[0].counts.turns, 2);
+  EXPECT_EQ(twice[0].counts.path, 2 * once[0].counts.path);
+}
+
 TEST(HealthBookTest, PartsMergeToTheWholeExactly) {
   const ModelSet models = LinearModels();
   HealthBook whole;
@@ -176,7 +208,8 @@ TEST(HealthBooksTest, WhatAMonitorSaysIsHandedOverWithTheCheckpoint) {
   const auto models = SharedLinearModels();
   ValveMonitor valve("V1", EngineParts(models), {});
   FakeOutlet outlet;
-  HealthBooks books;
+  Counters counters;
+  HealthBooks books(counters);
   const auto give = [&](const Sample& sample) {
     books.OnVerdict("V1", sample, valve.Step(sample, 1, {}, outlet));
   };
@@ -194,6 +227,8 @@ TEST(HealthBooksTest, WhatAMonitorSaysIsHandedOverWithTheCheckpoint) {
   EXPECT_EQ(checkpoint.health[0].seen_ms, 60'000);
   EXPECT_EQ(checkpoint.health[0].live_ms, (60 - kSettlingSamples) * 1000);
   EXPECT_EQ(checkpoint.health[0].bins[5].at(0).samples, 60 - kSettlingSamples);
+  EXPECT_EQ(counters[Counter::kReversals],
+            static_cast<std::uint64_t>(checkpoint.health[0].reversals));
 }
 
 }  // namespace

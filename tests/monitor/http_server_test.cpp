@@ -1,13 +1,16 @@
 #include "monitor/http/http_server.h"
 
+#include <algorithm>
 #include <chrono>
 #include <condition_variable>
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <stdexcept>
 #include <vector>
 
 #include <gmock/gmock.h>
+#include <sys/socket.h>
 
 #include "tests/monitor/raw_client.h"
 
@@ -16,6 +19,20 @@ namespace {
 
 using testing::HasSubstr;
 using Clock = std::chrono::steady_clock;
+
+// Descriptors of this process that listen.
+std::vector<int> Listeners() {
+  std::vector<int> found;
+  for (int file = 3; file < 256; ++file) {
+    int listens = 0;
+    socklen_t size = sizeof listens;
+    if (getsockopt(file, SOL_SOCKET, SO_ACCEPTCONN, &listens, &size) == 0 &&
+        listens != 0) {
+      found.push_back(file);
+    }
+  }
+  return found;
+}
 
 class HttpServerTest : public testing::Test {
  protected:
@@ -64,6 +81,27 @@ class HttpServerTest : public testing::Test {
   bool free_{false};
   std::optional<HttpServer> server_;
 };
+
+// It was waited for ever: at once, if the thread that accepts had ended before
+// anybody looked.
+TEST(HttpServerStartTest, EndsWhereTheSocketIsGone) {
+  for (int round = 0; round < 20; ++round) {
+    const std::vector<int> before = Listeners();
+    HttpServerOptions options;
+    options.address.host = "127.0.0.1";
+    HttpServer server(options);
+    for (const int file : Listeners()) {
+      if (std::find(before.begin(), before.end(), file) == before.end()) {
+        shutdown(file, SHUT_RDWR);
+      }
+    }
+    try {
+      server.Start();  // Or it has begun to accept just before it ended.
+    } catch (const std::runtime_error& error) {
+      EXPECT_THAT(error.what(), HasSubstr("cannot listen: the socket"));
+    }
+  }
+}
 
 TEST_F(HttpServerTest, ClientsThatDripHoldNobodyAndAreEnded) {
   Start();

@@ -33,7 +33,7 @@ class PipelineTest : public testing::Test {
     pipeline_ = std::make_unique<Pipeline>(
         options_, PipelineSinks{bus_, bus_, history_},
         std::make_shared<FixedResolver>(models_, assigned_), context_);
-    pipeline_->Attach(std::make_unique<HealthBooks>());
+    pipeline_->Attach(std::make_unique<HealthBooks>(counters_));
     for (ValveListener* listener : listeners_) {
       pipeline_->Attach(*listener);
     }

@@ -207,7 +207,7 @@ TEST_F(PipelineTest, NoThreadStartsBeforeStart) {
   EXPECT_EQ(ThreadCount(), before);
   recorder_->Start();
   pipeline_->Start({});
-  EXPECT_EQ(ThreadCount(), before + 4);
+  EXPECT_EQ(ThreadCount(), before + 5);
   Stop();
   EXPECT_EQ(ThreadCount(), before);
 }

@@ -40,6 +40,32 @@ TEST_F(RunStoreTest, ARunThatIsADayLongIsFollowedByTheNext) {
   }
 }
 
+// The period of the plant is 1 s; its clock ticks in ms, and gaps come first.
+TEST_F(RunStoreTest, JitterIsNotThePeriod) {
+  RunStore store(file_, "test");
+  const auto append = [&](const char* valve, std::uint64_t k,
+                          std::int64_t off_ns) {
+    Sample sample = PlantSample(k);
+    sample.stamp_ns += off_ns;
+    store.Append({valve, sample, Intake::kAccepted});
+  };
+  for (std::uint64_t k = 0; k < 40; ++k) {
+    append("blurred", k, k % 2 == 0 ? 0 : 1'000'000);
+    append("rough", k, k == 1 ? 300'000'000 : 0);
+    append("odd", k, static_cast<std::int64_t>(k) * 20'000'000);
+  }
+  append("short", 0, 0);
+  append("short", 1, 1'000'000);
+  store.Commit();
+  append("short", 2, 0);
+  store.Close();
+
+  for (const auto& info : storage::RunStore(file_).List()) {
+    EXPECT_EQ(info.run.period_s, info.run.valve_id == "odd" ? 1.02 : 1.0)
+        << info.run.valve_id;
+  }
+}
+
 TEST_F(RunStoreTest, AStampThatWasNotAcceptedEndsNoRun) {
   RunStore store(file_, "test");
   store.Append({"V1", PlantSample(0), Intake::kAccepted});

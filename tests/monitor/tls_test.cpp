@@ -11,6 +11,7 @@
 #include <httplib.h>
 
 #include "base/error.h"
+#include "base/passing_error.h"
 #include "monitor/http/http_server.h"
 #include "tests/monitor/certificates.h"
 #include "tests/monitor/raw_client.h"
@@ -129,6 +130,9 @@ TEST_F(TlsTest, WhatCannotServeIsRefusedWithFileAndReason) {
   EXPECT_THAT(Complaint(),
               HasSubstr("--console-tls " + files_.certificate.string() +
                         ": the certificate has expired"));
+  MakeCertificate(files_.certificate, files_.key, 365, 1);
+  EXPECT_THROW(TlsContext{files_}, PassingError)
+      << "the clock may be set later";
   MakeCertificate(files_.certificate, files_.key);
   std::filesystem::permissions(files_.key, std::filesystem::perms(0644));
   EXPECT_THAT(Complaint(), HasSubstr("key.pem: mode 0644 lets others read"));

@@ -8,6 +8,7 @@
 
 #include "base/time_text.h"
 #include "monitor/console/console.h"
+#include "tests/html_check.h"
 #include "tests/storage/history_fixture.h"
 
 namespace fdi::console {
@@ -69,6 +70,15 @@ class PlannerRoutesTest : public storage::HistoryFixture {
   std::optional<httplib::Client> client_;
 };
 
+TEST_F(PlannerRoutesTest, HealthHasTheFiguresAndTheStatusOfEachDay) {
+  const Json health = Get("/api/v1/valves/V%2F1%20a/health");
+  const std::size_t days = health["t_ms"].size();
+  for (const char* key : {"dead_band", "error_band", "t63", "exceeded"}) {
+    EXPECT_EQ(health[key].size(), days) << key;
+  }
+  EXPECT_EQ(health["status"].back(), "good");
+}
+
 TEST_F(PlannerRoutesTest, WorkListNamesValveAndReason) {
   const Json rows = Get("/api/v1/worklist")["rows"];
   ASSERT_EQ(rows.size(), 1u);
@@ -90,6 +100,27 @@ TEST_F(PlannerRoutesTest, WorkListIsAFileToo) {
   ASSERT_TRUE(answer);
   EXPECT_THAT(answer->get_header_value("Content-Type"), HasSubstr("text/csv"));
   EXPECT_THAT(answer->body, HasSubstr("\n1,V/1 a,"));
+}
+
+TEST_F(PlannerRoutesTest, ReportIsADocumentAndAPage) {
+  const Json report = Get("/api/v1/report");
+  ASSERT_EQ(report["worst"].size(), 1u);
+  EXPECT_EQ(report["worst"][0]["valve_ids"], Json::array({"V/1 a"}));
+  const std::string later = std::to_string(kDetected / 1'000'000 + 3000'000);
+  EXPECT_TRUE(Get("/api/v1/report?since_ms=" + later)["worst"].empty());
+  Get("/api/v1/report?since_ms=soon", 400);
+
+  for (const std::string path : {"report.html", "episodes/last.html"}) {
+    const httplib::Result page = client_->Get("/api/v1/" + path);
+    ASSERT_TRUE(page && page->status == 200) << path;
+    EXPECT_THAT(page->get_header_value("Content-Type"), HasSubstr("text/html"));
+    // Its style is in it, and nothing else may run or load.
+    EXPECT_EQ(page->get_header_value_count("Content-Security-Policy"), 1u);
+    EXPECT_THAT(page->get_header_value("Content-Security-Policy"),
+                HasSubstr("default-src 'none'; style-src 'unsafe-inline'"));
+    EXPECT_THAT(page->body, HasSubstr("Flow transmitter wrong"));
+    EXPECT_THAT(MalformedTags(page->body), testing::IsEmpty());
+  }
 }
 
 TEST_F(PlannerRoutesTest, MonthsOfAValveAreColumnsOfOneLength) {

@@ -144,5 +144,23 @@ TEST_F(PlantFeedTest, TrendsHaveTheirNamesFromTheModelSet) {
   EXPECT_EQ(Valve().silence, Silence::kNone) << "three periods are 6 s";
 }
 
+// A valve that was taken out of service, and a monitor that nobody will start
+// again; one that is there again is new.
+TEST_F(PlantFeedTest, WhatIsSilentForADayIsForgotten) {
+  Status(kA);
+  Vector(kA, 1);
+  Vector(kA, 1, "V2");
+  Pass(PlantFeed::kForgetValve);
+  EXPECT_EQ(Valve().silence, Silence::kMonitor);
+  ASSERT_EQ(feed_.monitors().size(), 1U);
+  Vector(kB, 2, "V2");
+  Pass(seconds(1));
+  EXPECT_FALSE(board_.Trend("V1"));
+  EXPECT_TRUE(board_.Trend("V2"));
+  EXPECT_TRUE(feed_.monitors().empty()) << "room:2 has sent no status";
+  Vector(kA, 1);
+  EXPECT_EQ(Valve().silence, Silence::kNone);
+}
+
 }  // namespace
 }  // namespace fdi::monitor

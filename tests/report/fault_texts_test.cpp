@@ -55,6 +55,24 @@ TEST_F(FaultTextsTest, SeverityFollowsTheSizeOfTheStrength) {
   EXPECT_EQ(SeverityAt(texts_.Of(19).bands, -0.5), Severity::kCritical);
 }
 
+TEST_F(FaultTextsTest, FiguresHaveLimitsThatAreAccepted) {
+  const auto& band = texts_.Of(loop::Figure::kDeadBand);
+  EXPECT_FALSE(band.Exceeded(1.0));
+  EXPECT_TRUE(band.Exceeded(1.01));
+  const auto& gain = texts_.Of(loop::Figure::kTravelGain);
+  EXPECT_TRUE(gain.Exceeded(0.89));
+  EXPECT_TRUE(gain.Exceeded(1.11));
+  EXPECT_FALSE(texts_.Of(loop::Figure::kT63).Exceeded(1e9));
+
+  texts_.Override(Write("own.toml", "[figure.t63]\nhighest = 3"));
+  EXPECT_TRUE(texts_.Of(loop::Figure::kT63).Exceeded(3.1));
+  EXPECT_FALSE(texts_.Of(loop::Figure::kT63).name.empty());
+  EXPECT_THAT(Refusal("[figure.dead_bend]\nhighest = 3"),
+              HasSubstr("dead_bend"));
+  EXPECT_THAT(Refusal("[figure.dead_band]\nlowest = 4"),
+              HasSubstr("lowest is above highest"));
+}
+
 TEST_F(FaultTextsTest, OverrideLeavesWhatItDoesNotName) {
   const std::string check = texts_.Of(9).check;
 

@@ -216,6 +216,20 @@ TEST(ProgramTest, MistypedVerbIsRefusedWithTheOneMeant) {
   EXPECT_EQ(RunProgram({"gret"}).code, kExitUsage);
 }
 
+// The help of something else would hide it.
+TEST(ProgramTest, AnUnknownVerbBeforeHelpIsRefused) {
+  for (const std::vector<const char*>& words :
+       std::vector<std::vector<const char*>>{
+           {"xyzzy", "--help"}, {"--help", "xyzzy"}, {"store", "x", "-h"}}) {
+    const Outcome outcome = RunProgram(words);
+    EXPECT_EQ(outcome.code, kExitUsage) << words.front();
+    EXPECT_THAT(outcome.err, HasSubstr("unknown verb 'x"));
+    EXPECT_THAT(outcome.out, IsEmpty());
+  }
+  EXPECT_EQ(RunProgram({"store", "open", "--help"}).code, kExitOk);
+  EXPECT_EQ(RunProgram({"store", "--help"}).code, kExitOk);
+}
+
 TEST(ProgramTest, MissingVerbIsAUsageErrorThatListsTheVerbs) {
   EXPECT_EQ(RunProgram({}).code, kExitUsage);
   EXPECT_THAT(RunProgram({}).err, HasSubstr("a verb is needed: greet, store"));

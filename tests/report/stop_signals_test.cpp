@@ -43,6 +43,27 @@ TEST(StopSignalsTest, SignalWakesAThreadThatWaits) {
   EXPECT_EQ(seen, Event::kStop);
 }
 
+// Long work ends soon after a request, with its last words; what has gone back
+// to looking itself takes its time.
+TEST(StopSignalsTest, WorkThatLooksSeldomHasSomePatience) {
+  const auto end_of = [](bool settled) {
+    return [settled] {
+      StopSignals signals;
+      signals.EndWithin(50ms, "interrupted\n");
+      if (settled) {
+        signals.EndWithin(0ms);
+      }
+      std::raise(SIGINT);
+      std::this_thread::sleep_for(settled ? 150ms : 20'000ms);
+      _exit(7);
+    };
+  };
+  const auto begin = std::chrono::steady_clock::now();
+  EXPECT_EXIT(end_of(false)(), testing::ExitedWithCode(1), "interrupted");
+  EXPECT_EXIT(end_of(true)(), testing::ExitedWithCode(7), "");
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, 5s);
+}
+
 TEST(StopSignalsTest, HangUpIsOneReload) {
   StopSignals signals(StopSignals::HangUp::kReload);
 

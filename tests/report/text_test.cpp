@@ -66,6 +66,21 @@ TEST(TextTableTest, SpareColumnsGoUntilTheTableFits) {
   EXPECT_EQ(printed(3), "valve\nLV-1\n(too narrow for: note, set)\n");
 }
 
+// Before any column is left out, and no more than has to be.
+TEST(TextTableTest, CellsThatMayBeCutGiveWay) {
+  TextTable table({{"id"}, {"name", Align::kLeft, 0, 5}, {"set", {}, 1}});
+  table.AddRow({"7", "Ventil größer", "set"});
+  const auto printed = [&table](std::size_t width) {
+    std::ostringstream out;
+    table.Print(out, {.colour = false, .width = width});
+    return out.str();
+  };
+  EXPECT_EQ(printed(0), printed(22));
+  EXPECT_EQ(printed(20), "id  name         set\n7   Ventil grö…  set\n");
+  EXPECT_EQ(printed(14), "id  name   set\n7   Vent…  set\n");
+  EXPECT_EQ(printed(13), "id  name\n7   Ventil g…\n(too narrow for: set)\n");
+}
+
 TEST(TextTableTest, ColourIsAskedForAndMovesNoColumn) {
   TextTable table({{"a"}, {"b"}});
   table.AddRow({"x", "y"});

@@ -104,6 +104,46 @@ TEST(MediumTest, FlowIsThatOfTheStandardsExamples) {
   }
 }
 
+Sample FlowReading(double flow) {
+  Sample sample;
+  sample.Set(Signal::kF, flow);
+  sample.flow_unit = FlowUnit::kM3PerHour;
+  return sample;
+}
+
+TEST(FlowConversionTest, TakesTheDensityOfTheMediumAtTheInlet) {
+  Sample sample = FlowReading(100.0);
+  FlowConversion water({FlowUnit::kTPerHour});
+  water.Apply(sample);
+  EXPECT_NEAR(sample[Signal::kF], 99.82, 0.01);  // 20 degC
+  EXPECT_EQ(sample.flow_unit, FlowUnit::kTPerHour);
+
+  // E8: steam of 1 MPa and 190 degC has 4.992 kg/m3.
+  FlowConversion steam({FlowUnit::kTPerHour, Steam()});
+  sample = FlowReading(100.0);
+  sample.Set(Signal::kP1, 1000.0);
+  sample.Set(Signal::kT1, 190.0);
+  steam.Apply(sample);
+  EXPECT_NEAR(sample[Signal::kF], 0.4992, 0.0015);
+  // The last known P1 and T1 count where one is missing.
+  sample = FlowReading(100.0);
+  steam.Apply(sample);
+  EXPECT_NEAR(sample[Signal::kF], 0.4992, 0.0015);
+
+  FlowConversion usual({FlowUnit::kTPerHour, Steam(), 1000.0, 190.0});
+  sample = FlowReading(100.0);
+  usual.Apply(sample);
+  EXPECT_NEAR(sample[Signal::kF], 0.4992, 0.0015);
+}
+
+TEST(FlowConversionTest, GasWithoutAPressureIsRefused) {
+  FlowConversion gas({FlowUnit::kTPerHour, Gas(28.96, 1.4, 1.0)});
+  Sample sample = FlowReading(100.0);
+  EXPECT_THROW(gas.Apply(sample), DataError);
+  sample.flow_unit = FlowUnit::kTPerHour;
+  EXPECT_NO_THROW(gas.Apply(sample));  // Nothing to convert.
+}
+
 TEST(MediumTest, CapacityIsTheInverseOfTheFlow) {
   for (const Sizing& e : kExamples) {
     SCOPED_TRACE(e.name);

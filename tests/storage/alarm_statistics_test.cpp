@@ -119,5 +119,38 @@ TEST(AlarmStatisticsTest, TheRateIsTheMostInTenMinutesOfThePlant) {
   EXPECT_EQ(figures.most_in_flood_window, 3);
 }
 
+// The whole days of a long episode are those of its parts.
+TEST(AlarmStatisticsTest, WholeDaysCountForEachEpisode) {
+  const auto figures =
+      Of({Span("V", kHour, 4 * kDay), Span("W", kDay + kHour, 5 * kDay + 1)});
+
+  ASSERT_EQ(figures.days.size(), 6U);
+  const double hours[] = {23, 24 + 23, 48, 48, 24, 1e-9 / 3600};
+  for (std::size_t day = 0; day < 6; ++day) {
+    EXPECT_EQ(figures.days[day].day, static_cast<std::int64_t>(day));
+    EXPECT_NEAR(figures.days[day].alarm_s, 3600.0 * hours[day], 1e-9);
+  }
+}
+
+// Rows of a foreign database: the time of an answer does not grow with theirs.
+TEST(AlarmStatisticsTest, StampsThatCannotBeEndNeitherTimeNorSums) {
+  constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::min();
+  AlarmSpan open = Span("W", kNever, std::nullopt);
+  open.last_ns = kEver;
+  std::vector<AlarmSpan> spans(1000, open);
+  spans.push_back(Span("V", kEver, kNever));
+  spans.push_back(Span("V", kNever, kEver));
+  spans.push_back(Span("V", kHour, 2 * kHour));
+
+  const auto figures = ComputeAlarmStatistics(spans, kNever, kEver, kDay);
+
+  EXPECT_EQ(figures.valves.at("V").episodes, 3);
+  EXPECT_LT(figures.days.size(), 100'000U);
+  for (const DayAlarms& day : figures.days) {
+    ASSERT_GE(day.alarm_s, 0.0);
+    ASSERT_LE(day.alarm_s, 86'400.0 * 1003);
+  }
+}
+
 }  // namespace
 }  // namespace fdi::storage

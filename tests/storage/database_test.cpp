@@ -289,6 +289,22 @@ TEST_F(DatabaseTest, ADeletedFileTakesNoCommitAndIsMadeAnew) {
   EXPECT_EQ(reader.QueryInt64("SELECT sum(id) FROM t"), 3);
 }
 
+// Killed in the copy, and between the commit and the copy's name.
+TEST_F(DatabaseTest, AKilledMigrationLeavesOneCopy) {
+  { Database(file_, SchemaOf(1), Access::kWriter); }
+  const std::string copy = file_.string() + ".v1.backup";
+  std::ofstream(copy + ".unfinished") << "half of a copy";
+  { Database(file_, SchemaOf(2), Access::kWriter); }
+  EXPECT_FALSE(std::filesystem::exists(copy + ".unfinished"));
+  EXPECT_NO_THROW(Database(copy, SchemaOf(1), Access::kReader));
+  EXPECT_FALSE(std::filesystem::exists(file_.string() + ".v1-2.backup"));
+
+  std::filesystem::rename(copy, copy + ".unfinished");
+  { Database(file_, SchemaOf(2), Access::kWriter); }
+  EXPECT_TRUE(std::filesystem::exists(copy));
+  EXPECT_FALSE(std::filesystem::exists(copy + ".unfinished"));
+}
+
 // As with `mv backup.db test.db`: SQLite would take the WAL for the backup's.
 TEST_F(DatabaseTest, AFileThatReplacesItIsReadWithoutTheOldWal) {
   const auto backup = directory_.path() / "backup.db";

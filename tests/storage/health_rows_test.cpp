@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <random>
 
 #include <gtest/gtest.h>
@@ -31,6 +32,14 @@ HealthHour Typical(const std::string& valve, std::int64_t hour, int bins,
   h.normal_factor = 3'300'000 + static_cast<std::int64_t>(9e3 * noise(random));
   h.travel = 180'000;
   h.reversals = 250;
+  h.counts.auto_ms = h.seen_ms;
+  h.counts.path = 1'200'000 + static_cast<std::int64_t>(9e4 * noise(random));
+  h.counts.turns = 40;
+  h.counts.dead_band = 22'000;
+  h.counts.opening = 900;
+  h.counts.opening_offset = 300'000;
+  h.counts.closing = 800;
+  h.counts.closing_offset = -280'000;
   h.channels = {{Signal::kX, -7}, {Signal::kF, -7}};
   for (int b = 0; b < bins; ++b) {
     for (const double mean : {70.0, 50.0}) {
@@ -61,6 +70,10 @@ TEST(HealthCodecTest, BytesGiveBackEveryNumber) {
   HealthHour hour = Typical("V1", 400'000, 3, random);
   hour.alarm_ms = 1;
   hour.bins[9] = {{0, 0, 0, 0}, {1, -1, 1, -1LL << 62}};
+  std::int64_t count = -3;
+  for (const auto member : loop::kValveCounts) {
+    hour.counts.*member = count++;
+  }
   hour.AddStrength(19, 60, -30'000);
   hour.AddStrength(3, 61, 15'000);
   HealthHour back;
@@ -71,6 +84,35 @@ TEST(HealthCodecTest, BytesGiveBackEveryNumber) {
   back.live_ms = hour.live_ms;
 
   UnpackHealth(PackHealth(hour), back);
+
+  EXPECT_EQ(back, hour);
+}
+
+// Hours of before there were counts.
+TEST(HealthCodecTest, HoursOfTheFormatBeforeHaveNoCounts) {
+  std::mt19937 random(4);
+  HealthHour hour = Typical("V1", 1, 2, random);
+  hour.counts = {};
+  hour.counts.auto_ms = hour.seen_ms;
+  auto bytes = PackHealth(hour);
+  HealthHour shorter = hour;
+  shorter.reversals = 0;
+  // No counts: a zero behind the two bytes of the reversals, which differ.
+  const auto other = PackHealth(shorter);
+  const auto place = std::ranges::mismatch(bytes, other).in1 + 2;
+  ASSERT_EQ(*place, std::byte{0});
+  bytes.erase(place);
+  hour.counts = {};
+  bytes[0] = (bytes[0] & std::byte{0x80}) | std::byte{1};
+  HealthHour back;
+  back.valve_id = hour.valve_id;
+  back.hour = hour.hour;
+  back.model_hash = hour.model_hash;
+  back.epoch = hour.epoch;
+  back.live_ms = hour.live_ms;
+  back.counts.steps = 9;
+
+  UnpackHealth(bytes, back);
 
   EXPECT_EQ(back, hour);
 }

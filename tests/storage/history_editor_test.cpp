@@ -190,6 +190,11 @@ TEST_F(HistoryEditorTest, StatesOfTheStandardCanBeAskedFor) {
   EXPECT_EQ(CountOf(EpisodeState::kAlarmNormal), 1U);
   EXPECT_EQ(CountOf(EpisodeState::kAlarmShelved), 1U);
   EXPECT_EQ(CountOf(ParseEpisodeState("RTN_UNACK")), 1U);
+  // The clock is set back: what is shelved stays it.
+  EpisodeFilter filter;
+  filter.state = EpisodeState::kAlarmShelved;
+  filter.now_ns = now_ - 3600 * kSecond;
+  EXPECT_EQ(HistoryReader(path_).List(filter).size(), 1U);
 }
 
 TEST_F(HistoryEditorTest, AShelfOutlivesTheProgramAndEndsByItself) {
@@ -205,6 +210,8 @@ TEST_F(HistoryEditorTest, AShelfOutlivesTheProgramAndEndsByItself) {
   EXPECT_EQ(in_force[0].comment, "seat ordered");
   EXPECT_TRUE(reader.Shelves(until).empty());
   EXPECT_EQ(reader.Shelves().size(), 1U);
+  // The clock is set back by an hour, or a standby is behind.
+  EXPECT_EQ(reader.Shelves(now_ - 3600 * kSecond).size(), 1U);
   const auto alarms = reader.Alarms(reader.List(), now_);
   EXPECT_TRUE(alarms[0].shelf);
   EXPECT_FALSE(alarms[1].shelf);

@@ -41,12 +41,44 @@ TEST_F(HistoryWriterTest, ViewHasTheColumnsOfTheContractInOrder) {
     columns.push_back(row.ColumnName(c));
   }
 
-  EXPECT_THAT(
-      columns,
-      ElementsAre("episode_id", "valve_id", "detected_utc", "isolated_utc",
-                  "cleared_utc", "fault", "peak_factor", "model_set",
-                  "end_reason", "label", "acked_by", "strength",
-                  "worst_strength", "severity", "priority", "unconfirmed_utc"));
+  EXPECT_THAT(columns,
+              ElementsAre("episode_id", "valve_id", "detected_utc",
+                          "isolated_utc", "cleared_utc", "fault", "peak_factor",
+                          "model_set", "end_reason", "label", "acked_by",
+                          "strength", "worst_strength", "severity", "priority",
+                          "unconfirmed_utc", "fault_name", "acked_utc",
+                          "ack_comment", "alarm_state", "shelved_until_utc"));
+}
+
+TEST_F(HistoryWriterTest, ViewHasTheNamesOfTheMonitorThatStartedLast) {
+  HistoryWriter writer(path_);
+  writer.BeginSession(kDetected, "test", "",
+                      {{"f1", "Blocked"}, {"f19", "Flow wrong"}, {"f9", "x"}});
+  RecordEpisode(writer, 0b101);
+  EXPECT_EQ(Sql("SELECT fault || ': ' || fault_name FROM fault_history"),
+            "f1|f19: Blocked or Flow wrong");
+
+  writer.BeginSession(kDetected, "test", "", {{"f1", "Travel blocked"}});
+  EXPECT_EQ(Sql("SELECT fault_name FROM fault_history"),
+            "Travel blocked or Flow wrong");
+  EXPECT_EQ(HistoryReader(path_).Show("last").fault_name,
+            "Travel blocked or Flow wrong");
+}
+
+TEST_F(HistoryWriterTest, ViewHasTheCommentOfTheAcknowledgementThatCounts) {
+  HistoryWriter writer(path_);
+  RecordEpisode(writer, 0b001);
+  EXPECT_EQ(Sql("SELECT acked_utc IS NULL AND ack_comment IS NULL FROM "
+                "fault_history"),
+            "1");
+  HistoryEditor editor(path_);
+  editor.Acknowledge("last",
+                     {"anna", "on my way", "test", kDetected + kSecond});
+  editor.Acknowledge("last", {"jan", "me too", "test", kDetected + kSecond});
+  EXPECT_EQ(Sql("SELECT acked_by || ' ' || acked_utc || ' ' || ack_comment "
+                "FROM fault_history"),
+            "anna 2026-11-20T14:56:12.000Z on my way");
+  EXPECT_EQ(HistoryReader(path_).Show("last").ack_comment, "on my way");
 }
 
 TEST_F(HistoryWriterTest, FaultIsNullUntilIsolatedAndUnknownIfItNeverWas) {

@@ -74,6 +74,18 @@ TEST(ModelCodecTest, NamesBeforeTkReadBackInTheirOwnFormat) {
   EXPECT_EQ(DecodeModelSet(bytes, "test").decision.early_error, 1e-3);
 }
 
+// Sets of before do not know it, and keep their bytes.
+TEST(ModelCodecTest, TooLittleFlowReadsBackInItsOwnFormat) {
+  ModelSet models = RandomModelSet("valve", 5);
+  models.floor.emplace().flow_share = 0.5;
+  AddFindings(models);
+  const auto bytes = EncodeModelSet(models);
+  EXPECT_EQ(bytes[4], std::byte{3 + 2 + 64});
+  const ModelSet back = DecodeModelSet(bytes, "test");
+  EXPECT_EQ(back.floor->flow_share, 0.5);
+  EXPECT_EQ(back.faults.back(), kLowFlow);
+}
+
 TEST(ModelCodecTest, EveryFieldReadsBackBitForBit) {
   ModelSet models = RandomModelSet("valve", 5);
   models.observers[2].channels[1].model.parallel = false;
@@ -244,7 +256,7 @@ TEST(ModelCodecTest, RefusalsNameThePlaceAndTheReason) {
   auto older = bytes;
   older[4] = std::byte{2};
   EXPECT_THAT(Refusal(WithValidChecksum(older)),
-              HasSubstr("format version 2, this program reads 3 to 66"));
+              HasSubstr("format version 2, this program reads 3 to 130"));
   EXPECT_THAT(Refusal({}), HasSubstr("is not a model set"));
   // The length of the name stands first in the payload, after 16 bytes.
   auto huge = bytes;

@@ -71,6 +71,33 @@ TEST_F(HistoryRetentionTest, WhatEndedLaterStays) {
   EXPECT_EQ(Valves().size(), 5U);
 }
 
+// An episode of a publisher whose clock says 1970, or 2049, is as old as its
+// arrival.
+TEST_F(HistoryRetentionTest, AgeIsThatOfTheArrivalWhereAClockWasWrong) {
+  using Kind = TransitionKind;
+  constexpr std::int64_t kYears = 20LL * 365 * 86400 * kSecond;
+  for (const std::int64_t off_ns : {-kYears, kYears}) {
+    const std::string valve = off_ns < 0 ? "behind" : "ahead";
+    for (const Kind kind : {Kind::kDetected, Kind::kClosed}) {
+      FaultEvent event =
+          Event(kind, kind == Kind::kClosed ? 91 : 0, 0, 0.3,
+                kind == Kind::kClosed ? EndReason::kCleared : EndReason::kNone,
+                valve);
+      event.transition.stamp_ns += off_ns;
+      event.transition.detection_stamp_ns += off_ns;
+      writer_.Record(event, kDetected + 300 * kSecond);
+    }
+    HistoryEditor(path_).Acknowledge(EpisodeIdText(Id(valve)), By("anna", 1));
+  }
+  MarkAllSent();
+
+  PruneHistory(path_, Before(kDetected + 200 * kSecond));
+  EXPECT_THAT(Valves(), testing::IsSupersetOf({"behind", "ahead"}));
+  PruneHistory(path_, Before(kDetected + 400 * kSecond));
+  EXPECT_THAT(Valves(), testing::Not(testing::Contains("behind")));
+  EXPECT_THAT(Valves(), testing::Not(testing::Contains("ahead")));
+}
+
 TEST_F(HistoryRetentionTest, ADryRunTellsTheSameAndDeletesNothing) {
   RetentionLimits limits = Before(kEnded + 1);
   limits.dry_run = true;

@@ -2,7 +2,8 @@
 # Two hosts as network namespaces joined by veth: the monitor in one, publishers
 # in the other, the link cut for FDI_CUT_SECONDS (default 5, long form 60). The
 # valves are reported stale within 3 periods; what was published is diagnosed
-# when the link is back, or is a data gap; nothing hangs.
+# when the link is back, or is a data gap; nothing hangs. Then the interfaces of
+# both hosts are removed and made anew under their addresses.
 # Usage: link_cut.sh BIN_DIRECTORY      77 where namespaces are not permitted.
 set -euo pipefail
 bin=$1
@@ -35,15 +36,18 @@ if ! command -v ip >/dev/null || ! ip netns add "$near" 2>/dev/null ||
   exit 77
 fi
 ip netns add "$far"
-ip link add "fa$tag" netns "$near" type veth peer name "fb$tag" netns "$far"
 join() {  # NAMESPACE DEVICE ADDRESS
   ip -n "$1" addr add "$3/24" dev "$2"
   ip -n "$1" link set lo up
   ip -n "$1" link set "$2" up
   ip -n "$1" route add 224.0.0.0/4 dev "$2"
 }
-join "$near" "fa$tag" 10.77.0.1
-join "$far" "fb$tag" 10.77.0.2
+plug() {
+  ip link add "fa$tag" netns "$near" type veth peer name "fb$tag" netns "$far"
+  join "$near" "fa$tag" 10.77.0.1
+  join "$far" "fb$tag" 10.77.0.2
+}
+plug
 
 "$bin/fdi-trainer" train --campaign "$(dirname "$0")/quick.toml" \
   --activate >/dev/null
@@ -85,6 +89,17 @@ more() { [ "$(received)" -ge $((before + 2 * valves)) ]; }
 await 20 more || fail "nothing was received after the cut"
 back_ms=$(($(now_ms) - up_ms))
 
+said() { grep -q "$1" "$out/monitor.log"; }
+ip -n "$near" link del "fa$tag"  # The other end goes, too.
+await 5 said "interface_missing address=10.77.0.1" ||
+  fail "nothing was said of the interface that is gone"
+plug
+before=$(received)
+up_ms=$(now_ms)
+await 15 more || fail "nothing was received on the interface made anew"
+anew_ms=$(($(now_ms) - up_ms))
+said "interface_renewed address=10.77.0.1" || fail "interface_renewed is missing"
+
 wait "$publisher" || fail "the publisher ended with $?"
 sleep 1.5
 kill -TERM "$monitor"
@@ -113,5 +128,5 @@ for run in $("$bin/fdi-store" runs list --json |
     awk -F, 'NR > 1 {t = int($1 + .5); if (NR > 2 && t > last + 1) print last, t; last = t}')
 done
 echo "link_cut: cut for $cut s; stale after $stale_ms ms, samples again after" \
-  "$back_ms ms, $missing of $(((cut + 30) * valves)) samples missing, all in gaps"
+  "$back_ms ms, on new interfaces after $anew_ms ms, $missing of $(((cut + 30) * valves)) samples missing, all in gaps"
 [ "$stale_ms" -le 4500 ] || fail "stale only after $stale_ms ms"

@@ -223,6 +223,100 @@ TEST_F(PlantConsoleTest, GoesOnWithoutPostgres) {
   EXPECT_THAT(refused->body, testing::HasSubstr("page of a plant"));
   console_->Signal(SIGTERM);
   EXPECT_EQ(console_->AwaitExit(), 0);
+
+  // A valve that was seen, and is silent when the page starts.
+  PlantDatabase(Url()).Run(
+      "INSERT INTO fdi.health_hour (monitor_id, valve_id, hour, model_hash, "
+      "epoch, live_ms, bytes) SELECT 1, 'GONE', extract(epoch FROM now())::"
+      "bigint / 3600 - 5, 0, 0, 0, ''");
+  StartConsole();
+  EXPECT_TRUE(Await([this] { return Tiles("state")["GONE"] == "NOT_JUDGED"; }))
+      << Get("valves");
+  EXPECT_TRUE(Await([this] {
+    return AllAre(Only(Tiles("quality"), {"GONE"}, false), "LIVE");
+  }));
+}
+
+// Without a monitor.
+class PlantPageTest : public PlantFixture {
+ protected:
+  void SetUp() override {
+    PlantFixture::SetUp();
+    if (!IsSkipped()) {
+      Init();
+      std::ofstream(Folder("page") / "index.html") << "<title>page</title>";
+    }
+  }
+  void Start(const std::vector<std::string>& more = {}) {
+    std::vector<std::string> arguments{FDI_MONITOR_PROGRAM,
+                                       "--domain",
+                                       std::to_string(domain_.id()),
+                                       "console",
+                                       "--from",
+                                       Url(),
+                                       "--listen",
+                                       "127.0.0.1:0",
+                                       "--console-files",
+                                       Folder("page").string(),
+                                       "--log-level",
+                                       "info"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    console_ = std::make_unique<ChildProcess>(arguments);
+    ASSERT_TRUE(console_->AwaitLine("console_listening")) << console_->errors();
+    const std::string& log = console_->errors();
+    port_ = std::stoi(log.substr(log.find("address=127.0.0.1:") + 18));
+  }
+  int Status(const std::string& path) const {
+    httplib::Client client("127.0.0.1", port_);
+    client.set_read_timeout(20);
+    const httplib::Result answer = client.Get("/api/v1/" + path);
+    return answer ? answer->status : 0;
+  }
+
+  const idl::TestDomain domain_;
+  int port_{0};
+  std::unique_ptr<ChildProcess> console_;
+};
+
+TEST_F(PlantPageTest, AForeignLockHoldsUpNeitherThePageNorItsEnd) {
+  Start();
+  while (Status("history") != 200) {
+    std::this_thread::sleep_for(milliseconds(20));
+  }
+  PlantDatabase other(Url());
+  const PlantTransaction transaction(other);
+  other.Run("LOCK fdi.episode IN ACCESS EXCLUSIVE MODE");
+  std::vector<std::jthread> clients;
+  for (int i = 0; i < 8; ++i) {
+    clients.emplace_back([this] { Status("statistics"); });
+  }
+  while (PlantRowsOf("SELECT count(*) >= 4 FROM pg_locks WHERE NOT granted")
+             .front() != "|t") {
+    std::this_thread::sleep_for(milliseconds(20));
+  }
+  const auto start = Clock::now();
+  EXPECT_EQ(Status("valves"), 200);
+  EXPECT_EQ(Status("status"), 200);
+  EXPECT_LT(Clock::now() - start, milliseconds(1000));
+  console_->Signal(SIGTERM);
+  EXPECT_EQ(console_->AwaitExit(), 0);
+  EXPECT_LT(Clock::now() - start, milliseconds(4000));
+}
+
+TEST_F(PlantPageTest, UsersHaveToLogIn) {
+  const std::string users = (directory_.path() / "users").string();
+  ASSERT_EQ(std::system(("echo a-long-password | \"" FDI_MONITOR_PROGRAM
+                         "\" console-user anna --role view --users " +
+                         users + " >/dev/null")
+                            .c_str()),
+            0);
+  Start({"--console-users", users});
+  EXPECT_EQ(Status("valves"), 401);
+  EXPECT_EQ(Status("history"), 401);
+  console_->Signal(SIGHUP);  // Reads the users anew.
+  EXPECT_EQ(Status("status"), 401);
+  console_->Signal(SIGTERM);
+  EXPECT_EQ(console_->AwaitExit(), 0);
 }
 
 }  // namespace

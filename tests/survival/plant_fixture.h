@@ -186,7 +186,13 @@ class PlantFixture : public HistoryFixture {
            "shelf_id"},
           {"monitor_session",
            "session_id, start_ns, alive_ns, stop_ns, clean, software",
-           "session_id"}}) {
+           "session_id"},
+          {"common_cause", "cause_id, group_name, opened_ns, ended_ns",
+           "cause_id"},
+          {"common_cause_member",
+           "cause_id, episode_id, valve_id, fault, isolated_ns",
+           "cause_id, episode_id"},
+          {"fault_name", "fault, name", "fault"}}) {
       std::string there(pair.columns);
       for (std::size_t at = 0; (at = there.find("HEX(", at)) != there.npos;) {
         const std::size_t end = there.find(')', at);
@@ -215,7 +221,9 @@ class PlantFixture : public HistoryFixture {
                     ", fault, peak_factor, model_set, end_reason, "
                     "label, acked_by, strength, worst_strength, severity, "
                     "priority, " +
-                    utc("unconfirmed_utc") +
+                    utc("unconfirmed_utc") + ", fault_name, " +
+                    utc("acked_utc") + ", ack_comment, alarm_state, " +
+                    utc("shelved_until_utc") +
                     " FROM fdi.fault_history WHERE "
                     "monitor = '" +
                     monitor + "' ORDER BY episode_id"));

@@ -3,9 +3,12 @@
 #include <algorithm>
 #include <cctype>
 #include <chrono>
+#include <cstdlib>
+#include <limits>
 #include <random>
 #include <regex>
 #include <set>
+#include <stop_token>
 #include <thread>
 
 #include <gmock/gmock.h>
@@ -98,7 +101,8 @@ TEST_F(ShipTest, WhatChangesIsShippedAgain) {
   Init();
   const auto path = Folder("a") / "history.db";
   HistoryWriter writer(path);
-  writer.BeginSession(kDetected, "test", "");
+  writer.BeginSession(kDetected, "test", "",
+                      {{"f1", "Blocked"}, {"f7", "Flashing"}, {"f19", "F"}});
   std::int64_t last = 0;
   const auto follow = [&](const char* what) {
     const std::int64_t before = last;
@@ -157,6 +161,24 @@ TEST_F(ShipTest, WhatChangesIsShippedAgain) {
   strength.strength = 0.45;
   writer.StoreStrength(strength);
   follow("a second one, and another instead");
+  const auto change = [&path](const std::string& sql) {
+    Database file(path, HistorySchema(), Access::kOccasionalWriter);
+    Transaction transaction(file);
+    file.Run(sql);
+    transaction.Commit();
+  };
+  change(
+      "INSERT INTO common_cause VALUES ('000000000000000c', 'air', 5, NULL)");
+  change("INSERT INTO common_cause_member VALUES ('000000000000000c', '" +
+         EpisodeIdText(Id()) + "', 'LV-1', 'f7', 4)");
+  follow("a common cause");
+  const auto causes = PlantReader(Url(), "").OpenCauses();
+  ASSERT_EQ(causes.size(), 1U);
+  EXPECT_EQ(causes[0].group, "air");
+  EXPECT_EQ(causes[0].members, HistoryReader(path).OpenCauses().at(0).members);
+  change("UPDATE common_cause SET ended_ns = 9");
+  follow("its end");
+  EXPECT_TRUE(PlantReader(Url(), "").OpenCauses().empty());
   writer.Record(Event(Kind::kCleared, 90, 0b10, 0.1), kDetected);
   follow("cleared");
   writer.Record(Event(Kind::kClosed, 91, 0b10, 0.1, EndReason::kCleared),
@@ -448,12 +470,12 @@ TEST_F(ShipTest, RefusalsHaveAReasonAndCode3) {
   refused(Store("ship --init --to '" + server_->Url("empty", "room") + "'"),
           "permission denied for database empty");
   EXPECT_EQ(Ship("a", "", "room").code, 0);
-  refused(Ship("a", "--prune --history-age 1s", "room"),
+  refused(Ship("a", "--prune --history-age 1s --trust-clock", "room"),
           "permission denied for table episode");
   EXPECT_EQ(Store("history list --from '" + Url("screen") + "'").code, 0);
   owner.Run("UPDATE fdi.plant SET version = version + 1");
   refused(Ship("a"),
-          "schema fdi has version 4, this program needs 3: update "
+          "schema fdi has version 6, this program needs 5: update "
           "this program");
   refused(Store("ship --data " + Folder("a").string() +
                 " --to 'postgresql://x:secret@/plant?host=/nowhere'"),
@@ -664,7 +686,10 @@ TEST_F(ShipTest, TheVerbsReadThePlant) {
   same("worklist --valve 'LV-*' --discipline instrument" + since);
   const Outcome list =
       Store("history list --limit 1 --csv --from '" + Url() + "' --monitor a");
-  EXPECT_THAT(list.out, HasSubstr("unconfirmed_utc,host,monitor\n"));
+  EXPECT_THAT(
+      list.out,
+      HasSubstr("unconfirmed_utc,fault_name,acked_utc,ack_comment,alarm_state,"
+                "shelved_until_utc,host,monitor\n"));
   EXPECT_THAT(list.out, HasSubstr(",a\n"));
   EXPECT_THAT(Store("history list --from '" + Url() + "' --monitor b").out,
               HasSubstr("no episode matches"));
@@ -885,6 +910,316 @@ TEST_F(ShipTest, TheDashboardsQueriesRun) {
       PlantRowsOf(query);
     }
   }
+}
+
+// Lifts the checks of the schema, as its owner can.
+constexpr const char* kLiftChecks =
+    "DO $$ DECLARE t text; c text; BEGIN FOR t, c IN SELECT relname, conname "
+    "FROM pg_constraint k JOIN pg_class r ON r.oid = conrelid "
+    "WHERE conname LIKE '%\\_sound' LOOP "
+    "EXECUTE format('ALTER TABLE fdi.%I DROP CONSTRAINT %I', t, c); "
+    "END LOOP; END $$";
+
+// Rows that cannot be, each in the place of a good one that an open episode and
+// all others of the tables are shown without.
+constexpr const char* kBadRows =
+    "INSERT INTO fdi.episode_trace SELECT monitor_id, episode_id, 99, 1, "
+    "9223372036854775807, 1, 1, 0, 'x', 0, 'x' FROM fdi.episode;"
+    "INSERT INTO fdi.episode (monitor_id, episode_id, valve_id, source_id, "
+    "detected_ns, isolated_ns, fault_bits, peak_factor, strength, model_set, "
+    "model_hash, flow_unit, channels, faults, host, monitor) "
+    "SELECT 1, 'ffff00000000000' || n, 'V1', 1, d, i, 0, p, 0.5, 'm', 1, u, "
+    "'X', 'f1', 'h', 'a' FROM (VALUES "
+    "(1, 9223372036854775807, -9223372036854775807, 0.5, 'm3/h'),"
+    "(2, 1795186571000000000, NULL, 0.5, 'gpm'),"
+    "(3, 1795186571000000001, NULL, 'NaN', 'm3/h')) AS v(n, d, i, p, u);"
+    "INSERT INTO fdi.coverage_day VALUES "
+    "(1, 'V1', 1099511627776, 'LIVE', 9223372036854775807, 1),"
+    "(1, 'V1', 106752, 'LIVE', 9223372036854775807, 1);"
+    "INSERT INTO fdi.data_gap VALUES "
+    "(1, 77, 'V1', 1, 9223372036854775807, 'bad', NULL);"
+    "INSERT INTO fdi.shelf VALUES (1, 77, 'V1', NULL, 1, 9223372036854775807, "
+    "'anna', NULL, 'test', NULL, NULL, NULL);"
+    "INSERT INTO fdi.health_hour VALUES (1, 'V1', 1099511627776, 1, 0, 1, 'x');"
+    "INSERT INTO fdi.episode_strength SELECT monitor_id, episode_id, 'f99', 1, "
+    "1, 1, 1, 'physics' FROM fdi.episode";
+
+TEST_F(ShipTest, ABadRowHidesNoGoodOne) {
+  Init();
+  HistoryWriter writer(Folder("a") / "history.db");
+  RecordEpisode(writer, 0b01);
+  writer.Record(
+      Event(TransitionKind::kDetected, 0, 0, 0.3, EndReason::kNone, "V1"),
+      kDetected);
+  StrengthPoint strength{Id(), kDetected, 7, 0.5, 0.4, 0.6, Layer::kPhysics};
+  writer.StoreStrength(strength);
+  writer.CommitCheckpoint(HoursOfHealth("V1"));
+  writer.AddGap({"V1", kDetected, kDetected + kSecond, "test"});
+  writer.Commit(kDetected + kSecond);
+  HistoryEditor(Folder("a") / "history.db")
+      .Shelve("V1", std::nullopt, kDetected + 3600 * kSecond,
+              By("anna", kDetected));
+  ASSERT_EQ(Ship("a").code, 0);
+
+  PlantDatabase owner(Url());
+  owner.RunScript("CREATE ROLE writer LOGIN IN ROLE fdi_writer");
+  const std::string bad = kBadRows;
+  for (std::size_t at = 0; at < bad.size();) {
+    const std::size_t end = std::min(bad.find(';', at), bad.size());
+    const std::string insert = bad.substr(at, end - at);
+    if (!insert.starts_with("INSERT INTO fdi.episode_strength")) {
+      try {
+        PlantDatabase(Url("writer")).Run(insert);
+        ADD_FAILURE() << insert;
+      } catch (const PlantError& error) {
+        EXPECT_THAT(error.what(), HasSubstr("_sound"));
+      }
+    }
+    at = end + 1;
+  }
+
+  owner.RunScript(kLiftChecks);
+  owner.RunScript(kBadRows);
+  PlantReader reader(Url());
+  const auto note = [&reader](const char* start) {
+    EXPECT_THAT(reader.TakeNote(), testing::StartsWith(start));
+    EXPECT_EQ(reader.TakeNote(), "");
+  };
+  EXPECT_EQ(reader.List({}).size(), 2U);
+  note("2 rows could not be read: episode: ");
+  EpisodeFilter newest;
+  newest.limit = 1;
+  ASSERT_EQ(reader.List(newest).size(), 1U) << "the bad ones are newer";
+  EXPECT_THAT(reader.TakeNote(), HasSubstr("flow_unit 'gpm' is unknown"));
+  EXPECT_EQ(reader.AlarmList(kDetected + kSecond, 10).size(), 2U);
+  reader.TakeNote();
+  EXPECT_EQ(reader.Statistics({}).size(), 2U);
+  note("1 row could not be read: episode: a number is out of its range");
+  EXPECT_EQ(reader.Coverage({}).size(), 0U);
+  note("2 rows could not be read: hours by quality");
+  EXPECT_EQ(reader.Gaps({}).size(), 1U);
+  note(
+      "1 row could not be read: data gap: to_ns '9223372036854775807' is "
+      "outside the years 1900 to 2149");
+  EXPECT_EQ(reader.Shelves({}).size(), 1U);
+  note("1 row could not be read: shelf");
+  EXPECT_EQ(reader.Health({"V1"}).size(), 2U);
+  EXPECT_EQ(reader.Strengths(Id()).size(), 1U);
+  note("1 row could not be read: strength: unknown fault 'f99'");
+  EXPECT_NO_THROW(reader.Trace(Id()));
+  note("1 row could not be read: evidence");
+  const auto start = Clock::now();
+  EXPECT_EQ(reader.AlarmFigures({}, kDetected + kSecond).valves.size(), 2U);
+  EXPECT_LT(Clock::now() - start, milliseconds(1000));
+  EXPECT_EQ(PlantRowsOf("SELECT count(day_utc) FROM fdi.coverage_hours"),
+            std::vector<std::string>{"|0"});
+  const Outcome said =
+      Store("history list --from '" + Url() + "' --since 2000-01-01 --json");
+  EXPECT_THAT(said.err, HasSubstr("plant_rows_left_out"));
+}
+
+// What earlier versions let in.
+TEST_F(ShipTest, AnUpgradeMovesBadRowsAside) {
+  Init();
+  HistoryWriter writer(Folder("a") / "history.db");
+  RecordEpisode(writer, 0b01);
+  ASSERT_EQ(Ship("a").code, 0);
+  PlantDatabase owner(Url());
+  owner.RunScript(kLiftChecks);
+  owner.RunScript(kBadRows);
+  owner.RunScript(
+      "DELETE FROM fdi.episode_strength;"
+      "DROP FUNCTION fdi.is_stamp, fdi.is_finite; DROP TABLE fdi.unsound;"
+      "DROP INDEX fdi.data_gap_once, fdi.shelf_once;"
+      "ALTER TABLE fdi.data_gap ADD PRIMARY KEY (gap_id, monitor_id);"
+      "ALTER TABLE fdi.shelf ADD PRIMARY KEY (shelf_id, monitor_id);"
+      "UPDATE fdi.plant SET version = 4");
+  const Outcome upgraded = Store("ship --init --to '" + Url() + "'");
+  ASSERT_EQ(upgraded.code, 0) << upgraded.err;
+  EXPECT_THAT(upgraded.out, HasSubstr("rows that cannot be right are in"));
+  EXPECT_EQ(PlantRowsOf("SELECT count(*) FROM fdi.unsound "
+                        "WHERE table_name = 'episode'"),
+            std::vector<std::string>{"|3"});
+  EXPECT_EQ(PlantReader(Url()).List({}).size(), 1U);
+  ASSERT_EQ(Ship("a").code, 0);
+  ExpectEqual("a");
+}
+
+// Of a history.db that somebody has written into: its other rows go on.
+TEST_F(ShipTest, ARowThatThePlantRefusesStopsNothing) {
+  Init();
+  const auto path = Folder("a") / "history.db";
+  HistoryWriter writer(path);
+  RecordEpisode(writer, 0b01);
+  writer.AddGap({"V1", kDetected, kDetected + kSecond, "good"});
+  writer.AddGap(
+      {"V1", kDetected, std::numeric_limits<std::int64_t>::max(), "bad"});
+  writer.Commit(kDetected + kSecond);
+  const Outcome shipped = Ship("a", "--json");
+  ASSERT_EQ(shipped.code, 0) << shipped.err;
+  EXPECT_EQ(nlohmann::json::parse(shipped.out)["left_out"], 1);
+  EXPECT_EQ(PlantRowsOf("SELECT reason FROM fdi.data_gap"),
+            std::vector<std::string>{"|good"});
+}
+
+// The numbers of rows are given twice.
+TEST_F(ShipTest, ARestoredHistoryOverwritesNothing) {
+  Init();
+  const auto path = Folder("a") / "history.db";
+  const auto copy = Folder("a") / "copy.db";
+  { HistoryWriter(path).BeginSession(kDetected, "test", ""); }
+  Database(path, HistorySchema(), Access::kReader).BackupTo(copy);
+  const auto live = [&](std::int64_t from_ns, const std::string& who) {
+    HistoryWriter writer(path);
+    writer.BeginSession(from_ns, who, "");
+    writer.Record(Event(TransitionKind::kDetected, 0, 0, 0.3, EndReason::kNone,
+                        "LV-" + who),
+                  kDetected);
+    writer.AddGap({"V1", kDetected, from_ns, who});
+    writer.Commit(from_ns + kSecond);
+    HistoryEditor(path).Shelve("V1", std::nullopt, UtcNow() + 3600 * kSecond,
+                               By(who, UtcNow()));
+    EXPECT_EQ(Ship("a").code, 0);
+  };
+  live(kDetected + 100 * kSecond, "first");
+  for (const char* rest : {"-wal", "-shm"}) {
+    std::filesystem::remove(path.string() + rest);
+  }
+  std::filesystem::rename(copy, path);
+  live(kDetected + 200 * kSecond, "second");
+
+  const auto both = std::vector<std::string>{"|first", "|second"};
+  EXPECT_EQ(PlantRowsOf("SELECT reason FROM fdi.data_gap ORDER BY 1"), both);
+  EXPECT_EQ(PlantRowsOf("SELECT who FROM fdi.shelf ORDER BY 1"), both);
+  EXPECT_EQ(PlantRowsOf("SELECT software FROM fdi.monitor_session "
+                        "WHERE software <> 'test' ORDER BY 1"),
+            both);
+  // What is lost here does not hold there for ever.
+  EXPECT_EQ(PlantRowsOf("SELECT who, ended_origin FROM fdi.shelf "
+                        "WHERE ended_ns IS NOT NULL"),
+            std::vector<std::string>{"|first|history.db was restored"});
+  EXPECT_EQ(PlantRowsOf("SELECT valve_id FROM fdi.episode "
+                        "WHERE ended_ns IS NULL"),
+            std::vector<std::string>{"|LV-second"});
+  EXPECT_EQ(PlantRowsOf("SELECT software FROM fdi.monitors"),
+            std::vector<std::string>{"|second"});
+}
+
+// A lock, a stopped server process, a stopped server, an end of the program.
+TEST_F(ShipTest, NoWaitIsWithoutLimit) {
+  Init();
+  std::stop_source stop;
+  PlantLimits limits;
+  limits.connect = limits.statement = milliseconds(500);
+  limits.lock = milliseconds(100);
+  limits.stop = stop.get_token();
+  const auto refused = [](const auto& call, const char* reason) {
+    const auto start = Clock::now();
+    try {
+      call();
+      ADD_FAILURE() << "waits for " << reason;
+    } catch (const PlantError& error) {
+      EXPECT_THAT(error.what(), HasSubstr(reason));
+    }
+    EXPECT_LT(Clock::now() - start, milliseconds(2500));
+  };
+  PlantReader reader(Url(), "", limits);
+  {
+    PlantDatabase other(Url());
+    const PlantTransaction transaction(other);
+    other.Run("LOCK fdi.episode IN ACCESS EXCLUSIVE MODE");
+    refused([&] { reader.List({}); }, "lock timeout");
+  }
+  EXPECT_NO_THROW(reader.List({})) << "the connection goes on";
+
+  PlantDatabase stopped(Url(), limits);
+  const auto server =
+      static_cast<pid_t>(stopped.Run("SELECT pg_backend_pid()").Int64(0, 0));
+  kill(server, SIGSTOP);
+  refused([&] { stopped.Run("SELECT 1"); },
+          "timeout expired: waited for an answer for 500 ms");
+  refused([&] { stopped.Run("SELECT 1"); }, "PostgreSQL");
+  kill(server, SIGKILL);  // The server ends all connections.
+  WaitUntil([&] {
+    try {
+      PlantDatabase again(Url());
+      return true;
+    } catch (const PlantError&) {
+      return false;
+    }
+  });
+
+  const pid_t postmaster = server_->Pid();
+  kill(postmaster, SIGSTOP);
+  refused([&] { PlantDatabase(Url(), limits); },
+          "timeout expired: waited for a connection for 500 ms");
+  limits.connect = std::chrono::seconds(60);
+  std::jthread end([&stop] {
+    std::this_thread::sleep_for(milliseconds(200));
+    stop.request_stop();
+  });
+  refused([&] { PlantDatabase(Url(), limits); }, "the program stops");
+  kill(postmaster, SIGCONT);
+}
+
+TEST_F(ShipTest, AWaitIsSaid) {
+  Init();
+  HistoryWriter writer(Folder("a") / "history.db");
+  RecordEpisode(writer, 0b01);
+  PlantDatabase other(Url());
+  const PlantTransaction transaction(other);
+  other.Run("LOCK fdi.episode IN ACCESS EXCLUSIVE MODE");
+  const pid_t shipper = Spawn(ShipCommand("a", "20ms"), Log());
+  WaitUntil([&] { return Count("plant_waits") == 1; });
+  EXPECT_THAT(Slurp(Log()), HasSubstr("waits for an answer for 120 s at most"));
+  Stop(shipper);
+}
+
+// PgBouncer gives each transaction any of the server's sessions.
+TEST_F(ShipTest, APoolerMayGiveEachTransactionAnotherSession) {
+  const char* asked = std::getenv("FDI_PGBOUNCER");
+  const std::string pooler = asked == nullptr ? "/usr/sbin/pgbouncer" : asked;
+  if (!std::filesystem::exists(pooler)) {
+    GTEST_SKIP() << "no PgBouncer (Debian: apt install pgbouncer)";
+  }
+  Init();
+  const std::string folder = server_->folder() + "/pool";
+  std::filesystem::create_directories(folder);
+  std::filesystem::permissions(folder, std::filesystem::perms::all);
+  std::ofstream(folder + "/ini")
+      << "[databases]\n* = host=" << server_->folder()
+      << " user=postgres\n[pgbouncer]\nlisten_addr =\nunix_socket_dir = "
+      << folder << "\nauth_type = any\npool_mode = transaction\n"
+      << "default_pool_size = 2\npidfile = " << folder
+      << "/pid\nlogfile = " << folder << "/log\n";
+  const std::string as_user = geteuid() == 0
+                                  ? "setpriv --reuid=postgres --regid=postgres "
+                                    "--clear-groups "
+                                  : "";
+  ASSERT_EQ(
+      std::system(("cd / && " + as_user + pooler + " -q -d " + folder + "/ini")
+                      .c_str()),
+      0);
+  const std::string pooled =
+      "postgresql://postgres@/" + database_ + "?port=6432&host=" + folder;
+  const auto path = Folder("a") / "history.db";
+  HistoryWriter writer(path);
+  for (int i = 0; i < 3; ++i) {
+    RecordEpisode(writer, 0b01, "LV-" + std::to_string(i));
+    const Outcome outcome = Store("ship --data " + Folder("a").string() +
+                                  " --monitor a --to '" + pooled + "'");
+    EXPECT_EQ(outcome.code, 0) << outcome.err;
+    // Two readers hold a connection each, so that the sessions change.
+    PlantReader first(pooled);
+    PlantReader second(pooled);
+    EXPECT_EQ(first.List({}).size(), static_cast<std::size_t>(i + 1));
+    EXPECT_EQ(second.Statistics({}).size(), static_cast<std::size_t>(i + 1));
+  }
+  ExpectEqual("a");
+  pid_t pid = 0;
+  std::ifstream(folder + "/pid") >> pid;
+  ASSERT_GT(pid, 1);
+  kill(pid, SIGTERM);
 }
 
 }  // namespace

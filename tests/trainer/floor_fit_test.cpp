@@ -82,6 +82,24 @@ TEST(FloorFitTest, TimesAreSecondsWhateverThePeriod) {
   EXPECT_EQ(FitFloor(Healthy(3.0), 10.0)->deviation_samples, 2);
 }
 
+TEST(FloorFitTest, WithoutAPositionTheFlowIsThatOfTheCommand) {
+  Condition normal = Healthy(3.0);
+  for (Sample& sample : normal.training.front().samples) {
+    sample.present =
+        static_cast<SignalMask>(sample.present & ~MaskOf(Signal::kX));
+    sample.Set(Signal::kF, 60.0 * std::exp(-0.03 * sample[Signal::kCv]));
+    sample.values[Index(Signal::kX)] = 0.0;
+  }
+  const auto floor = FitFloor(normal, 1.0);
+  ASSERT_TRUE(floor.has_value());
+  EXPECT_NEAR(floor->flow_exponent, 3.0, 0.1);
+  EXPECT_EQ(floor->quick.rate, 100.0);
+  EXPECT_LE(floor->slow.rate, 1.0);
+  FloorLimits wider = *floor;
+  WidenFloor(normal.training, wider);
+  EXPECT_EQ(wider, *floor);
+}
+
 TEST(FloorFitTest, NoFlowNoLimitOnIt) {
   EXPECT_EQ(FitFloor(Healthy(3.0, false), 1.0)->flow_gain, 0.0);
 }

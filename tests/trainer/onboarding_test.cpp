@@ -11,6 +11,7 @@
 #include "base/error.h"
 #include "diagnosis/fault_catalogue.h"
 #include "trainer/onboarding/record_checks.h"
+#include "trainer/onboarding/record_verdict.h"
 
 namespace fdi::trainer {
 namespace {
@@ -61,6 +62,40 @@ TEST(OnboardingPresetTest, WhatIsHardlyReadIsNoChannel) {
   EXPECT_TRUE(std::ranges::none_of(channels, [](const ChannelPlan& plan) {
     return plan.output == Signal::kT1;
   }));
+}
+
+TEST(OnboardingPresetTest, NeedsTheCommandAndAnAnswerToIt) {
+  const auto outputs = [](SignalMask signals) {
+    std::vector<std::string> names;
+    for (const ChannelPlan& plan : OnboardingPreset(signals).channels) {
+      names.push_back(plan.name);
+    }
+    return names;
+  };
+  const SignalMask cv = MaskOf(Signal::kCv);
+  EXPECT_EQ(outputs(static_cast<SignalMask>(cv | MaskOf(Signal::kF))),
+            std::vector<std::string>{"F(CV)"});
+  EXPECT_EQ(outputs(static_cast<SignalMask>(cv | MaskOf(Signal::kX))),
+            std::vector<std::string>{"X"});
+  EXPECT_THROW(OnboardingPreset(cv), DataError);
+  EXPECT_THROW(OnboardingPreset(kRodSignals), DataError);
+}
+
+TEST(TrainingTest, RunsWithoutTheOutputOfAChannelAreRefused) {
+  TrainingRun run = RunOf(Strange(400.0));
+  for (LabelledSample& labelled : run.samples) {
+    Sample& sample = labelled.sample;
+    sample.present =
+        static_cast<SignalMask>(sample.present & ~MaskOf(Signal::kX));
+  }
+  TrainingOptions options = PresetOptions("extended");
+  options.name = "x";
+  try {
+    TrainModelSet({run}, options);
+    FAIL() << "not refused";
+  } catch (const DataError& error) {
+    EXPECT_THAT(error.what(), testing::HasSubstr("has no X"));
+  }
 }
 
 TEST(FaultSynthesizerTest, MismatchOfTheSimulationStaysInTheReadings) {
@@ -170,11 +205,27 @@ TEST(RecordChecksTest, WrongUnitsAndSensesAreToldApart) {
         s.Set(kCv, s.stamp_ns / 60'000'000'000 % 2 == 0 ? 100.0 : 0.0);
       },
       "this is an open/shut valve");
+  const auto without = [](Sample& s, SignalMask signals) {
+    s.present = static_cast<SignalMask>(s.present & ~signals);
+  };
+  refused([&](Sample& s) { without(s, kRodSignals); },
+          "neither a position (X) nor a flow (F)");
+  EXPECT_EQ(Refusal([&](Sample& s) { without(s, MaskOf(kX)); }), "");
   refused(
-      [](Sample& s) {
-        s.present = static_cast<SignalMask>(s.present & ~MaskOf(kX));
+      [&](Sample& s) { without(s, s.seq < 5 ? MaskOf(kX) : SignalMask{0}); },
+      "begins without a position (X)");
+  refused(
+      [&](Sample& s) {
+        without(s, MaskOf(kX));
+        Scale(s, kCv, -1.0, 100.0);
       },
-      "there is no position (X)");
+      "F rises while CV closes");
+  refused(
+      [&](Sample& s) {
+        without(s, MaskOf(kX));
+        s.Set(kF, 10.0 + std::sin(7.0 * s[kP1]));
+      },
+      "F does not follow CV");
   refused([](Sample& s) { Scale(s, kCv, 0.01); }, "CV is 0.");
   refused([](Sample& s) { Scale(s, kX, 0.01); }, "scale = 100");
   refused(
@@ -261,11 +312,12 @@ TEST(OnboardTest, RefusesWhatIsNotHealthyData) {
     gap.samples[k].sample.stamp_ns += 60'000'000'000;
   }
   EXPECT_THROW(Onboard({gap}, options), DataError);
-  TrainingRun without_x = RunOf(Strange(700.0));
-  for (LabelledSample& labelled : without_x.samples) {
-    labelled.sample.present = kBasicSignals & ~MaskOf(Signal::kX);
+  TrainingRun neither_x_nor_f = RunOf(Strange(700.0));
+  for (LabelledSample& labelled : neither_x_nor_f.samples) {
+    labelled.sample.present =
+        kBasicSignals & ~(MaskOf(Signal::kX) | MaskOf(Signal::kF));
   }
-  EXPECT_THROW(Onboard({without_x}, options), DataError);
+  EXPECT_THROW(Onboard({neither_x_nor_f}, options), DataError);
 }
 
 // Before the physics are fitted to what is not one record.
@@ -306,6 +358,28 @@ TEST(OnboardTest, RunWithoutSamplesIsLeftOutWhereverTheValveWorks) {
   empty.samples.clear();
   EXPECT_EQ(WithoutStops({empty, at_work}).size(), 1U);
   EXPECT_EQ(WithoutStops({empty, shut}).size(), 1U);
+}
+
+TEST(RecordVerdictTest, ThinSaysWhatIsStillNeeded) {
+  const auto record = [](int samples, double span) {
+    TrainingRun run;
+    for (int k = 0; k < samples; ++k) {
+      Sample sample;
+      sample.Set(Signal::kCv, 40.0 + span * (k % 11) / 10.0);
+      run.samples.push_back({sample, {}});
+    }
+    return std::vector{run};
+  };
+  EXPECT_EQ(JudgeRecord(record(3600, 20.0), 1.0).word, "usable");
+  EXPECT_EQ(JudgeRecord(record(1500, 20.0), 1500.0 / 3600.0).word, "usable");
+  EXPECT_EQ(
+      JudgeRecord(record(840, 20.0), 840.0 / 3600.0).sentence.substr(0, 59),
+      "thin: 14 minutes of healthy data, 11 more are needed. Until");
+  const RecordVerdict still = JudgeRecord(record(3600, 2.0), 1.0);
+  EXPECT_EQ(still.word, "thin");
+  EXPECT_NE(still.sentence.find("stays within 2.0 %, one more operating point"),
+            std::string::npos)
+      << still.sentence;
 }
 
 }  // namespace

@@ -79,7 +79,7 @@ TEST(TrainingTest, OneObserverPerConditionTheNormalOneFirst) {
   EXPECT_EQ(models.observers[1].name, "f6 0.50");
   EXPECT_EQ(models.observers[5].name, "f19 0.60");
   EXPECT_EQ(models.faults,
-            (std::vector<int>{6, 8, 19, 201, 202, 203, 204, 205}));
+            (std::vector<int>{6, 8, 19, 201, 202, 203, 204, 205, 206}));
   EXPECT_GT(models.observers[0].channels[0].validation.vaf, 99.0);
   EXPECT_GT(models.observers[0].channels[1].validation.vaf, 99.0);
 }

@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cstdlib>
 #include <string_view>
+#include <utility>
 
 #include "base/error.h"
 #include "base/log.h"
-#include "simulator/valve_equations.h"
 
 namespace fdi::trainer {
 namespace {
@@ -97,13 +97,10 @@ std::vector<path> MatchingFiles(const std::string& pattern,
   return files;
 }
 
-storage::StoredRun ReadRunFile(const std::string& text,
-                               importer::CsvOptions csv) {
+storage::StoredRun RunOf(const importer::CsvTable& table,
+                         storage::RunSelector selector) {
   storage::StoredRun run;
-  run.selector = SplitStretch(text);
-  csv.split_gaps = true;
-  const importer::CsvTable table =
-      importer::ReadCsvFile(run.selector.id, std::move(csv));
+  run.selector = std::move(selector);
   const SampleSeries& content = table.runs.front();
   run.info.id = run.selector.id;
   run.info.run.start_ns = table.start_ns;
@@ -112,9 +109,7 @@ storage::StoredRun ReadRunFile(const std::string& text,
   run.info.run.flow_unit = content.flow_unit;
   run.info.signals = content.signals;
   run.info.has_truth = content.has_truth;
-  std::size_t count = 0;
   for (const SampleSeries& part : table.runs) {
-    count += part.samples.size();
     for (const LabelledSample& labelled : part.samples) {
       const double t_s =
           static_cast<double>(labelled.sample.stamp_ns - table.start_ns) * 1e-9;
@@ -126,7 +121,21 @@ storage::StoredRun ReadRunFile(const std::string& text,
       }
     }
   }
+  return run;
+}
+
+storage::StoredRun ReadRunFile(const std::string& text,
+                               importer::CsvOptions csv) {
+  storage::RunSelector selector = SplitStretch(text);
+  csv.split_gaps = true;
+  const importer::CsvTable table =
+      importer::ReadCsvFile(selector.id, std::move(csv));
+  storage::StoredRun run = RunOf(table, std::move(selector));
   if (run.samples.empty()) {
+    std::size_t count = 0;
+    for (const SampleSeries& part : table.runs) {
+      count += part.samples.size();
+    }
     throw NotFoundError("file " + text + " holds no sample (of " +
                         std::to_string(count) + ")");
   }
@@ -149,22 +158,27 @@ std::vector<storage::StoredRun> LoadRunsAndFiles(
   return loaded;
 }
 
-void ConvertFlow(storage::StoredRun& run, FlowUnit unit, const LogSink& log) {
-  if (run.info.run.flow_unit == unit) {
+void ConvertFlow(storage::StoredRun& run, const simulator::FlowTarget& to,
+                 const LogSink& log) {
+  if (run.info.run.flow_unit == to.unit) {
     return;
   }
-  simulator::FlowConversion conversion(unit);
-  for (storage::StoredSample& stored : run.samples) {
-    conversion.Apply(stored.sample);
+  simulator::FlowConversion conversion(to);
+  try {
+    for (storage::StoredSample& stored : run.samples) {
+      conversion.Apply(stored.sample);
+    }
+  } catch (const DataError& error) {
+    throw DataError("run " + run.info.id + ": " + error.what());
   }
   if (log && (run.info.signals & MaskOf(Signal::kF)) != 0) {
     log(LogLevel::kInfo,
         EventLine("flow_converted",
                   {{"run", run.info.id},
                    {"from", std::string(FlowUnitName(run.info.run.flow_unit))},
-                   {"to", std::string(FlowUnitName(unit))}}));
+                   {"to", std::string(FlowUnitName(to.unit))}}));
   }
-  run.info.run.flow_unit = unit;
+  run.info.run.flow_unit = to.unit;
 }
 
 }  // namespace fdi::trainer

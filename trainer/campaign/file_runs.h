@@ -6,6 +6,7 @@
 
 #include "diagnosis/sample.h"
 #include "import/csv.h"
+#include "simulator/valve_equations.h"
 #include "storage/database/data_directory.h"
 #include "storage/runs/runs.h"
 
@@ -19,6 +20,11 @@ namespace fdi::trainer {
 /// @throws ConfigError if a variable is not set, or nothing matches a `*`.
 std::vector<std::filesystem::path> MatchingFiles(
     const std::string& pattern, const std::filesystem::path& folder);
+
+/// The run of a table, gaps left in it, or the stretch that `selector` names by
+/// seconds from its start; its id is that of the selector.
+storage::StoredRun RunOf(const importer::CsvTable& table,
+                         storage::RunSelector selector);
 
 /// Reads a table as a run, as `fdi-store runs import` does, without storing it;
 /// gaps stay in it. Its name stands for the id.
@@ -36,7 +42,9 @@ std::vector<storage::StoredRun> LoadRunsAndFiles(
     const std::vector<std::string>& runs, const std::vector<std::string>& files,
     const storage::DataDirectory& directory, const importer::CsvOptions& csv);
 
-/// Brings the flow of a run to `unit` by the density of water at T1.
-void ConvertFlow(storage::StoredRun& run, FlowUnit unit, const LogSink& log);
+/// Brings the flow of a run to the unit of its valve.
+/// @throws DataError as FlowConversion, naming the run.
+void ConvertFlow(storage::StoredRun& run, const simulator::FlowTarget& to,
+                 const LogSink& log);
 
 }  // namespace fdi::trainer

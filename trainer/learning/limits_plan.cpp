@@ -16,6 +16,7 @@
 #include "trainer/campaign/file_runs.h"
 #include "trainer/campaign/run_input.h"
 #include "trainer/evaluation.h"
+#include "trainer/scoring/detectors.h"
 
 namespace fdi::trainer {
 namespace {
@@ -139,7 +140,7 @@ class RunReader {
     plan_->episodes_left_out_s += plan_->parent().sample_period_s *
                                   static_cast<double>(all - run.samples.size());
     if (!run.samples.empty()) {
-      ConvertFlow(run, plan_->parent().flow_unit, {});
+      ConvertFlow(run, *EngineDetector(plan_->labels.parent).flow, {});
       AddResiduals(plan_->labels.parent, run, plan_->healthy);
       plan_->runs.push_back(RunName(run));
     }

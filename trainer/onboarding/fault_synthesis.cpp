@@ -122,10 +122,10 @@ std::vector<Sample> FaultSynthesizer::Simulate(
   config.parameters = type_.parameters;
   config.excitation = std::move(excitation);
   config.continuous_inputs = type_.interpolated_command;
-  config.period_s =
+  config.period_s = simulator::SimulatedPeriod(
       inputs.size() > 1
           ? 1e-9 * static_cast<double>(inputs[1].stamp_ns - inputs[0].stamp_ns)
-          : 1.0;
+          : 1.0);
   config.duration_s = config.period_s * static_cast<double>(inputs.size());
   // Only the difference of two simulations is used; the recorded readings have
   // noise and resolution of their own.

@@ -8,6 +8,7 @@
 
 #include "base/error.h"
 #include "diagnosis/fault_catalogue.h"
+#include "simulator/record_fit.h"
 #include "simulator/second_look/valve_physics.h"
 #include "simulator/valve_equations.h"
 #include "trainer/evaluation.h"
@@ -155,6 +156,17 @@ namespace {
 
 constexpr std::uint64_t kSeed = 1;
 
+std::string SignalList(SignalMask signals) {
+  std::string list;
+  for (std::size_t i = 0; i < kSignalCount; ++i) {
+    const auto signal = static_cast<Signal>(i);
+    if ((signals & MaskOf(signal)) != 0) {
+      list += (list.empty() ? "" : ", ") + std::string(SignalName(signal));
+    }
+  }
+  return list.empty() ? "none" : list;
+}
+
 // Keeps the regressors that `signals` has.
 void Restrict(SignalMask signals, std::vector<Regressor>& regressors) {
   std::erase_if(regressors, [&](const Regressor& r) {
@@ -182,17 +194,19 @@ TrainingRun SimulateHealthyRun(const ValveType& type, double duration_s) {
 }
 
 TrainingOptions OnboardingPreset(SignalMask signals) {
-  for (const Signal signal : {Signal::kCv, Signal::kX}) {
-    if ((signals & MaskOf(signal)) == 0) {
-      throw DataError("the valve has no signal " +
-                      std::string(SignalName(signal)) +
-                      ": CV and X are the least that faults show in");
-    }
+  if ((signals & MaskOf(Signal::kCv)) == 0 || (signals & kRodSignals) == 0) {
+    throw DataError("the valve has the signals " + SignalList(signals) +
+                    ": CV, and X or F, are the least that faults show in");
   }
   TrainingOptions options = PresetOptions("extended");
   options.preset = "onboard";
+  // The rules of a channel need what they are chosen by: F has no channel of
+  // its own without X, only the one that predicts it from CV.
   std::erase_if(options.channels, [&](const ChannelPlan& plan) {
-    return (signals & MaskOf(plan.output)) == 0;
+    return (signals & MaskOf(plan.output)) == 0 ||
+           std::ranges::any_of(plan.antecedents, [&](const Regressor& r) {
+             return (signals & MaskOf(r.signal)) == 0;
+           });
   });
   using enum Signal;
   for (ChannelPlan& plan : options.channels) {
@@ -244,7 +258,8 @@ std::vector<TrainingRun> WithoutStops(std::vector<TrainingRun> runs) {
   constexpr double kAfterS = 60.0;
   constexpr double kMaxStopShare = 0.05;
   const auto at_stop = [](const LabelledSample& labelled) {
-    const double x = labelled.sample[Signal::kX];
+    const Sample& sample = labelled.sample;
+    const double x = sample[sample.Has(Signal::kX) ? Signal::kX : Signal::kCv];
     return x <= kStop || x >= 100.0 - kStop;
   };
   double stops = 0.0;
@@ -278,6 +293,7 @@ constexpr double kFitShare = 0.2;
 constexpr double kTrainShare = 0.7;
 
 constexpr std::size_t kMinSamples = 600;
+constexpr int kMinFitRows = 360;  // of slow data
 
 Progress Part(const Progress& progress, double from, double share) {
   return [&progress, from, share](double done, std::string_view stage) {
@@ -347,9 +363,11 @@ std::vector<simulator::HealthyRecord> Records(
     for (const Stretch& stretch : SplitAtGaps(run)) {
       records.emplace_back();
       for (const Sample& sample : stretch.samples) {
+        const bool has_x = sample.Has(Signal::kX);
         records.back().rows.push_back(
-            {InputsOf(sample, levels), sample[Signal::kX], sample[Signal::kF],
-             IsMeasured(sample, Signal::kX), IsMeasured(sample, Signal::kF)});
+            {InputsOf(sample, levels), sample[has_x ? Signal::kX : Signal::kCv],
+             sample[Signal::kF], has_x && IsMeasured(sample, Signal::kX),
+             IsMeasured(sample, Signal::kF)});
       }
     }
   }
@@ -361,6 +379,11 @@ simulator::ValveFit FitType(const std::vector<TrainingRun>& runs,
   simulator::ValveFitOptions fit;
   fit.has_flow = runs.front().samples.front().sample.Has(Signal::kF);
   fit.period_s = runs.front().period_s;
+  // Rows beyond what a valve settles in cost as much each, and tell no more.
+  fit.max_rows = std::max(
+      kMinFitRows,
+      static_cast<int>(fit.max_rows / std::max(1.0, simulator::SimulatedPeriod(
+                                                        fit.period_s))));
   fit.threads =
       options.threads > 0
           ? options.threads
@@ -546,6 +569,30 @@ double Hours(const std::vector<TrainingRun>& runs) {
 
 }  // namespace
 
+namespace {
+
+// Faults act in proportion to the size of a valve, so that a set serves valves
+// of its own size only.
+void RequireOfType(const std::vector<TrainingRun>& runs,
+                   const Onboarding& onboarding) {
+  constexpr double kAlike = 1.25;
+  if (!onboarding.transferred) {
+    throw NotOfType(
+        "the set of the type has other channels or was made for other "
+        "commands, pressures or temperatures");
+  }
+  if ((onboarding.signals & MaskOf(Signal::kF)) == 0) {
+    return;
+  }
+  const double size = simulator::SizeOf(Records(runs, onboarding.type.levels),
+                                        onboarding.type.parameters);
+  if (size > kAlike || size < 1.0 / kAlike) {
+    throw NotOfType("the valve has another size than its type");
+  }
+}
+
+}  // namespace
+
 // What is refused is refused before the work that it would spoil:
 //
 //   RequireHealthy   the record as given, and once more without its stops,
@@ -600,6 +647,9 @@ Onboarding Onboard(const std::vector<TrainingRun>& all,
   const Progress part = Part(progress, kFitShare, kTrainShare);
   result.transferred =
       options.of_type && IsTransferable(*options.of_type, runs, training);
+  if (options.only_of_type) {
+    RequireOfType(runs, result);
+  }
   result.models =
       result.transferred
           ? TransferDifferenceSet(*options.of_type, runs, training, part)

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "base/error.h"
 #include "diagnosis/model_set.h"
 #include "simulator/valve_identification.h"
 #include "trainer/onboarding/fault_synthesis.h"
@@ -71,6 +72,12 @@ TrainingOptions OnboardingPreset(SignalMask signals);
 std::vector<std::string> DropUnreadChannels(
     const std::vector<TrainingRun>& runs, std::vector<ChannelPlan>& channels);
 
+/// The valve is not enough like the one that the type's set was made from.
+class NotOfType : public DataError {
+ public:
+  using DataError::DataError;
+};
+
 struct OnboardingOptions {
   std::string name;  ///< Of the model set.
   ValveType type;    ///< Where the fit starts, or what is taken as it is.
@@ -81,6 +88,8 @@ struct OnboardingOptions {
   /// Set of another valve of the type, which serves this one where it can
   /// (TransferDifferenceSet); none: every fault is simulated.
   std::optional<ModelSet> of_type{};
+  /// Throw NotOfType where `of_type` cannot serve, instead of simulating.
+  bool only_of_type{false};
   std::string software;
   std::int64_t created_ns{0};
 };

@@ -65,10 +65,20 @@ Readings ReadingsOf(const std::vector<TrainingRun>& runs, Signal signal) {
 
 void CheckShare(const Readings& r) {
   if (r.measured() && r.high <= kMaxShare && r.low >= -kMaxShare) {
-    throw DataError(r.Seen() +
-                    ": expected per cent of closing, 0 to 100; if "
-                    "it counts in shares of 1, map it with scale = 100");
+    throw DataError(std::string(SignalName(r.signal)) +
+                    " counts in shares of 1 and not in per cent: " + r.Seen() +
+                    "; expected is per cent of closing, 0 to 100. Map it with "
+                    "scale = 100");
   }
+}
+
+// What a pressure of so little is likeliest in.
+std::string UnitOfPressure(double middle) {
+  return middle <= 0.0  ? "P1 is a gauge pressure and not absolute: "
+         : middle < 3.0 ? "P1 is likely in MPa (or in bar), not in kPa: "
+         : middle < kMinPressure
+             ? "P1 is likely in bar (or in MPa), not in kPa: "
+             : "P1 or T1 is in another unit, or P1 a gauge pressure: ";
 }
 
 void CheckPressures(const Readings& p1, const Readings& p2, const Readings& t1,
@@ -78,7 +88,7 @@ void CheckPressures(const Readings& p1, const Readings& p2, const Readings& t1,
   if (p1.measured() &&
       p1.middle < std::max(kMinPressure, kBoilingShare * vapour)) {
     throw DataError(
-        p1.Seen() +
+        UnitOfPressure(p1.middle) + p1.Seen() +
         (vapour > 0.0 ? ", and " + t1.Seen() +
                             ": the liquid boils there below " + Text(vapour) +
                             " kPa (for a gas or steam, give a --type of that "
@@ -89,9 +99,9 @@ void CheckPressures(const Readings& p1, const Readings& p2, const Readings& t1,
         "-273.15");
   }
   if (p1.measured() && p2.measured() && p1.middle < p2.middle) {
-    throw DataError(p1.Seen() + ", " + p2.Seen() +
-                    ": expected P1 before the valve above P2 behind it; are "
-                    "the two exchanged, or in different units?");
+    throw DataError(
+        "P1 and P2 are exchanged, or in different units: " + p1.Seen() + ", " +
+        p2.Seen() + "; expected is P1 before the valve above P2 behind it");
   }
 }
 
@@ -106,7 +116,47 @@ double Correlation(const Readings& a, const Readings& b) {
          (static_cast<double>(a.values.size()) * a.deviation * b.deviation);
 }
 
+// The strongest correlation of `b` with what `a` was up to three samples
+// before: a rod takes some seconds.
+double LaggedCorrelation(Readings a, Readings b) {
+  constexpr int kLags = 3;
+  double strongest = Correlation(a, b);
+  for (int lag = 1; lag <= kLags && a.values.size() > 1; ++lag) {
+    a.values.pop_back();
+    b.values.erase(b.values.begin());
+    const double lagged = Correlation(a, b);
+    strongest = std::abs(lagged) > std::abs(strongest) ? lagged : strongest;
+  }
+  return strongest;
+}
+
+// Without X: whether F falls while CV closes, and follows it at all.
+void CheckFlowFollows(const Readings& cv, const Readings& f) {
+  if (cv.deviation < kMinVariation || f.values.size() != cv.values.size() ||
+      f.deviation <= 0.0) {
+    return;
+  }
+  const double rises = LaggedCorrelation(cv, f);
+  if (rises > kAgainst) {
+    throw DataError("F rises while CV closes (correlation " + Text(rises) +
+                    "): CV must count in % of closing; if it counts opening, "
+                    "map it with sense = \"opening\"");
+  }
+  if (rises > -kAgainst) {
+    throw DataError(
+        "F does not follow CV (correlation " + Text(rises) +
+        "), and there is no position (X): nothing here shows what the valve "
+        "does. Likeliest: F is not the flow through this valve, or a pressure "
+        "moves it more than the valve does (map P1 and P2), or the valve is "
+        "not healthy. fdi-store audit judges the loop from OP, PV and SP");
+  }
+}
+
 void CheckSense(const Readings& cv, const Readings& x, const Readings& f) {
+  if (!x.measured()) {
+    CheckFlowFollows(cv, f);
+    return;
+  }
   if (std::min(cv.deviation, x.deviation) < kMinVariation) {
     return;
   }
@@ -130,11 +180,18 @@ void CheckSense(const Readings& cv, const Readings& x, const Readings& f) {
 
 // Records that no unit makes right: not of a control valve, or not measured.
 void CheckKind(const std::vector<TrainingRun>& runs, const Readings& cv,
-               const Readings& x) {
-  if (!x.measured()) {
+               const Readings& x, const Readings& f) {
+  if (!x.measured() && !f.measured()) {
     throw DataError(
-        "there is no position (X), which onboarding needs to tell the rod from "
-        "the trim: map the position transmitter as [signal.X]");
+        "there is neither a position (X) nor a flow (F), one of which "
+        "onboarding needs: map the position transmitter as [signal.X] or the "
+        "flow through the valve as [signal.F]. A level or a pressure shows "
+        "neither; fdi-store audit judges such a loop from OP, PV and SP");
+  }
+  if (x.measured() && !runs.front().samples.front().sample.Has(Signal::kX)) {
+    throw DataError("run " + runs.front().id +
+                    " begins without a position (X), which comes later: begin "
+                    "where it is measured, with @from:to");
   }
   const auto at_end = [](double value) { return value < 2.0 || value > 98.0; };
   const auto ends = std::ranges::count_if(cv.values, at_end);
@@ -155,11 +212,24 @@ void CheckKind(const std::vector<TrainingRun>& runs, const Readings& cv,
                   : 0U;
     }
   }
-  if (cv.deviation > kMinVariation && 100 * same > 99 * x.values.size()) {
+  if (x.measured() && cv.deviation > kMinVariation &&
+      100 * same > 99 * x.values.size()) {
     throw DataError(
         "X is a copy of CV: it was not measured, and no fault shows in it. Map "
         "the position transmitter as [signal.X]");
   }
+}
+
+// A cause beside the others, where the command moves much in a sample: what it
+// was meanwhile is not in the record.
+std::string SlowRecord(const std::vector<TrainingRun>& runs) {
+  constexpr double kSlowS = 5.0;
+  const double period_s = runs.front().period_s;
+  return period_s < kSlowS
+             ? std::string()
+             : ". One sample in " + Text(period_s) +
+                   " s may be too slow for a command that moves faster: export "
+                   "every second, or unfiltered values";
 }
 
 // What explains a flow that is not simulated: the flow meter of the type ends
@@ -188,10 +258,11 @@ void CheckRecords(const std::vector<TrainingRun>& runs,
   const Readings x = ReadingsOf(runs, Signal::kX);
   CheckShare(cv);
   CheckShare(x);
-  CheckKind(runs, cv, x);
+  const Readings f = ReadingsOf(runs, Signal::kF);
+  CheckKind(runs, cv, x, f);
   CheckPressures(ReadingsOf(runs, Signal::kP1), ReadingsOf(runs, Signal::kP2),
                  ReadingsOf(runs, Signal::kT1), medium);
-  CheckSense(cv, x, ReadingsOf(runs, Signal::kF));
+  CheckSense(cv, x, f);
 }
 
 void CheckFit(const std::vector<TrainingRun>& runs,
@@ -201,14 +272,19 @@ void CheckFit(const std::vector<TrainingRun>& runs,
   const Readings f = ReadingsOf(runs, Signal::kF);
   const auto refuse = [&](const char* what, double error, double naive,
                           const char* model, const char* unit) {
-    throw DataError(BeyondMeter(runs, f, meter_end) +
-                    "the simulated valve follows the record worse than " +
-                    std::string(model) + " does: " + what + " RMSE " +
-                    Text(error) + " instead of " + Text(naive) + unit +
-                    ". Check units and sense of all columns, and that the "
-                    "record is of a healthy valve in AUTO; for a valve of "
-                    "another kind or size give its parameters, --type "
-                    "FILE.toml");
+    const std::string beyond = BeyondMeter(runs, f, meter_end);
+    throw DataError(
+        (beyond.empty() ? std::string("the unit or sense of a column is wrong, "
+                                      "or the record is not of a healthy valve "
+                                      "in AUTO, or the valve is of another "
+                                      "kind or size than its type: ")
+                        : beyond) +
+        "the simulated valve follows the record worse than " +
+        std::string(model) + " does: " + what + " RMSE " + Text(error) +
+        " instead of " + Text(naive) + unit +
+        ". fdi-store runs sniff shows what each column was taken for; "
+        "--type FILE.toml states another kind or size" +
+        SlowRecord(runs));
   };
   const Readings cv = ReadingsOf(runs, Signal::kCv);
   const Readings x = ReadingsOf(runs, Signal::kX);
@@ -217,8 +293,9 @@ void CheckFit(const std::vector<TrainingRun>& runs,
     squares += (x.values[k] - cv.values[k]) * (x.values[k] - cv.values[k]);
   }
   const double naive =
-      std::sqrt(squares / static_cast<double>(x.values.size()));
-  if (simulation.x_rmse_pct > std::max(kWorse * naive, kMinVariation)) {
+      std::sqrt(squares / std::max(1.0, static_cast<double>(x.values.size())));
+  if (x.measured() &&
+      simulation.x_rmse_pct > std::max(kWorse * naive, kMinVariation)) {
     refuse("X", simulation.x_rmse_pct, naive, "X = CV", " %");
   }
   if (f.measured() &&
@@ -233,11 +310,11 @@ void CheckFit(const std::vector<TrainingRun>& runs,
     if (p.identified && !harmless &&
         (low || p.value >= (1.0 - kAtBound) * p.upper)) {
       throw DataError(
+          "a column is in another unit, or the valve of another kind or size "
+          "than its type (--type FILE.toml gives its parameters): " +
           p.name + " fits best at " + Text(p.value) + ", the " +
           (low ? "lower" : "upper") + " bound of its search (" + Text(p.lower) +
-          " to " + Text(p.upper) + " about " + Text(p.nominal) +
-          "): check the units of all columns; for a valve "
-          "of another kind or size give its parameters, --type FILE.toml");
+          " to " + Text(p.upper) + " about " + Text(p.nominal) + ")");
     }
   }
 }

@@ -1,7 +1,11 @@
 #include "trainer/scoring/detectors.h"
 
+#include <vector>
+
+#include "diagnosis/fault_catalogue.h"
 #include "diagnosis/quality_count.h"
 #include "simulator/second_look/episode_looks.h"
+#include "simulator/second_look/valve_physics.h"
 #include "trainer/campaign/run_input.h"
 #include "trainer/parallel_for.h"
 #include "trainer/scoring/rescore.h"
@@ -48,6 +52,10 @@ class SecondLooks {
     if (const simulator::LookAnswer* answer = looks_->Answer()) {
       if (auto names = simulator::NamesOf(
               *answer, simulator::ObserversName(models_, isolated))) {
+        // A finding that the set does not have, no name can hold.
+        std::erase_if(*names, [this](int fault) {
+          return IsFinding(fault) && FaultIndex(models_, fault) < 0;
+        });
         return names;
       }
     }
@@ -109,7 +117,7 @@ Detector EngineDetector(const std::shared_ptr<const ModelSet>& models) {
           [models](const ScoredRun& run, const VerdictSink& sink) {
             return FollowEngine(models, run, sink);
           },
-          models->flow_unit};
+          simulator::FlowTargetOf(*models)};
 }
 
 EvaluatedRun Evaluate(const Detector& detector, const ScoredRun& run,

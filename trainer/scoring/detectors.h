@@ -30,7 +30,7 @@ struct Detector {
   /// Follows one run; called from several threads at a time. The sink is
   /// called with every verdict of an engine, and never by other detectors.
   std::function<Answer(const ScoredRun&, const VerdictSink&)> follow{};
-  std::optional<FlowUnit> flow_unit{};  ///< That flows are converted to.
+  std::optional<simulator::FlowTarget> flow{};  ///< That it is converted to.
 };
 
 /// The monitor's engine. @throws DataError from `follow` as Rescore().

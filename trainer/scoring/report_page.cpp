@@ -5,7 +5,6 @@
 #include <cmath>
 #include <optional>
 #include <set>
-#include <sstream>
 #include <utility>
 
 #include "diagnosis/fault_catalogue.h"
@@ -147,41 +146,6 @@ std::string BandKey() {
          "closer than pixels, the smallest and the largest are drawn.";
 }
 
-// An SVG document of gnuplot as an element of the page, at a third of its size.
-// Its definitions are those of point shapes, which no picture has, and their
-// ids would occur once per picture. gnuplot opens a group for each change of
-// its pen, so that most groups are empty, and writes attributes that are the
-// defaults of SVG or that the style of the page gives.
-std::string Embedded(const std::string& svg) {
-  std::vector<std::string> kept;
-  std::istringstream lines(svg.substr(svg.find("<svg")));
-  bool defines = false;
-  for (std::string line; std::getline(lines, line);) {
-    line.erase(0, line.find_first_not_of(" \t"));
-    defines = defines || line == "<defs>";
-    if (line == "</g>" && kept.back().starts_with("<g fill=")) {
-      kept.pop_back();
-    } else if (!defines && !line.empty() && !line.starts_with("xmlns:xlink")) {
-      kept.push_back(line);
-    }
-    defines = defines && line != "</defs>";
-  }
-  std::string text;
-  for (const std::string& line : kept) {
-    text += line + '\n';
-  }
-  for (const std::string_view needless :
-       {" stroke-linecap=\"butt\" stroke-linejoin=\"miter\"",
-        " class=\"gridline\"",
-        " font-family=\"DejaVu Sans,Verdana,sans-serif\""}) {
-    for (std::size_t at = text.find(needless); at != std::string::npos;
-         at = text.find(needless, at)) {
-      text.erase(at, needless.size());
-    }
-  }
-  return text;
-}
-
 }  // namespace
 
 // What the engine said in the course of one run, on one time axis.
@@ -270,7 +234,7 @@ class ReportPage::RunPicture {
     std::string svg;
     for (figure.groups = kMaxGroups; figure.groups >= kMinGroups;
          figure.groups = figure.groups * 3 / 4) {
-      svg = Embedded(plot::DrawFigure(figure, plot::Format::kSvg));
+      svg = plot::SvgElement(figure);
       if (svg.size() <= kPictureBytes) {
         break;
       }

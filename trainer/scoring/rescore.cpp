@@ -1,10 +1,12 @@
 #include "trainer/scoring/rescore.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <string>
 
 #include "base/error.h"
+#include "base/usual_period.h"
 #include "diagnosis/valve_engine.h"
 #include "trainer/campaign/run_input.h"
 
@@ -18,7 +20,9 @@ void RequireSuited(const ModelSet& models, const storage::StoredRun& run) {
   const std::string set =
       "model set " + models.name + "@" + std::to_string(models.version);
   const double period_s = run.info.run.period_s;
-  if (std::abs(period_s - models.sample_period_s) >
+  // Recordings of earlier versions have the first step, with its jitter.
+  if (std::min(std::abs(period_s - models.sample_period_s),
+               std::abs(UsualPeriod(period_s) - models.sample_period_s)) >
       1e-6 * models.sample_period_s) {
     throw DataError(what + " has a sample period of " +
                     std::to_string(period_s) + " s, " + set + " was trained " +

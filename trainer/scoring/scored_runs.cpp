@@ -37,28 +37,33 @@ importer::CsvOptions RunSelection::ForFiles(
           .log = context.log};
 }
 
-std::vector<ScoredRun> LoadScoredRuns(const RunSelection& selection,
-                                      SignalMask required,
-                                      std::optional<FlowUnit> flow_unit,
-                                      const report::Context& context) {
+std::vector<ScoredRun> LoadScoredRuns(
+    const RunSelection& selection, SignalMask required,
+    const std::optional<simulator::FlowTarget>& flow,
+    const report::Context& context) {
   if (selection.runs.empty() && selection.files.empty() &&
       selection.campaign.empty()) {
     throw ConfigError(
         "what to score: --runs ID,..., --file FILE.csv or "
         "--campaign FILE.toml");
   }
+  const importer::CsvOptions csv = selection.ForFiles(required, context);
+  if (flow) {
+    importer::CheckGasFlow(csv.map, simulator::MolarMass(flow->medium));
+  }
   std::vector<ScoredRun> runs;
   // The order is part of the contract: files of verdicts are given in it.
   const auto add = [&](storage::StoredRun run, std::string name = "",
                        double horizon_s = 0.0) {
-    ConvertFlow(run, flow_unit.value_or(run.info.run.flow_unit), context.log);
+    ConvertFlow(run,
+                flow.value_or(simulator::FlowTarget{run.info.run.flow_unit}),
+                context.log);
     name = name.empty() ? RunName(run) : std::move(name);
     runs.push_back({std::move(run), std::move(name), horizon_s, runs.size()});
   };
   // Before the campaign stores runs of its own, one of which would be `last`.
   std::vector<storage::StoredRun> given = LoadRunsAndFiles(
-      selection.runs, selection.files, {context.options.data_dir},
-      selection.ForFiles(required, context));
+      selection.runs, selection.files, {context.options.data_dir}, csv);
   if (!selection.campaign.empty()) {
     const std::vector<CampaignRun> validation =
         ValidationRuns(selection.campaign, selection.seed_offset);

@@ -9,6 +9,7 @@
 #include "import/csv.h"
 #include "import/tag_map.h"
 #include "report/program.h"
+#include "simulator/valve_equations.h"
 #include "storage/runs/runs.h"
 
 namespace CLI {
@@ -45,11 +46,11 @@ struct ScoredRun {
 /// What the campaign simulates or imports is stored in runs.db.
 ///
 /// @param required signals that a file must have.
-/// @param flow_unit that flows are converted to; nothing: as they are.
+/// @param flow that flows are converted to; nothing: as they are.
 /// @throws ConfigError if nothing is selected, NotFoundError, DataError.
-std::vector<ScoredRun> LoadScoredRuns(const RunSelection& selection,
-                                      SignalMask required,
-                                      std::optional<FlowUnit> flow_unit,
-                                      const report::Context& context);
+std::vector<ScoredRun> LoadScoredRuns(
+    const RunSelection& selection, SignalMask required,
+    const std::optional<simulator::FlowTarget>& flow,
+    const report::Context& context);
 
 }  // namespace fdi::trainer

@@ -51,6 +51,28 @@ TEST_F(AppPublishTest, AReplayedCsvArrivesInOrderBitForBit) {
   EXPECT_EQ(summary["acknowledged"], true);
 }
 
+TEST_F(AppPublishTest, StampsThatEndNowAreNeverAheadOfTheClock) {
+  const std::string file = MakeCsv("300");
+  for (const std::vector<std::string>& what :
+       std::vector<std::vector<std::string>>{{"run", "--duration", "300"},
+                                             {"replay", "--csv", file}}) {
+    Reader reader(domain_);
+    std::vector<std::string> words = what;
+    words.insert(words.end(), {"--valve", "E", "--speed", "300", "--end-now"});
+    const std::int64_t began_ns = NowNs();
+    Process process(With(words));
+    ASSERT_TRUE(reader.TakeUntilEnded());
+    ASSERT_EQ(process.Wait().code, 0);
+    const std::int64_t last_ns = reader.Samples("E").back().stamp_ns;
+    EXPECT_LE(last_ns, NowNs());
+    EXPECT_GE(last_ns, began_ns - 1'000'000'000);
+  }
+  const Ended refused =
+      RunProgram({"replay", "--csv", "-", "--valve", "E", "--end-now"});
+  EXPECT_EQ(refused.code, 2);
+  EXPECT_THAT(refused.err, HasSubstr("whose end is not known"));
+}
+
 TEST_F(AppPublishTest, AtMaxSpeedASlowReaderLosesNothing) {
   Reader reader(domain_);
   Process process(With(

@@ -1,8 +1,13 @@
 // Runs the built program on a history: list, show, ack, export, doctor, backup.
+#include <algorithm>
+#include <sstream>
+
 #include <gmock/gmock.h>
 
+#include "base/time_text.h"
 #include "storage/database/locks.h"
 #include "storage/runs/run_recorder.h"
+#include "tests/html_check.h"
 #include "tests/programs/store/store_program_fixture.h"
 
 namespace fdi::storage {
@@ -32,10 +37,37 @@ TEST_F(FdiStoreHistoryTest, ListedEpisodesHaveTheColumnsOfTheView) {
           "episode_id", "valve_id", "detected_utc", "isolated_utc",
           "cleared_utc", "fault", "peak_factor", "model_set", "end_reason",
           "label", "acked_by", "strength", "worst_strength", "severity",
-          "priority", "unconfirmed_utc", "certainty"));
+          "priority", "unconfirmed_utc", "certainty", "fault_name", "acked_utc",
+          "ack_comment", "alarm_state", "shelved_until_utc"));
+  EXPECT_EQ(episode["fault_name"], "Flashing or critical flow");
   EXPECT_EQ(episode["fault"], "f7");
   EXPECT_EQ(episode["detected_utc"], "2026-11-20T14:56:11.000Z");
   EXPECT_TRUE(episode["cleared_utc"].is_null());
+}
+
+// Whatever the ids and names.
+TEST_F(FdiStoreHistoryTest, TheListFitsAHundredColumns) {
+  {
+    HistoryWriter writer(path_);
+    for (const char* valve : {"UNIT-300/AREA-2/FV-10123A", "LV-2"}) {
+      RecordEpisode(writer, 0b111, valve);
+    }
+  }
+  std::istringstream list(Store("history list").out);
+  std::string all;
+  for (std::string line; std::getline(list, line);) {
+    all += line + '\n';
+    if (line.find("too narrow") == std::string::npos) {
+      EXPECT_LE(std::ranges::count_if(
+                    line, [](char c) { return (c & '\xC0') != '\x80'; }),
+                100)
+          << line;
+    }
+  }
+  for (const char* shown : {"UNIT-300/AREA-2/FV-10123A", "f1|f7|f19", "UNACK",
+                            "2026-11-20 ", "Flashing"}) {
+    EXPECT_THAT(all, HasSubstr(shown));
+  }
 }
 
 TEST_F(FdiStoreHistoryTest, FiltersReachTheQuery) {
@@ -59,7 +91,16 @@ TEST_F(FdiStoreHistoryTest, AcknowledgedAndLabelledEpisodeSaysSo) {
 
   const json shown = StoreJson("history show last");
   EXPECT_EQ(shown["acked_by"], "anna");
+  EXPECT_EQ(shown["ack_comment"], "seat worn");
   EXPECT_EQ(shown["label"], "f1");
+  const std::string csv = Store("history list --csv").out;
+  EXPECT_THAT(csv, HasSubstr("unconfirmed_utc,fault_name,acked_utc,"
+                             "ack_comment,alarm_state,shelved_until_utc\n"));
+  EXPECT_THAT(csv, testing::ContainsRegex("Flashing or critical flow,20[0-9TZ:"
+                                          ".-]+,seat worn,ACKED,\n"));
+  EXPECT_THAT(Store("history show last").out,
+              testing::ContainsRegex("acknowledged: +by anna at 20.+: seat "
+                                     "worn\n"));
   EXPECT_EQ(shown["events"].back()["kind"], "LABEL");
   EXPECT_EQ(shown["trace_instants"], 100);
   {
@@ -327,13 +368,41 @@ TEST_F(FdiStoreHistoryTest, PlotIsAPictureOrAClearError) {
   EXPECT_THAT(Slurp(directory_.path() / "a.svg"), HasSubstr("isolated f7"));
 }
 
+TEST_F(FdiStoreHistoryTest, PageOfAnEpisodeHasStoryChecksAndBlanks) {
+  EXPECT_EQ(Store("history ack last --by '<b>anna' --comment '</table>&'").code,
+            0);
+  EXPECT_EQ(Store("history label last false --by jan").code, 0);
+  const std::string id = EpisodeIdText(Id());
+  ASSERT_EQ(Store("history report last --utc").code, 0);
+  const std::string html = Slurp(directory_.path() / (id + ".html"));
+  for (const char* part :
+       {"<title>LV-1: ", "Detected: the readings no longer agree", "Named ",
+        " (f7), strength 0.50", "<td class=\"number\">20 s</td>",
+        "&lt;b&gt;anna acknowledged it", "&lt;/table&gt;&amp;",
+        "jan labelled it: no fault", "What to check", "<ul class=\"checks\">",
+        "As found", "fdi-store history label ", "@page{size:A4;"}) {
+    EXPECT_THAT(html, HasSubstr(part));
+  }
+  EXPECT_THAT(MalformedTags(html), testing::IsEmpty());
+  const bool drawn = std::system("gnuplot --version >/dev/null 2>&1") == 0;
+  EXPECT_EQ(html.find("<svg") != std::string::npos, drawn);
+  // Without gnuplot the page says so.
+  EXPECT_EQ(Store("history report last -o -", "PATH=/nowhere").code, 0);
+  EXPECT_THAT(Slurp(directory_.path() / "out.txt"),
+              HasSubstr("gnuplot is not installed"));
+
+  EXPECT_EQ(Store("history report 77").code, 5);
+  EXPECT_EQ(Store("history report").code, 2);
+  EXPECT_EQ(Store("history report last -o no/such/page.html").code, 3);
+}
+
 TEST_F(FdiStoreHistoryTest, DoctorFindsASoundDirectorySound) {
   const json report = StoreJson("doctor");
 
   EXPECT_EQ(report["sound"], true);
   ASSERT_EQ(report["databases"].size(), 3U);
   EXPECT_EQ(report["databases"][0]["present"], false);
-  EXPECT_EQ(report["databases"][2]["version"], 11);
+  EXPECT_EQ(report["databases"][2]["version"], 12);
   EXPECT_EQ(report["databases"][2]["figures"]["open_episodes"], 1);
   EXPECT_EQ(report["databases"][2]["figures"]["unsent_events"], 2);
 }
@@ -406,11 +475,40 @@ TEST_F(FdiStoreHistoryTest, PruneTellsWhatWentAndNeedsALimit) {
 
   const json dry = StoreJson("prune --history-age 0s --dry-run");
   EXPECT_EQ(dry["dry_run"], true);
-  const json done = StoreJson("prune --history-age 0s --history-size 1B");
+  const json done =
+      StoreJson("prune --history-age 0s --history-size 1B --trust-clock");
   EXPECT_EQ(done["databases"][0]["name"], "history.db");
   EXPECT_EQ(done["databases"][0]["deleted"], 0);
   EXPECT_EQ(done["databases"][0]["protected"], 1);
   EXPECT_EQ(done["databases"][0]["fits"], false);
+}
+
+// The clock stands years ahead, so everything looks old.
+TEST_F(FdiStoreHistoryTest, PruneRefusesAClockThatIsFarFromTheNewestRecord) {
+  const std::int64_t year_ns = 365 * 86'400 * kSecond;
+  {
+    HistoryWriter writer(path_);
+    writer.BeginSession(NowNs() - year_ns, "test", "");
+    writer.EndSession(NowNs() - year_ns, true);
+    Database history(path_, HistorySchema(), Access::kOccasionalWriter);
+    Transaction transaction(history);
+    history.Run("UPDATE monitor_session SET start_ns = ?1, alive_ns = ?1",
+                NowNs() - year_ns);
+    history.Run("DROP TRIGGER episode_event_keeps");
+    history.Run("UPDATE episode_event SET recorded_ns = ?1", NowNs() - year_ns);
+    transaction.Commit();
+  }
+  const Outcome refused = Store("prune --history-age 30d");
+  EXPECT_EQ(refused.code, 3);
+  EXPECT_THAT(refused.err, HasSubstr("nothing is deleted, because the clock"));
+  EXPECT_EQ(Store("prune --history-age 30d --dry-run").code, 0);
+  EXPECT_EQ(Store("prune --history-age 30d --trust-clock").code, 0);
+  {
+    HistoryWriter writer(path_);
+    writer.BeginSession(NowNs(), "test", "");
+    writer.EndSession(NowNs(), true);
+  }
+  EXPECT_EQ(Store("prune --history-age 30d").code, 0);
 }
 
 TEST_F(FdiStoreHistoryTest, BackupIsACompleteCopyAndNeverOverwrites) {

@@ -1,6 +1,10 @@
 // What a planner asks fdi-store.
+#include <algorithm>
+#include <cmath>
+
 #include <gmock/gmock.h>
 
+#include "tests/html_check.h"
 #include "tests/programs/store/store_program_fixture.h"
 
 namespace fdi::storage {
@@ -53,12 +57,111 @@ TEST_F(FdiStorePlannerTest, HealthIsShownByDayByHourAndAsCsv) {
               HasSubstr("hour_utc,epoch,model_hash"));
 }
 
+TEST_F(FdiStorePlannerTest, StatusIsThatOfTheGravestFigureBeyondItsLimit) {
+  {
+    HistoryWriter writer(path_);
+    HealthHour hour;
+    hour.valve_id = "V2";
+    hour.hour = 24 * 20'000;
+    hour.seen_ms = 3'600'000;
+    hour.counts.auto_ms = 1'800'000;
+    hour.counts.limit_ms = 360'000;
+    hour.counts.turns = 2;
+    hour.counts.dead_band = 2'400;
+    Checkpoint checkpoint;
+    checkpoint.health = {hour};
+    hour.hour += 24;
+    hour.counts = {};
+    checkpoint.health.push_back(hour);
+    writer.CommitCheckpoint(checkpoint);
+  }
+  const json days =
+      StoreJson("health show --valve V2 --since 1970-01-01")["hours"];
+  ASSERT_EQ(days.size(), 2u);
+  EXPECT_EQ(days[0]["dead_band"], 1.2);
+  EXPECT_EQ(days[0]["at_limit"], 10.0);
+  EXPECT_EQ(days[0]["auto_h"], 0.5);
+  EXPECT_TRUE(days[0]["t63"].is_null());
+  EXPECT_EQ(days[0]["exceeded"], json({"at_limit", "dead_band"}));
+  EXPECT_EQ(days[0]["status"], "out of specification");
+  EXPECT_EQ(days[1]["status"], "good");
+  EXPECT_THAT(Store("health show --valve V2 --since 1970-01-01").out,
+              HasSubstr("out of specification: at_limit, dead_band"));
+}
+
 TEST_F(FdiStorePlannerTest, WorkListAndCausesOfAnEmptyHistoryAreEmpty) {
   { const HistoryWriter writer(path_); }
   EXPECT_TRUE(StoreJson("worklist")["rows"].empty());
   EXPECT_TRUE(StoreJson("history causes")["causes"].empty());
   EXPECT_EQ(Store("worklist").out, "Nothing to do.\n");
   EXPECT_EQ(Store("worklist --discipline plumber").code, 2);
+}
+
+// A day of which 20 h were judged, and a fault.
+TEST_F(FdiStorePlannerTest, ReportIsWrittenAndCompared) {
+  {
+    HistoryWriter writer(path_);
+    CoverageDay day{"LV-1", kDetected / (86'400 * kSecond), 1.0, {}};
+    day.samples.Add(Quality::kLive, 72'000);
+    Checkpoint checkpoint;
+    checkpoint.coverage = {day};
+    writer.CommitCheckpoint(checkpoint);
+  }
+  const std::string since = "report --since 2026-11-01 --utc";
+  EXPECT_EQ(Store(since + " --output out").code, 0);
+  const json first = json::parse(Slurp(directory_.path() / "out/report.json"));
+  EXPECT_EQ(first["coverage"]["named_faults"], 1);
+  EXPECT_TRUE(first["changes"].is_null());
+  {
+    HistoryWriter writer(path_);
+    RecordEpisode(writer, 0b100);
+  }
+  const json second = StoreJson(since + " --output out");
+  EXPECT_EQ(second["changes"]["last_utc"], first["made_utc"]);
+  EXPECT_EQ(second["changes"]["loops"][0]["change"], "new");
+  EXPECT_EQ(json::parse(Slurp(directory_.path() / "out/report.json")), second);
+  const std::string html = Slurp(directory_.path() / "out/report.html");
+  EXPECT_THAT(html, HasSubstr("Flow transmitter wrong (f19)"));
+  EXPECT_THAT(MalformedTags(html), testing::IsEmpty());
+  EXPECT_THAT(Store(since + " --csv").out, HasSubstr("\n1,LV-1,f19,"));
+}
+
+TEST_F(FdiStorePlannerTest, ReportRefusesWhatItCannotUse) {
+  EXPECT_EQ(Store("report").code, 3);  // There is nothing at all.
+  { const HistoryWriter writer(path_); }
+  EXPECT_EQ(Store("report").code, 0);
+  EXPECT_EQ(Store("report --since 2100-01-01").code, 2);
+  EXPECT_EQ(Store("report --since soon").code, 2);
+  EXPECT_EQ(Store("report --top 0").code, 2);
+  EXPECT_EQ(Store("report --output no/such/folder").code, 3);
+  std::filesystem::create_directory(directory_.path() / "out");
+  Write("out/report.json", "[1]");
+  const Outcome foreign = Store("report --output out");
+  EXPECT_EQ(foreign.code, 3);
+  EXPECT_THAT(foreign.err, HasSubstr("report.json is no report"));
+  EXPECT_EQ(Slurp(directory_.path() / "out/report.json"), "[1]");
+}
+
+// A sticky loop without a model set or a history: X follows CV through a play.
+TEST_F(FdiStorePlannerTest, ReportAuditsStoredRuns) {
+  std::string rows = header_;
+  double x = 50.0;
+  for (int t = 0; t < 900; ++t) {
+    const double cv = 50.0 + 4.0 * std::sin(0.05 * t);
+    x = std::min(std::max(x, cv - 1.5), cv + 1.5);
+    rows += std::to_string(t) + ',' + std::to_string(cv) + ",3500,2600,130," +
+            std::to_string(x) + ',' + std::to_string(30.0 - 0.2 * x) + '\n';
+  }
+  Write("a.csv", rows);
+  ASSERT_EQ(Store("runs import a.csv --valve FV-1").code, 0);
+  const json report = StoreJson("report --since 2000-01-01");
+  EXPECT_EQ(report["coverage"]["audit"], 1);
+  ASSERT_EQ(report["worst"].size(), 1u) << report.dump(1);
+  EXPECT_EQ(report["worst"][0]["fault"], "stiction");
+  EXPECT_EQ(
+      StoreJson(
+          "report --since 2000-01-01 --audit-windows 0")["coverage"]["audit"],
+      0);
 }
 
 }  // namespace

@@ -18,6 +18,7 @@ using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
+using testing::Not;
 
 TEST_F(FdiStoreTest, ImportedRunIsListedAndExportedAsItWas) {
   Write("a.csv", header_ + Rows(5));
@@ -145,6 +146,20 @@ TEST_F(FdiStoreTest, TheMapOfSniffTakesNamesOfSeveralLines) {
   const json imported = StoreJson(
       "runs import lines.csv --valve V1 --map lines.toml --signals CV,F");
   EXPECT_EQ(imported["samples"], 30);
+}
+
+TEST_F(FdiStoreTest, AFileThatIsImportedAgainIsSaidToBe) {
+  Write("a.csv", header_ + Rows(5));
+  const std::string import =
+      "runs import a.csv --start 2026-11-20T00:00:00Z --valve ";
+  EXPECT_THAT(Store(import + "LV-1").err, Not(HasSubstr("import_repeated")));
+  EXPECT_THAT(Store(import + "LV-2").err, Not(HasSubstr("import_repeated")));
+  const std::string first =
+      StoreJson("runs list --valve LV-1")["runs"][0]["run_id"];
+
+  const Outcome again = Store(import + "LV-1");
+  EXPECT_EQ(again.code, 0);
+  EXPECT_THAT(again.err, HasSubstr("same_as=" + first));
 }
 
 TEST_F(FdiStoreTest, AValveThatNoSampleCanHaveIsRefused) {

@@ -334,16 +334,26 @@ TEST_F(JsonDocumentsTest, ProgramsAndPageHaveTheSameKeys) {
   Printed(page, "valves add", "'PV-*' --type globe");
   Printed(page, "valves event", "LV-1 --kind repacked");
   Printed(page, "valves assign", "LV-1 pump@2");
+  Write("plant.csv", "name,op,pv,group\nFIC1,OP,PV,a\nFIC2,OP,PV,a\n,OP,,\n");
+  Printed(page, "valves add --plant", "plant.csv");
+  std::filesystem::create_directory(directory_.path() / "DIR");
+  ModelStore(directory_.path() / "DIR" / "models.db",
+             Access::kOccasionalWriter);
+  Printed(page, "models import DIR");
   Printed(page, "valves list");
   Printed(page, "valves show", "LV-1");
   Printed(page, "valves move", "LV-1 --to moved");
   Printed(page, "valves remove", "'PV-*'");
   Printed(page, "history shelve", "LV-1 --for 1h --comment ordered");
   Printed(page, "history shelf");
+  if (FDI_PLANNER) {
+    Printed(page, "report", "--since 2020-01-01 --output weekly");
+  }
   Printed(page, "history list");
   Printed(page, "history ack", "last");
   Printed(page, "history label", "last f7 --comment seen");
   Printed(page, "history show", "last");
+  Printed(page, "history report", "last -o page.html");
   Printed(page, "history stats");
   Printed(page, "history causes");
   Printed(page, "history shadow");
@@ -353,9 +363,12 @@ TEST_F(JsonDocumentsTest, ProgramsAndPageHaveTheSameKeys) {
     Printed(page, "health show", "--valve LV-1");
     Printed(page, "health trend", "--valve LV-1 --limit X=3");
     Printed(page, "worklist", "--since 2020-01-01 --limit X=0.01");
+    // A valve that nothing judges, and one that is shelved no longer.
+    Printed(page, "valves add", "NV-9");
+    Printed(page, "report", "--since 2020-01-01 --output weekly");
   } else {
     called_.insert({"fdi-store health show", "fdi-store health trend",
-                    "fdi-store worklist"});
+                    "fdi-store worklist", "fdi-store report"});
   }
   Printed(page, "keys init", "keys");
   Printed(page, "keys add", "keys monitor-1 --role monitor");

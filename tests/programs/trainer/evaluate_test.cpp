@@ -99,7 +99,7 @@ std::string LineOf(const std::string& run, const Verdict& v) {
   char text[600];
   std::snprintf(
       text, sizeof text,
-      "%s,%lld,%llu,%llu,%s,%d,%s,%s,%a,%a,%a,%a,%a,%a,%a,%a,%a,%s,%a,%a",
+      "%s,%lld,%llu,%llu,%s,%d,%s,%s,%a,%a,%a,%a,%a,%a,%a,%a,%a,%a,%s,%a,%a",
       run.c_str(), static_cast<long long>(v.stamp_ns),
       static_cast<unsigned long long>(v.source_id),
       static_cast<unsigned long long>(v.seq),
@@ -108,8 +108,8 @@ std::string LineOf(const std::string& run, const Verdict& v) {
       std::string(StateName(v.state)).c_str(), v.residuals[0], v.residuals[1],
       v.normal_factor, v.fault_factors[0], v.fault_factors[1],
       v.fault_factors[2], v.fault_factors[3], v.fault_factors[4],
-      v.fault_factors[5], v.isolated != 0 ? "f19" : "", v.observer_factors[0],
-      v.observer_factors[1]);
+      v.fault_factors[5], v.fault_factors[6], v.isolated != 0 ? "f19" : "",
+      v.observer_factors[0], v.observer_factors[1]);
   return text;
 }
 
@@ -167,7 +167,7 @@ TEST_F(AppEvaluateTest, RescoringARecordedRunRepeatsTheLiveVectorsBitForBit) {
   EXPECT_EQ(lines[0],
             "run,stamp_ns,source_id,seq,intake,initialised,quality,state,r_X,"
             "r_F,d_0,d_f19,d_travel_deviation,d_shut_flow,d_excess_flow,"
-            "d_x_stuck,d_f_stuck,isolated,o_normal,o_f19 0.50");
+            "d_x_stuck,d_f_stuck,d_low_flow,isolated,o_normal,o_f19 0.50");
   for (std::size_t k = 0; k < expected.size(); ++k) {
     ASSERT_EQ(lines[k + 1], expected[k]) << "sample " << k;
   }

@@ -326,8 +326,11 @@ TEST_F(AppTrainTest, InterruptedTrainingLeavesNoModelSet) {
 
   AwaitText(log, "train:");
   kill(child, SIGINT);
+  const auto begin = std::chrono::steady_clock::now();
   int status = 0;
   ASSERT_EQ(waitpid(child, &status, 0), child);
+  EXPECT_LT(std::chrono::steady_clock::now() - begin,
+            std::chrono::milliseconds(1500));
   posix_spawn_file_actions_destroy(&actions);
 
   EXPECT_TRUE(WIFEXITED(status));

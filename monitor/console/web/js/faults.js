@@ -158,7 +158,8 @@ export const markWord = (kind) =>
 
 /** What gave a fault its name, where that is not the observers. */
 export const layerText = (layer) =>
-  layer === 'physics' ? 'named by simulation of the valve' : '';
+  layer === 'physics' ? 'named by simulation of the valve' :
+    layer === 'audit' ? 'named by the audit of the loop' : '';
 
 // Signs of alarms: shape, number and text say what the colour says.
 const kShapes = {

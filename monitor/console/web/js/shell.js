@@ -1,6 +1,7 @@
 // What stands above every view: where one is, how many alarms, whether the data
 // are fresh, the clock.
 
+import {notes} from './api.js';
 import {button, h, replace, setText} from './dom.js';
 import {faultTitle, groups, groupOf, priorityNames, priorityOf, prioritySign}
   from './faults.js';
@@ -16,6 +17,7 @@ const kEntries = [
   {name: 'alarms', text: 'Alarms', key: '2'},
   {name: 'history', text: 'History', key: '3'},
   {name: 'worklist', text: 'Work list', key: '4'},
+  {name: 'report', text: 'Report', key: '5'},
 ];
 const kPauseMs = 1000;  // In which new alarms are counted, not named.
 const kGraceMs = 2000;  // A change of view reconnects; that is no news.
@@ -58,6 +60,8 @@ function bannerText() {
 
 function historyText() {
   const away = store.status?.plant?.history_away;
+  const [note] = notes.values();
+  if (!away && note) return `The plant's history: ${note}. All else is shown.`;
   return away ? `The plant's history is not there since ` +
       `${timeText(away.since_ms)} (${away.reason}). The valves are live; ` +
       'episodes come back by themselves.' : '';

@@ -3,6 +3,7 @@
 const kWidth = 96;
 const kHeight = 22;
 const kCapacity = 60;
+const kWordHeight = 9;  // Above the line.
 
 export function drawSparkline(canvas, values, color) {
   const ratio = Math.min(2, devicePixelRatio || 1);
@@ -23,7 +24,8 @@ export function drawSparkline(canvas, values, color) {
     if (value === null) {
       down = false;
     } else {
-      const y = kHeight - 1.5 - (kHeight - 3) * Math.min(1, Math.max(0, value));
+      const y = kHeight - 1.5 - (kHeight - kWordHeight - 3) *
+        Math.min(1, Math.max(0, value));
       if (down) context.lineTo(x, y);
       else context.moveTo(x, y);
       down = true;

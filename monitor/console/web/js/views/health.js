@@ -1,5 +1,6 @@
-// Months of a valve, a point a day: residuals, normality, travel, hours in
-// alarm, and how long until a limit where a trend is significant.
+// Months of a valve, a point a day: residuals, normality, travel, dead band,
+// hours in alarm, what was counted on the last day, and how long until a limit
+// where a trend is significant.
 
 import {getOptional, path} from '../api.js';
 import {PanelStack} from '../charts/panel.js';
@@ -27,12 +28,19 @@ function panelsOf(health) {
     lines: [{column: 'travel_strokes', label: 'travel', unit: 'strokes',
       color: '--s2'}, {column: 'alarm_h', label: 'in alarm', unit: 'h',
       color: '--s3', scale: 'right'}],
+  }, {
+    key: 'band', title: 'Dead band and dynamic error band [%], mean of the day',
+    height: 90, points: true,
+    lines: [{column: 'dead_band', label: 'dead band', unit: '%',
+      color: '--s4'}, {column: 'error_band', label: 'error band', unit: '%',
+      color: '--s5', dash: [6, 3]}],
   }];
 }
 
 function tableOf(health) {
   const table = {t: health.t_ms, d0: health.d0, alarm_h: health.alarm_h,
-    travel_strokes: health.travel_strokes};
+    travel_strokes: health.travel_strokes, dead_band: health.dead_band,
+    error_band: health.error_band};
   health.channels.forEach(({mean, rms}, c) => {
     table[`mean${c}`] = mean;
     table[`rms${c}`] = rms;
@@ -42,6 +50,30 @@ function tableOf(health) {
 
 const withUnit = (value, {unit}) => value === null ? '–' :
   `${numberText(value)} ${unitText(unit)}`;
+
+// What was counted: column of the answer, words, unit.
+const kCounts = [
+  ['travel_strokes', 'Travel', 'strokes'], ['reversals', 'Reversals', ''],
+  ['auto_h', 'In AUTO', 'h'], ['shut_h', 'Shut', 'h'], ['open_h', 'Open', 'h'],
+  ['at_limit', 'CV at an end', '%'], ['slip_jumps', 'Slip jumps', ''],
+  ['slip_jump', 'Mean slip jump', '%'], ['dead_band', 'Dead band', '%'],
+  ['error_band', 'Dynamic error band', '%'], ['delay', 'Dead time', 's'],
+  ['t63', 'T63', 's'], ['t86', 'T86', 's'], ['overshoot', 'Overshoot', '%'],
+  ['travel_gain', 'Travel gain', ''],
+];
+
+function countsOf(health) {
+  const last = health.t_ms.length - 1;
+  return kCounts.map(([key, text, unit]) => ({text, unit,
+    value: health[key][last], exceeded: health.exceeded[last].includes(key)}))
+      .filter(({value}) => value !== null);
+}
+
+const kCountColumns = [
+  {text: 'Count', header: true, cell: (row) => row.text},
+  {text: 'Value', cell: (row) => `${numberText(row.value)} ${row.unit}`},
+  {text: 'Limit', cell: (row) => row.exceeded ? 'exceeded' : ''},
+];
 
 const kTrendColumns = [
   {text: 'Limit', header: true, cell: (row) => row.limit.replace('=', ' = ')},
@@ -72,7 +104,11 @@ export class HealthSection {
       return;  // The rest of the page says what is wrong.
     }
     if (health === null || health.t_ms.length === 0 || this.#gone) return;
-    this.element.append(h('h2', {}, 'Months'),
+    this.element.append(
+        h('h2', {}, `Counts of the last ${health.step}`),
+        h('p', {}, `Status (NAMUR NE 107): ${health.status.at(-1)}`),
+        dataTable('Counts', kCountColumns, countsOf(health)),
+        h('h2', {}, 'Months'),
         dataTable('Trends to limits', kTrendColumns, health.trends));
     if (health.t_ms.length < kMinDays) {
       this.element.append(h('p', {class: 'hint'},

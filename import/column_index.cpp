@@ -1,0 +1,302 @@
+#include "import/column_index.h"
+
+#include <algorithm>
+#include <cstring>
+#include <optional>
+#include <utility>
+
+#include "base/csv_cells.h"
+#include "base/error.h"
+#include "import/layout.h"
+#include "import/quality.h"
+
+namespace fdi::importer {
+namespace {
+
+// Lines that show the form of a table; see kSampleRows of layout.cpp. What all
+// rows have to show (decimal sign, order of dates) is found for each loop.
+constexpr std::size_t kHeadLines = 80;
+
+std::string_view FirstLines(std::string_view text, std::size_t count) {
+  std::size_t end = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::size_t line_break = text.find('\n', end);
+    if (line_break == std::string_view::npos) {
+      return text;
+    }
+    end = line_break + 1;
+  }
+  return text.substr(0, end);
+}
+
+// Whether a record that ends with `line` goes on, because a quote that began a
+// cell is open.
+bool EndsInQuote(std::string_view line, char separator) {
+  bool quoted = false;
+  bool at_begin = true;
+  for (const char c : line) {
+    if (c == '"' && (at_begin || quoted)) {
+      quoted = !quoted;
+      at_begin = !quoted;  // The second of a doubled quote reopens it.
+    } else if (!quoted) {
+      at_begin = c == separator || (at_begin && c == ' ');
+    }
+  }
+  return quoted;
+}
+
+// A long table of many tags does not show in its first lines that the tags
+// repeat; its header does.
+std::optional<LongTable> LongByNames(const std::vector<std::string>& names) {
+  LongTable table;
+  bool has_tag = false;
+  bool has_value = false;
+  for (const std::string& name : names) {
+    const std::string plain = PlainText(name);
+    if (!has_tag && (plain == "tag" || plain == "tagname" ||
+                     plain == "tag_name" || plain == "point")) {
+      table.tag = name;
+      has_tag = true;
+    } else if (!has_value && (plain == "value" || plain == "wert")) {
+      table.value = name;
+      has_value = true;
+    }
+  }
+  return has_tag && has_value && names.size() <= 8 ? std::optional(table)
+                                                   : std::nullopt;
+}
+
+std::string_view Trimmed(std::string_view cell) {
+  const std::size_t first = cell.find_first_not_of(" \t\r");
+  if (first == std::string_view::npos) {
+    return {};
+  }
+  cell = cell.substr(first, cell.find_last_not_of(" \t\r") + 1 - first);
+  return cell.size() > 1 && cell.front() == '"' && cell.back() == '"'
+             ? cell.substr(1, cell.size() - 2)
+             : cell;
+}
+
+}  // namespace
+
+ColumnIndex::ColumnIndex(const std::filesystem::path& path,
+                         const ColumnMap& map, std::size_t max_lines)
+    : source_(path.string()), text_(ReadTextFile(path)) {
+  if (max_lines > 0) {
+    text_.resize(FirstLines(text_, max_lines).size());
+    text_.shrink_to_fit();
+  }
+  FindForm(map);
+  IndexRows();
+}
+
+void ColumnIndex::FindForm(const ColumnMap& map) {
+  const Layout layout =
+      FindLayout(LinesOf(FirstLines(text_, kHeadLines)), map, source_, true);
+  names_ = layout.names;
+  if (names_.empty()) {
+    throw DataError(source_ + ": no header with rows below it");
+  }
+  form_ = map;
+  form_.columns.clear();
+  form_.separator = layout.map.separator;
+  form_.skip = layout.map.skip;
+  form_.header_rows = layout.map.header_rows;
+  form_.time_column = layout.map.time_column;
+  if (form_.time_column.empty()) {
+    form_.time_column = kTimeColumn;  // Which FindLayout() need not say.
+  }
+  form_.clock_column = layout.map.clock_column;
+  form_.long_table = layout.map.long_table;
+  if (!form_.long_table) {
+    form_.long_table = LongByNames(names_);
+  }
+  form_.quality_of = layout.map.quality_of;
+  if (form_.long_table) {
+    return;
+  }
+  for (const std::string& name : names_) {
+    const bool quality = std::ranges::any_of(
+        form_.quality_of,
+        [&](const auto& entry) { return entry.second == name; });
+    if (!quality && !SameName(name, form_.time_column) &&
+        !SameName(name, form_.clock_column)) {
+      tags_.push_back(name);
+    }
+  }
+}
+
+// Quotes are those of CsvCells: at the begin of a cell only, doubled inside.
+void ColumnIndex::IndexRows() {
+  std::size_t line = 1;
+  for (std::size_t begin = 0; begin < text_.size();) {
+    const std::size_t first_line = line++;
+    std::size_t end = std::min(text_.find('\n', begin), text_.size());
+    if (std::memchr(text_.data() + begin, '"', end - begin) != nullptr) {
+      const auto record = [&] {
+        return std::string_view(text_).substr(begin, end - begin);
+      };
+      while (end < text_.size() && EndsInQuote(record(), form_.separator)) {
+        end = std::min(text_.find('\n', end + 1), text_.size());
+        ++line;
+      }
+    }
+    TakeRecord(begin, end, first_line);
+    begin = end + 1;
+  }
+  if (form_.long_table) {
+    for (const auto& [tag, rows] : rows_of_tag_) {
+      tags_.push_back(tag);
+    }
+    std::ranges::sort(tags_);
+  }
+}
+
+void ColumnIndex::TakeRecord(std::size_t begin, std::size_t end,
+                             std::size_t line) {
+  const std::string_view record(text_.data() + begin, end - begin);
+  if (record.starts_with('#') || record.starts_with("sep=") ||
+      record.find_first_not_of(" \t\r") == std::string_view::npos) {
+    return;
+  }
+  Row row{begin, record.size(), cells_.size(), 0, line};
+  bool quoted = false;
+  bool at_begin = true;
+  cells_.push_back(0);
+  const std::size_t tag = form_.long_table ? ColumnOf(form_.long_table->tag)
+                                           : std::string_view::npos;
+  for (std::size_t i = 0; i < record.size(); ++i) {
+    const char c = record[i];
+    if (c == '"' && (at_begin || quoted)) {
+      quoted = !quoted;
+      at_begin = !quoted;
+    } else if (c == form_.separator && !quoted) {
+      cells_.push_back(static_cast<std::uint32_t>(i + 1));
+      at_begin = true;
+    } else if (c != ' ' && !quoted) {
+      at_begin = false;
+    }
+  }
+  row.count = cells_.size() - row.first_cell;
+  const auto header_end = static_cast<std::size_t>(form_.skip) +
+                          static_cast<std::size_t>(form_.header_rows);
+  if (form_.long_table) {
+    if (tag < row.count && line > header_end) {
+      rows_of_tag_[std::string(Trimmed(CellAt(row, tag)))].push_back(
+          rows_.size());
+    }
+    cells_.resize(row.first_cell);  // Whole rows are kept.
+  }
+  rows_.push_back(row);
+}
+
+std::string_view ColumnIndex::CellAt(const Row& row, std::size_t cell) const {
+  const std::size_t begin = cells_[row.first_cell + cell];
+  const std::size_t end =
+      cell + 1 < row.count ? cells_[row.first_cell + cell + 1] - 1 : row.length;
+  std::string_view text(text_.data() + row.begin + begin, end - begin);
+  if (text.ends_with('\r')) {
+    text.remove_suffix(1);
+  }
+  return text;
+}
+
+std::size_t ColumnIndex::ColumnOf(std::string_view name) const {
+  const auto same = [&](const std::string& other) {
+    return SameName(other, name);
+  };
+  const auto found = std::ranges::find(names_, name);
+  return static_cast<std::size_t>(
+      (found != names_.end() ? found : std::ranges::find_if(names_, same)) -
+      names_.begin());
+}
+
+std::size_t ColumnIndex::bytes() const {
+  return text_.capacity() + rows_.capacity() * sizeof(Row) +
+         cells_.capacity() * sizeof(std::uint32_t);
+}
+
+std::string ColumnIndex::Project(
+    const std::vector<std::string>& tags, const std::string& words_of,
+    const std::map<std::string, std::string>& words) const {
+  if (form_.long_table) {
+    return ProjectLong(tags);
+  }
+  std::vector<std::size_t> columns = {ColumnOf(form_.time_column)};
+  const auto add = [&](const std::string& name) {
+    const std::size_t column = ColumnOf(name);
+    if (column < names_.size() &&
+        std::ranges::find(columns, column) == columns.end()) {
+      columns.push_back(column);
+    }
+  };
+  add(form_.clock_column);
+  for (const std::string& tag : tags) {
+    add(tag);
+    if (const auto found = form_.quality_of.find(tag);
+        found != form_.quality_of.end()) {
+      add(found->second);
+    }
+  }
+  // A column of quality is that of the columns before it.
+  std::ranges::sort(columns);
+  const std::size_t translated =
+      words.empty() ? names_.size() : ColumnOf(words_of);
+  const auto add_cell = [&](std::string_view cell, std::size_t column,
+                            std::string& table) {
+    if (column == translated) {
+      const auto found = std::ranges::find_if(words, [&](const auto& word) {
+        return SameName(word.first, Trimmed(cell));
+      });
+      cell = found == words.end() ? cell : std::string_view(found->second);
+    }
+    table += cell;
+  };
+  std::string table;
+  std::size_t line = 1;
+  for (const Row& row : rows_) {
+    for (; line < row.line; ++line) {
+      table += '\n';
+    }
+    for (std::size_t i = 0; i < columns.size() && columns[i] < row.count; ++i) {
+      if (i > 0) {
+        table += form_.separator;
+      }
+      add_cell(CellAt(row, columns[i]), columns[i], table);
+    }
+    table += '\n';
+    ++line;
+  }
+  return table;
+}
+
+std::string ColumnIndex::ProjectLong(
+    const std::vector<std::string>& tags) const {
+  std::vector<std::size_t> chosen;
+  const auto header_end = static_cast<std::size_t>(form_.skip) +
+                          static_cast<std::size_t>(form_.header_rows);
+  for (std::size_t i = 0; i < rows_.size() && rows_[i].line <= header_end;
+       ++i) {
+    chosen.push_back(i);
+  }
+  for (const std::string& tag : tags) {
+    if (const auto found = rows_of_tag_.find(tag);
+        found != rows_of_tag_.end()) {
+      chosen.insert(chosen.end(), found->second.begin(), found->second.end());
+    }
+  }
+  std::ranges::sort(chosen);
+  std::string table;
+  std::size_t line = 1;
+  for (const std::size_t i : chosen) {
+    for (; line < rows_[i].line; ++line) {
+      table += '\n';
+    }
+    table.append(text_, rows_[i].begin, rows_[i].length);
+    table += '\n';
+    ++line;
+  }
+  return table;
+}
+
+}  // namespace fdi::importer

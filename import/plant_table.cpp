@@ -1,0 +1,651 @@
+#include "import/plant_table.h"
+
+#include <algorithm>
+#include <map>
+#include <span>
+
+#include "base/csv_cells.h"
+#include "base/error.h"
+#include "base/toml_reader.h"
+#include "import/tag_map.h"
+
+namespace fdi::importer {
+namespace {
+
+using NamedCells = std::map<std::string, std::string>;
+
+constexpr std::array<std::string_view, kLoopTagCount> kTagNames = {
+    "op", "pv", "sp", "mode", "x", "f", "p1", "p2", "t1"};
+constexpr std::string_view kOtherKeys[] = {"name",  "sense", "service", "type",
+                                           "grade", "group", "file",    "from",
+                                           "to",    "auto",  "manual"};
+// How rows without a model set are told apart from a forgotten type.
+constexpr std::string_view kDataOnly = "data only";
+
+std::string Lower(std::string text) {
+  std::ranges::transform(text, text.begin(), [](unsigned char c) {
+    return static_cast<char>(c >= 'A' && c <= 'Z' ? c - 'A' + 'a' : c);
+  });
+  return text;
+}
+
+std::vector<std::string> KnownKeys() {
+  std::vector<std::string> keys(std::begin(kOtherKeys), std::end(kOtherKeys));
+  for (const std::string_view tag : kTagNames) {
+    keys.emplace_back(tag);
+    if (tag != "mode") {
+      keys.push_back(std::string(tag) + "_unit");
+      keys.push_back(std::string(tag) + "_range");
+    }
+  }
+  return keys;
+}
+
+bool IsKnown(const std::string& key) {
+  static const std::vector<std::string> kKeys = KnownKeys();
+  return std::ranges::find(kKeys, key) != kKeys.end();
+}
+
+// Whether `text` is `pattern`, in which each * stands for anything. Goes back
+// to the last star only: O(length of pattern x length of text).
+bool MatchesStars(std::string_view pattern, std::string_view text) {
+  std::size_t p = 0;
+  std::size_t t = 0;
+  std::optional<std::size_t> star;
+  std::size_t resume = 0;
+  while (t < text.size()) {
+    if (p < pattern.size() && pattern[p] == '*') {
+      star = p++;
+      resume = t;
+    } else if (p < pattern.size() && pattern[p] == text[t]) {
+      ++p;
+      ++t;
+    } else if (star) {
+      p = *star + 1;
+      t = ++resume;
+    } else {
+      return false;
+    }
+  }
+  return pattern.find_first_not_of('*', p) == std::string_view::npos;
+}
+
+std::vector<std::string> Words(const std::string& text) {
+  std::vector<std::string> words;
+  std::size_t begin = 0;
+  while (begin <= text.size()) {
+    const std::size_t end =
+        std::min(text.find_first_of(",;|", begin), text.size());
+    const std::string word = text.substr(begin, end - begin);
+    const std::size_t first = word.find_first_not_of(' ');
+    if (first != std::string::npos) {
+      words.push_back(
+          word.substr(first, word.find_last_not_of(' ') + 1 - first));
+    }
+    begin = end + 1;
+  }
+  return words;
+}
+
+// What one row says, with the defaults behind it.
+class RowReader {
+ public:
+  RowReader(const NamedCells& own, std::span<const NamedCells* const> defaults)
+      : own_(own), defaults_(defaults) {}
+
+  PlantRow Read(std::string place) {
+    row_.place = std::move(place);
+    row_.name = Cell("name");
+    CheckName();
+    row_.group = Cell("group");
+    ReadTags();
+    ReadKind();
+    row_.file = Filled(Cell("file"));
+    row_.from = Cell("from");
+    row_.to = Cell("to");
+    row_.auto_words = Words(Cell("auto"));
+    row_.manual_words = Words(Cell("manual"));
+    return std::move(row_);
+  }
+
+ private:
+  void Refuse(const std::string& what) {
+    if (row_.error.empty()) {
+      row_.error = what;
+    }
+  }
+
+  bool IsOwn(const std::string& key) const {
+    const auto found = own_.find(key);
+    return found != own_.end() && !found->second.empty();
+  }
+
+  // "-" in a row takes a default away.
+  std::string Cell(const std::string& key) const {
+    if (IsOwn(key)) {
+      const std::string& cell = own_.at(key);
+      return cell == "-" ? "" : cell;
+    }
+    for (const NamedCells* cells : defaults_) {
+      const auto found = cells->find(key);
+      if (found != cells->end() && !found->second.empty()) {
+        return found->second;
+      }
+    }
+    return {};
+  }
+
+  std::string Filled(std::string text) {
+    std::size_t begin = 0;
+    while ((begin = text.find('{', begin)) != std::string::npos) {
+      const std::size_t end = text.find('}', begin);
+      const std::string key = text.substr(begin + 1, end - begin - 1);
+      if (end == std::string::npos || (key != "loop" && key != "group")) {
+        Refuse(Quoted(text) +
+               " has a placeholder other than {loop} and "
+               "{group}; correct it, or write the tag itself");
+        return text;
+      }
+      const std::string& value = key == "loop" ? row_.name : row_.group;
+      text.replace(begin, end + 1 - begin, value);
+      begin += value.size();
+    }
+    return text;
+  }
+
+  void CheckName() {
+    const std::string& name = row_.name;
+    if (name.empty()) {
+      Refuse("the row has no name; type name = the id of its valve or loop");
+    } else if (name.find_first_of("*?") != std::string::npos) {
+      Refuse("the name " + Quoted(name) + " has * or ?; a row is one loop");
+    } else if (std::ranges::any_of(name, [](unsigned char c) {
+                 return c < ' ' || c == 0x7F;
+               })) {
+      Refuse("the name " + Quoted(name) + " has a control character");
+    }
+  }
+
+  void ReadTags() {
+    for (std::size_t i = 0; i < kLoopTagCount; ++i) {
+      const std::string key(kTagNames[i]);
+      TagCell& tag = row_.tags[i];
+      tag.pattern = Filled(Cell(key));
+      tag.own = IsOwn(key);
+      tag.unit = Cell(key + "_unit");
+      if (const std::string range = Cell(key + "_range"); !range.empty()) {
+        const std::size_t dots = range.find("..");
+        const auto low = ParseNumber(range.substr(0, dots));
+        const auto high =
+            dots == std::string::npos
+                ? std::nullopt
+                : ParseNumber(std::string_view(range).substr(dots + 2));
+        if (low && high && *low < *high) {
+          tag.range = std::pair(*low, *high);
+        } else {
+          Refuse(key + "_range is " + Quoted(range) +
+                 "; type LOW..HIGH, such as 0..100 or 4..20");
+        }
+      }
+    }
+  }
+
+  void ReadKind() {
+    const std::string sense = Lower(Cell("sense"));
+    if (!sense.empty() && sense != "closing" && sense != "opening") {
+      Refuse("sense is " + Quoted(sense) + "; type closing or opening");
+    }
+    row_.sense = sense == "opening" ? Sense::kOpening : Sense::kClosing;
+    const std::string service = Cell("service");
+    if (!service.empty()) {
+      row_.service = {static_cast<char>(service.front() & ~0x20)};
+      if (service.size() != 1 || std::string_view("FPLTA").find(row_.service) ==
+                                     std::string_view::npos) {
+        row_.service.clear();
+        Refuse("service is " + Quoted(service) +
+               "; type one letter, F, P, L, "
+               "T or A");
+      }
+    }
+    row_.type = Cell("type");
+    if (SameName(row_.type, kDataOnly) || SameName(row_.type, "data_only")) {
+      row_.type.clear();
+    }
+    if (const std::string grade = Cell("grade"); !grade.empty()) {
+      if (grade == "1" || grade == "2" || grade == "3") {
+        row_.grade = grade.front() - '0';
+      } else {
+        Refuse("grade is " + Quoted(grade) +
+               "; type 1 (most important), 2 or "
+               "3");
+      }
+    }
+  }
+
+  const NamedCells& own_;
+  std::span<const NamedCells* const> defaults_;
+  PlantRow row_;
+};
+
+// The rows of either form, and their defaults: for all under "".
+struct RawTable {
+  struct Row {
+    std::string place;
+    NamedCells cells;
+    std::string error;
+  };
+  std::map<std::string, NamedCells> defaults;
+  std::vector<Row> rows;
+};
+
+std::vector<PlantRow> RowsOf(const RawTable& raw) {
+  static const NamedCells kNone;
+  std::vector<PlantRow> rows;
+  std::map<std::string, std::string> places;  // By name.
+  const auto defaults_of = [&](const std::string& group) {
+    const auto found = raw.defaults.find(group);
+    return found == raw.defaults.end() ? &kNone : &found->second;
+  };
+  for (const RawTable::Row& from : raw.rows) {
+    const auto own = from.cells.find("group");
+    const NamedCells* all = defaults_of("");
+    const std::string group = own != from.cells.end() && !own->second.empty()
+                                  ? own->second
+                              : all->contains("group") ? all->at("group")
+                                                       : "";
+    const NamedCells* chain[] = {group.empty() ? &kNone : defaults_of(group),
+                                 all};
+    PlantRow row = RowReader(from.cells, chain).Read(from.place);
+    if (!from.error.empty()) {
+      row.error = from.error;
+    }
+    const auto [first, added] = places.try_emplace(row.name, row.place);
+    if (!added && !row.name.empty()) {
+      row.error = "the name " + Quoted(row.name) + " is that of " +
+                  first->second + ", too; give one of the two another name";
+    }
+    rows.push_back(std::move(row));
+  }
+  return rows;
+}
+
+// A number, a flag or a list of the file as text, as in a cell of CSV.
+std::string CellOf(TomlReader& table, const std::string& key) {
+  const auto tried = [](const auto& read) -> std::optional<std::string> {
+    try {
+      return read();
+    } catch (const ConfigError&) {
+      return std::nullopt;
+    }
+  };
+  if (auto text = tried([&] { return table.Text(key).value_or(""); })) {
+    return *text;
+  }
+  if (auto text =
+          tried([&] { return NumberText(table.Number(key).value_or(0.0)); })) {
+    return *text;
+  }
+  if (auto text = tried([&] {
+        const std::vector<double> range = table.Numbers(key);
+        if (range.size() != 2) {
+          throw ConfigError("not a range");
+        }
+        return NumberText(range[0]) + ".." + NumberText(range[1]);
+      })) {
+    return *text;
+  }
+  return Listed(table.Texts(key));  // Or refused, with file and line.
+}
+
+std::string UnknownKey(const std::string& key) {
+  return "unknown key " + Quoted(key) + "; there are " + Listed(KnownKeys());
+}
+
+NamedCells CellsOf(TomlReader& table, std::string& error) {
+  NamedCells cells;
+  for (const std::string& key : table.Keys()) {
+    if (!IsKnown(key)) {
+      error = UnknownKey(key);
+      continue;
+    }
+    try {
+      cells[key] = CellOf(table, key);
+    } catch (const ConfigError& refused) {
+      error = refused.what();
+    }
+  }
+  return cells;
+}
+
+NamedCells DefaultsOf(TomlReader table) {
+  std::string error;
+  NamedCells cells = CellsOf(table, error);
+  if (!error.empty()) {
+    throw ConfigError("defaults: " + error);
+  }
+  return cells;
+}
+
+RawTable ReadToml(TomlReader& file, PlantTable& table) {
+  for (const std::string& key : file.Keys()) {
+    constexpr std::string_view kKeys[] = {
+        "files", "map", "zone", "resample", "defaults", "group", "loop"};
+    if (std::ranges::find(kKeys, key) == std::end(kKeys)) {
+      file.Refuse(key,
+                  "is unknown; there are files, map, zone, resample, "
+                  "[defaults], [group.NAME] and [[loop]]");
+    }
+  }
+  table.files = file.Texts("files");
+  table.map = file.Text("map").value_or("");
+  table.zone = file.Text("zone").value_or("");
+  table.resample = file.Text("resample").value_or("");
+  RawTable raw;
+  if (auto defaults = file.Table("defaults")) {
+    raw.defaults[""] = DefaultsOf(std::move(*defaults));
+  }
+  if (auto groups = file.Table("group")) {
+    for (const std::string& name : groups->Keys()) {
+      raw.defaults[name] = DefaultsOf(std::move(*groups->Table(name)));
+    }
+  }
+  for (TomlReader& loop : file.Tables("loop")) {
+    RawTable::Row& row = raw.rows.emplace_back();
+    row.cells = CellsOf(loop, row.error);
+    row.place = table.source + " [[loop]] " + std::to_string(raw.rows.size());
+  }
+  return raw;
+}
+
+RawTable ReadCells(const std::string& text, const PlantTable& table) {
+  const std::vector<std::string_view> lines = LinesOf(text);
+  std::vector<std::string_view> first;
+  for (const std::string_view line : lines) {
+    if (!line.empty() && !line.starts_with('#') && first.size() < 50) {
+      first.push_back(line);
+    }
+  }
+  CsvCells reader(FindSeparator(first));
+  std::vector<std::string> keys;
+  RawTable raw;
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    if ((!reader.open() && lines[i].starts_with('#')) ||
+        !reader.TakeLine(lines[i]) || reader.blank()) {
+      continue;
+    }
+    if (keys.empty()) {
+      for (const std::string& cell : reader.cells()) {
+        keys.push_back(Lower(cell));
+        if (!cell.empty() && !IsKnown(keys.back())) {
+          throw DataError(table.source + ":" + std::to_string(i + 1) + ": " +
+                          UnknownKey(cell));
+        }
+      }
+      continue;
+    }
+    reader.Trim(keys.size());
+    RawTable::Row row;
+    row.place = table.source + ":" + std::to_string(i + 1);
+    if (reader.cells().size() > keys.size()) {
+      row.error = "the row has " + std::to_string(reader.cells().size()) +
+                  " cells, the header " + std::to_string(keys.size()) +
+                  "; put text with separators in quotes";
+    }
+    for (std::size_t c = 0; c < std::min(keys.size(), reader.cells().size());
+         ++c) {
+      row.cells[keys[c]] = reader.cells()[c];
+    }
+    if (const auto name = row.cells.find("name");
+        name != row.cells.end() && name->second == "*") {
+      const std::string group = row.cells["group"];
+      row.cells.erase("name");
+      raw.defaults[group] = std::move(row.cells);
+    } else {
+      raw.rows.push_back(std::move(row));
+    }
+  }
+  if (reader.open()) {
+    throw DataError(table.source + ": a quote is open at the end of the file");
+  }
+  return raw;
+}
+
+}  // namespace
+
+std::string_view LoopTagName(LoopTag tag) {
+  return kTagNames[static_cast<std::size_t>(tag)];
+}
+
+std::optional<LoopTag> PlantRow::FlowTag() const {
+  if (!(*this)[LoopTag::kF].pattern.empty()) {
+    return LoopTag::kF;
+  }
+  return service == "F" && !(*this)[LoopTag::kPv].pattern.empty()
+             ? std::optional(LoopTag::kPv)
+             : std::nullopt;
+}
+
+PlantTable ReadPlantTable(const std::filesystem::path& path) {
+  PlantTable table;
+  table.source = path.string();
+  RawTable raw;
+  if (SameName(path.extension().string(), ".toml")) {
+    TomlReader file(path);
+    raw = ReadToml(file, table);
+  } else {
+    raw = ReadCells(ReadTextFile(path), table);
+  }
+  table.rows = RowsOf(raw);
+  if (table.rows.empty()) {
+    throw DataError(table.source +
+                    ": no loop; expected rows below a header with name, op, "
+                    "pv, ... or [[loop]] in TOML");
+  }
+  return table;
+}
+
+TagNames::TagNames(std::vector<std::string> names) : names_(std::move(names)) {
+  for (std::size_t i = 0; i < names_.size(); ++i) {
+    lower_.push_back(Lower(names_[i]));
+    exact_.emplace(names_[i], i);
+    any_case_.emplace(lower_.back(), i);
+  }
+}
+
+std::vector<std::string> TagNames::Find(const std::string& pattern) const {
+  std::vector<std::size_t> found;
+  const auto look_up = [&](const auto& names, const std::string& name) {
+    const auto [begin, end] = names.equal_range(name);
+    for (auto at = begin; at != end; ++at) {
+      found.push_back(at->second);
+    }
+  };
+  look_up(exact_, pattern);
+  const std::string lower = Lower(pattern);
+  if (found.empty()) {
+    look_up(any_case_, lower);
+  }
+  if (found.empty() && pattern.find('*') != std::string::npos) {
+    for (std::size_t i = 0; i < lower_.size(); ++i) {
+      if (MatchesStars(lower, lower_[i])) {
+        found.push_back(i);
+      }
+    }
+  }
+  std::ranges::sort(found);
+  std::vector<std::string> names;
+  for (const std::size_t i : found) {
+    names.push_back(names_[i]);
+  }
+  return names;
+}
+
+std::vector<std::string> TagNames::Like(const std::string& part) const {
+  constexpr std::size_t kShown = 4;
+  const std::string lower = Lower(part);
+  std::vector<std::string> like;
+  for (std::size_t i = 0; i < names_.size() && like.size() < kShown; ++i) {
+    if (!lower.empty() && lower_[i].find(lower) != std::string::npos) {
+      like.push_back(names_[i]);
+    }
+  }
+  if (like.empty()) {
+    like.assign(names_.begin(),
+                names_.begin() + static_cast<std::ptrdiff_t>(
+                                     std::min(kShown, names_.size())));
+  }
+  return like;
+}
+
+TagMatch MatchTags(const PlantRow& row, const TagNames& names,
+                   const std::string& source) {
+  TagMatch match;
+  const auto refuse = [&](const std::string& what) {
+    if (match.error.empty()) {
+      match.error = what;
+    }
+  };
+  for (std::size_t i = 0; i < kLoopTagCount; ++i) {
+    const TagCell& tag = row.tags[i];
+    const std::string key(kTagNames[i]);
+    if (tag.pattern.empty()) {
+      continue;
+    }
+    const std::string stated = key + " = " + tag.pattern;
+    const std::vector<std::string> found = names.Find(tag.pattern);
+    if (found.size() > 1) {
+      const std::vector<std::string> shown(
+          found.begin(),
+          found.begin() + std::min<std::ptrdiff_t>(
+                              4, static_cast<std::ptrdiff_t>(found.size())));
+      match.ambiguous.push_back(stated + ": " + Listed(shown));
+      refuse(stated + " matches " + std::to_string(found.size()) +
+             " columns of " + source + " (" + Listed(shown) +
+             "); type the one that is meant");
+    } else if (found.empty()) {
+      match.unmatched.push_back(stated);
+      if (tag.own || i == static_cast<std::size_t>(LoopTag::kOp)) {
+        refuse(stated + " is not in " + source + ", which has " +
+               Listed(names.Like(row.name)) + "; correct " + key +
+               ", or the file");
+      }
+    } else {
+      match.columns[i] = found.front();
+    }
+  }
+  if (row[LoopTag::kOp].pattern.empty()) {
+    refuse("op is not stated; type op = the tag of the controller's output");
+  }
+  if (match[LoopTag::kPv].empty() && match[LoopTag::kX].empty()) {
+    refuse("neither pv nor x is in " + source + ", which has " +
+           Listed(names.Like(row.name)) +
+           "; type pv = the tag of the measured "
+           "value");
+  }
+  for (std::size_t i = 0; i < kLoopTagCount; ++i) {
+    for (std::size_t k = i + 1; k < kLoopTagCount; ++k) {
+      // In a flow loop f may repeat pv.
+      const bool flow = i == static_cast<std::size_t>(LoopTag::kPv) &&
+                        k == static_cast<std::size_t>(LoopTag::kF);
+      if (!match.columns[i].empty() && match.columns[i] == match.columns[k] &&
+          !flow) {
+        refuse(std::string(kTagNames[i]) + " and " + std::string(kTagNames[k]) +
+               " are both " + match.columns[i] + "; correct one of them");
+      }
+    }
+  }
+  return match;
+}
+
+namespace {
+
+// The reading in the unit of the signal; see ReadUnit() of tag_map.cpp.
+ColumnMapping MappingOf(const PlantRow& row, LoopTag tag, Signal signal,
+                        const std::string& column, ColumnMap& map) {
+  const TagCell& cell = row[tag];
+  ColumnMapping mapping;
+  mapping.column = column;
+  mapping.signal = signal;
+  const bool percent = signal == Signal::kCv || signal == Signal::kX;
+  const std::string name = cell.unit.empty() && signal != Signal::kF
+                               ? std::string(SignalUnit(signal))
+                               : cell.unit;
+  const auto unit = FindUnit(signal, name == "mA" && percent ? "%" : name);
+  if (!unit) {
+    throw ConfigError(
+        std::string(LoopTagName(tag)) + "_unit is " +
+        (name.empty() ? std::string("missing") : Quoted(name)) +
+        "; accepted are" + UnitNames(signal) +
+        (IsGasUnit(name) ? "; a flow at standard conditions is not converted: "
+                           "name the unit in which it is a mass, or type f = -"
+                         : ""));
+  }
+  mapping.scale = unit->scale;
+  mapping.offset = unit->offset;
+  mapping.unit = name;
+  auto range = cell.range;
+  if (name == "mA" && !range) {
+    range = std::pair(4.0, 20.0);
+  }
+  if (range) {
+    const auto [low, high] = *range;
+    if (percent) {
+      mapping.scale = 100.0 / (high - low);
+      mapping.offset = -low * mapping.scale;
+    }
+    const double margin = 0.1 * (high - low);
+    mapping.lowest = low - margin;
+    mapping.highest = high + margin;
+  }
+  if (percent) {
+    mapping.sense = row.sense;
+  }
+  if (signal == Signal::kF) {
+    map.flow_unit = unit->flow_unit;
+  }
+  return mapping;
+}
+
+}  // namespace
+
+ColumnMap LoopColumns(const PlantRow& row, const TagMatch& match,
+                      ColumnMap file) {
+  file.columns = {
+      MappingOf(row, LoopTag::kOp, Signal::kCv, match[LoopTag::kOp], file)};
+  if (!match[LoopTag::kX].empty()) {
+    file.columns.push_back(
+        MappingOf(row, LoopTag::kX, Signal::kX, match[LoopTag::kX], file));
+  }
+  // PV and SP keep their own unit: nothing depends on it there.
+  if (!match[LoopTag::kPv].empty()) {
+    file.columns.push_back({match[LoopTag::kPv], Signal::kF});
+  }
+  if (!match[LoopTag::kSp].empty()) {
+    file.columns.push_back({match[LoopTag::kSp], Signal::kSp});
+  }
+  file.flow_unit = FlowUnit::kM3PerHour;
+  file.mode_column = match[LoopTag::kMode];
+  return file;
+}
+
+ColumnMap ValveColumns(const PlantRow& row, const TagMatch& match,
+                       ColumnMap file) {
+  file.columns.clear();
+  const auto add = [&](LoopTag tag, Signal signal) {
+    if (!match[tag].empty()) {
+      file.columns.push_back(MappingOf(row, tag, signal, match[tag], file));
+    }
+  };
+  add(LoopTag::kOp, Signal::kCv);
+  add(LoopTag::kX, Signal::kX);
+  if (const auto flow = row.FlowTag()) {
+    add(*flow, Signal::kF);
+  }
+  add(LoopTag::kP1, Signal::kP1);
+  add(LoopTag::kP2, Signal::kP2);
+  add(LoopTag::kT1, Signal::kT1);
+  file.mode_column = match[LoopTag::kMode];
+  return file;
+}
+
+}  // namespace fdi::importer

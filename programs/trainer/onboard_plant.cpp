@@ -1,0 +1,304 @@
+// fdi-trainer onboard --plant: every loop of a plant from one table.
+#include "programs/trainer/onboard_plant.h"
+
+#include <algorithm>
+#include <charconv>
+#include <map>
+#include <memory>
+#include <set>
+#include <tuple>
+#include <utility>
+
+#include <CLI/CLI.hpp>
+
+#include "base/error.h"
+#include "base/time_text.h"
+#include "import/plant_table.h"
+#include "report/progress.h"
+#include "report/stop_signals.h"
+#include "storage/database/data_directory.h"
+#include "trainer/campaign/campaign_runs.h"
+#include "trainer/campaign/file_runs.h"
+#include "trainer/fleet/plant_run.h"
+
+namespace fdi::trainer {
+namespace {
+
+using report::Json;
+using report::Tone;
+using storage::LoopState;
+
+// What a dry run reads of each file: the form, the words, the ranges.
+constexpr std::size_t kDryRunLines = 600;
+
+// "2/8": part 2 of 8.
+std::pair<int, int> ParseShard(const std::string& text) {
+  if (text.empty()) {
+    return {1, 1};
+  }
+  int part = 0;
+  int parts = 0;
+  const char* end = text.data() + text.size();
+  const auto [slash, first] = std::from_chars(text.data(), end, part);
+  if (first == std::errc() && slash != end && *slash == '/') {
+    const auto [last, second] = std::from_chars(slash + 1, end, parts);
+    if (second == std::errc() && last == end && part >= 1 && part <= parts &&
+        parts <= 10'000) {
+      return {part, parts};
+    }
+  }
+  throw ConfigError("--shard '" + text +
+                    "': accepted is I/N with I in 1..N and N at most 10000, "
+                    "such as 3/8");
+}
+
+std::vector<std::filesystem::path> FilesOf(
+    const importer::PlantTable& table, const std::vector<std::string>& given,
+    const std::filesystem::path& folder) {
+  std::vector<std::filesystem::path> files;
+  for (const std::string& pattern : given) {
+    for (auto& file : MatchingFiles(pattern, "")) {
+      files.push_back(std::move(file));
+    }
+  }
+  if (given.empty()) {
+    for (const std::string& pattern : table.files) {
+      for (auto& file : MatchingFiles(pattern, folder)) {
+        files.push_back(std::move(file));
+      }
+    }
+  }
+  return files;
+}
+
+// What the command line does not state is taken from the table.
+importer::ColumnMap FormOf(importer::TableOptions form,
+                           const importer::PlantTable& table,
+                           const std::filesystem::path& folder, bool utc) {
+  if (form.map.empty() && !table.map.empty()) {
+    form.map = std::filesystem::path(table.map).is_absolute()
+                   ? std::filesystem::path(table.map)
+                   : folder / table.map;
+  }
+  form.zone = form.zone.empty() ? table.zone : form.zone;
+  form.resample = form.resample.empty() ? table.resample : form.resample;
+  return form.Read(utc);
+}
+
+Json RowJson(const PlantJob& job, const PlantOutcome& outcome, bool dry_run) {
+  const storage::PlantLoop& loop = outcome.loop;
+  return {{"loop", loop.name},
+          {"row", job.row.place},
+          {"service", loop.service.empty() ? Json() : Json(loop.service)},
+          {"type", loop.type.empty() ? Json() : Json(loop.type)},
+          {"grade", loop.grade ? Json(*loop.grade) : Json()},
+          {"group", loop.group.empty() ? Json() : Json(loop.group)},
+          {"state", dry_run && loop.state != LoopState::kRefused
+                        ? "expected"
+                        : storage::LoopStateName(loop.state)},
+          {"watched_by", storage::LoopWatchName(loop.watch)},
+          {"model_set",
+           outcome.model_set.empty() ? Json() : Json(outcome.model_set)},
+          {"unchanged", outcome.unchanged},
+          {"seconds", outcome.seconds},
+          {"finding", loop.finding},
+          {"tags", job.matched},
+          {"unmatched", job.unmatched},
+          {"ambiguous", job.ambiguous}};
+}
+
+std::string CountsText(const Json& counts, bool dry_run) {
+  const auto count = [&](const char* key) {
+    return std::to_string(counts[key].get<std::size_t>());
+  };
+  return dry_run
+             ? count("rows") + " rows: " + count("faults") +
+                   " for named faults, " + count("audit") + " for the audit, " +
+                   count("refused") + " refused; nothing was stored"
+             : count("rows") + " rows: " + count("faults") +
+                   " watched for named faults, " + count("audit") +
+                   " by the audit, " + count("refused") + " refused; " +
+                   count("unchanged") + " had not changed";
+}
+
+Json CountsJson(const Json& rows) {
+  Json counts = {{"rows", rows.size()}, {"faults", 0},  {"audit", 0},
+                 {"nothing", 0},        {"refused", 0}, {"unchanged", 0}};
+  const auto add = [&](const std::string& key) {
+    counts[key] = counts[key].get<std::size_t>() + 1;
+  };
+  for (const Json& row : rows) {
+    add(row["watched_by"]);
+    if (row["state"] == "refused") {
+      add("refused");
+    }
+    if (row["unchanged"] == true) {
+      add("unchanged");
+    }
+  }
+  return counts;
+}
+
+// Tags that no row uses, by file.
+Json UnusedTags(const std::vector<PlantJob>& jobs, const PlantFiles& files) {
+  std::map<std::string, std::set<std::string>> used;
+  for (const PlantJob& job : jobs) {
+    for (const RowSource& source : job.sources) {
+      used[source.path.string()].insert(source.match.columns.begin(),
+                                        source.match.columns.end());
+    }
+  }
+  Json unused = Json::array();
+  for (const auto& [file, tags] : files.AllTags()) {
+    Json rest = Json::array();
+    for (const std::string& tag : tags) {
+      if (!used[file].contains(tag)) {
+        rest.push_back(tag);
+      }
+    }
+    if (!rest.empty()) {
+      unused.push_back({{"file", file}, {"tags", rest}});
+    }
+  }
+  return unused;
+}
+
+report::Column StateColumn() {
+  report::Column column{"state", "state"};
+  column.text = [](const Json& row) {
+    return row["unchanged"] == true
+               ? row["state"].get<std::string>() + ", unchanged"
+               : row["state"].get<std::string>();
+  };
+  column.tone = [](const Json& row) {
+    return row["state"] == "refused" ? Tone::kWarning : Tone::kPlain;
+  };
+  return column;
+}
+
+// Ten are enough to see what a pattern has missed; JSON has all.
+report::Column FirstTags() {
+  report::Column column{"tags that no row uses", "tags"};
+  column.text = [](const Json& row) {
+    const Json& tags = row["tags"];
+    std::string text;
+    for (std::size_t i = 0; i < std::min<std::size_t>(tags.size(), 10); ++i) {
+      text += (i == 0 ? "" : ", ") + tags[i].get<std::string>();
+    }
+    return tags.size() > 10
+               ? text + " and " + std::to_string(tags.size() - 10) + " more"
+               : text;
+  };
+  return column;
+}
+
+report::Report ReportOf(const importer::PlantTable& table,
+                        const std::vector<PlantJob>& jobs,
+                        const std::vector<PlantOutcome>& outcomes,
+                        const PlantFiles& files,
+                        const PlantVerbOptions& options) {
+  report::Report report;
+  Json rows = Json::array();
+  for (std::size_t i = 0; i < jobs.size(); ++i) {
+    if (outcomes[i].in_shard) {
+      rows.push_back(RowJson(jobs[i], outcomes[i], options.dry_run));
+    }
+  }
+  report.document = {
+      {"plant", table.source},
+      {"shard", options.shard.empty() ? Json() : Json(options.shard)},
+      {"dry_run", options.dry_run},
+      {"counts", CountsJson(rows)},
+      {"rows", std::move(rows)},
+      {"unused_tags",
+       options.dry_run ? UnusedTags(jobs, files) : Json::array()}};
+  std::vector<report::Column> columns = {
+      {"loop", "loop"},
+      {"group", "group", report::Format::kPlain, 0, 3},
+      StateColumn(),
+      {"watched by", "watched_by"}};
+  if (options.dry_run) {
+    columns.push_back({"tags", "tags", report::Format::kPlain, 0, 2});
+    columns.push_back({"unmatched", "unmatched", report::Format::kPlain, 0, 1});
+  } else {
+    columns.push_back({"model set", "model_set", report::Format::kPlain, 0, 2});
+  }
+  columns.push_back({"finding", "finding"});
+  report.Table("rows", std::move(columns), "no row is of this shard");
+  report.Line("").Line(CountsText(report.document["counts"], options.dry_run));
+  if (!report.document["unused_tags"].empty()) {
+    report.Line("").Table("unused_tags", {{"file", "file"}, FirstTags()});
+  }
+  const Json& counts = report.document["counts"];
+  if (!report.document["rows"].empty() && counts["refused"] == counts["rows"]) {
+    report.exit_code = report::kExitData;
+  }
+  return report;
+}
+
+}  // namespace
+
+void PlantVerbOptions::AddTo(CLI::App& verb) {
+  verb.add_option("--plant", plant,
+                  "Table of valves and loops, a row each: onboards every row "
+                  "with a type, audits the others (docs/plant.md)")
+      ->type_name("FILE.toml|FILE.csv");
+  verb.add_flag("--dry-run", dry_run,
+                "With --plant: list matched, unmatched and ambiguous tags and "
+                "what is wrong with a row; store nothing");
+  verb.add_option("--shard", shard,
+                  "With --plant: part I of N, for the jobs of a scheduler; "
+                  "fdi-store models import brings the parts together")
+      ->type_name("I/N");
+}
+
+report::Report OnboardFromTable(const PlantVerbOptions& options,
+                                const std::vector<std::string>& files,
+                                const importer::TableOptions& form, int threads,
+                                double false_alarms_per_hour,
+                                const report::Context& context) {
+  const importer::PlantTable table = importer::ReadPlantTable(options.plant);
+  const auto folder = options.plant.parent_path();
+  PlantSettings settings;
+  settings.folder = folder;
+  std::tie(settings.shard, settings.shards) = ParseShard(options.shard);
+  settings.threads = threads;
+  settings.false_alarms_per_hour = false_alarms_per_hour;
+  settings.utc = context.options.utc;
+  settings.software = context.software;
+  settings.created_ns = NowNs();
+  PlantFiles shelf(FormOf(form, table, folder, context.options.utc),
+                   options.dry_run ? kDryRunLines : 0);
+  const std::vector<PlantJob> jobs =
+      MatchRows(table, FilesOf(table, files, folder), folder, shelf);
+  const storage::DataDirectory directory{context.options.data_dir};
+  if (options.dry_run) {
+    const std::unique_ptr<storage::ModelStore> store =
+        std::filesystem::exists(directory.models())
+            ? std::make_unique<storage::ModelStore>(directory.models())
+            : nullptr;
+    return ReportOf(table, jobs, CheckPlant(jobs, shelf, store.get(), settings),
+                    shelf, options);
+  }
+  storage::EnsureExists(directory);
+  storage::ModelStore store(directory.models(),
+                            storage::Access::kOccasionalWriter);
+  const report::StopSignals signals;
+  settings.stop = [&signals] { return signals.stop_requested(); };
+  report::Progress bar("onboard");
+  try {
+    const auto outcomes =
+        OnboardPlant(jobs, shelf, store, settings,
+                     [&bar](double share, const std::string& row) {
+                       bar.Update(share, row);
+                     });
+    bar.Finish();
+    return ReportOf(table, jobs, outcomes, shelf, options);
+  } catch (const Interrupted&) {
+    throw Interrupted(
+        "interrupted: finished rows are stored; the same command goes on with "
+        "the others");
+  }
+}
+
+}  // namespace fdi::trainer

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "import/tag_map.h"
+#include "report/program.h"
+#include "report/report.h"
+
+namespace CLI {
+class App;
+}
+
+namespace fdi::trainer {
+
+/// Options of `onboard --plant`.
+struct PlantVerbOptions {
+  std::filesystem::path plant;
+  std::string shard;
+  bool dry_run{false};
+
+  void AddTo(CLI::App& verb);
+};
+
+/// Onboards every row of the table, or says what would be done.
+/// @param files as --file gives them; none: those of the table.
+report::Report OnboardFromTable(const PlantVerbOptions& options,
+                                const std::vector<std::string>& files,
+                                const importer::TableOptions& form, int threads,
+                                double false_alarms_per_hour,
+                                const report::Context& context);
+
+}  // namespace fdi::trainer

@@ -1,0 +1,354 @@
+#include "report/plot/episode_page.h"
+
+#include <array>
+#include <cctype>
+#include <string_view>
+#include <utility>
+
+#include "base/error.h"
+#include "base/time_text.h"
+#include "diagnosis/fault_catalogue.h"
+#include "report/text_table.h"
+#include "storage/history/certainty.h"
+
+namespace fdi::plot {
+namespace {
+
+using report::Column;
+using report::Json;
+using storage::Alarm;
+using storage::Episode;
+using storage::HistoryEntry;
+
+// Such that letters are readable on A4.
+constexpr double kPictureWidth = 1200.0;  // [px]
+constexpr double kLegendWidth = 225.0;    // [px]
+constexpr std::size_t kGroups = 720;
+
+std::string ShownTime(std::optional<std::int64_t> stamp_ns, bool utc) {
+  return stamp_ns ? FormatTime(*stamp_ns, utc) : "-";
+}
+
+Column Field(std::string heading, std::string text) {
+  Column column;
+  column.heading = std::move(heading);
+  column.text = [text = std::move(text)](const Json&) { return text; };
+  column.wraps = true;
+  return column;
+}
+
+std::string_view BySimulation(std::string_view layer) {
+  return layer == LayerName(Layer::kPhysics) ? ", by simulation of the valve"
+                                             : "";
+}
+
+// "likely: Flow transmitter wrong (f19), by simulation of the valve"
+std::string FaultLine(const Episode& e, const std::string& name) {
+  std::string line(CertaintyName(storage::CertaintyOf(e)));
+  if (!e.fault || e.fault == "unknown") {
+    return line;
+  }
+  line += ": " + name + " (" + *e.fault + ")";
+  return line.append(BySimulation(e.layer.value_or("")));
+}
+
+std::string AlarmLine(const Alarm& alarm, bool utc) {
+  std::string line(AlarmStateName(alarm.state));
+  if (const auto since = alarm.episode.unconfirmed_ns) {
+    line += ", not confirmed since " + ShownTime(since, utc);
+  }
+  if (alarm.shelf) {
+    const storage::Shelf& shelf = *alarm.shelf;
+    line += ", shelved by " + shelf.who + " until " +
+            ShownTime(shelf.until_ns, utc) +
+            (shelf.comment.empty() ? "" : ": " + shelf.comment);
+  }
+  return line;
+}
+
+// "0.42 (0.38 to 0.46), 0.55 at its worst"
+std::string StrengthLine(const Episode& e) {
+  if (!storage::IsNamed(e)) {
+    return "-";
+  }
+  std::string line = e.lowest && e.highest
+                         ? IntervalText(e.strength, *e.lowest, *e.highest, 3)
+                         : report::FormatNumber(e.strength, 3);
+  if (e.worst_strength && *e.worst_strength != e.strength) {
+    line += ", " + report::FormatNumber(*e.worst_strength, 3) + " at its worst";
+  }
+  return line;
+}
+
+// "by anna at 2026-11-20T15:02:11+01:00: on my way"
+std::string AckLine(const Episode& e, bool utc) {
+  return !e.acked_by
+             ? "-"
+             : "by " + *e.acked_by + " at " + ShownTime(e.acked_ns, utc) +
+                   (e.ack_comment ? ": " + *e.ack_comment : "");
+}
+
+// "Flow transmitter wrong (f19)"
+std::string NameAndFault(const std::string& fault,
+                         const report::FaultTexts& texts) {
+  return texts.Words(fault, 0.0).name + " (" + fault + ")";
+}
+
+std::string EndText(std::string_view reason) {
+  constexpr std::array<std::pair<std::string_view, const char*>, 5> kEnds{
+      {{"cleared", "the fault is gone"},
+       {"stream_ended", "the valve's data ended"},
+       {"stale_timeout", "no data came any more"},
+       {"model_changed", "another model set judges the valve"},
+       {"superseded", "a newer source of its data took over"}}};
+  for (const auto& [name, text] : kEnds) {
+    if (reason == name) {
+      return text;
+    }
+  }
+  return "the monitor no longer followed it";
+}
+
+std::string LabelText(const std::string& label,
+                      const report::FaultTexts& texts) {
+  return label == "true"    ? "right"
+         : label == "false" ? "no fault"
+                            : NameAndFault(label, texts);
+}
+
+std::string ActionSentence(const HistoryEntry& event,
+                           const report::FaultTexts& texts) {
+  std::string text = event.who;
+  text += event.kind == "ACK" ? " acknowledged it"
+          : event.kind == "LABEL"
+              ? " labelled it: " + LabelText(event.value, texts)
+              : " " + event.kind + " " + event.value;
+  return text + (event.origin.empty() ? "" : " (" + event.origin + ")") +
+         (event.comment.empty() ? "." : ". \"" + event.comment + "\"");
+}
+
+Json StoryJson(const EpisodeEvidence& evidence,
+               const report::FaultTexts& texts) {
+  Json story = Json::array();
+  for (const HistoryEntry& event : evidence.events) {
+    story.push_back({{"stamp_utc", FormatTime(event.stamp_ns, true)},
+                     {"after", FormatDuration(event.stamp_ns -
+                                              evidence.episode.detected_ns)},
+                     {"text", EventSentence(event, texts)}});
+  }
+  return story;
+}
+
+// What a simulation of the valve found: "f7: 0.50 (0.40 to 0.60), begins ..."
+std::string LookText(const EpisodeLook& look, const report::FaultTexts& texts,
+                     bool utc) {
+  std::string text = "A simulation of the valve explains the data best by ";
+  if (look.faults.empty()) {
+    return "A simulation of the valve with any known fault does not explain "
+           "the data.";
+  }
+  for (const LookFault& f : look.faults) {
+    text += (&f == look.faults.data() ? "" : " and ") +
+            NameAndFault(FaultName(f.fault), texts) + " of strength " +
+            IntervalText(f.strength, f.lowest, f.highest, 2) + " since " +
+            ShownTime(f.begins_ns, utc) + (f.growing ? ", growing" : "");
+  }
+  return text + ".";
+}
+
+// The sentences of `text`: each begins with a capital behind ". ".
+std::vector<std::string> Sentences(const std::string& text) {
+  std::vector<std::string> sentences;
+  std::size_t begin = 0;
+  for (std::size_t i = 0; i + 2 < text.size(); ++i) {
+    if (text[i] == '.' && text[i + 1] == ' ' &&
+        std::isupper(static_cast<unsigned char>(text[i + 2])) != 0) {
+      sentences.push_back(text.substr(begin, i + 1 - begin));
+      begin = i + 2;
+    }
+  }
+  if (begin < text.size()) {
+    sentences.push_back(text.substr(begin));
+  }
+  return sentences;
+}
+
+void AddChecks(const Episode& episode, const report::FaultTexts& texts,
+               report::Report& page) {
+  std::string rest = episode.fault.value_or("unknown");
+  while (!rest.empty()) {
+    const std::size_t bar = rest.find('|');
+    const std::string fault = rest.substr(0, bar);
+    rest = bar == std::string::npos ? "" : rest.substr(bar + 1);
+    const report::FaultWords words = texts.Words(fault, episode.strength);
+    page.Line(words.name + (fault == "unknown" ? "" : " (" + fault + ")") +
+              ", for " + words.discipline + ":");
+    page.Checks(Sentences(words.check));
+  }
+}
+
+void AddPicture(const EpisodeEvidence& evidence,
+                const report::FaultTexts& texts, const GnuplotLimits& limits,
+                report::Report& page) {
+  if (evidence.trace.empty()) {
+    page.Line("There is no recording of this episode.");
+    return;
+  }
+  if (!HaveGnuplot()) {
+    page.Line(
+        "There is no picture, because gnuplot is not installed; on Debian it "
+        "is in gnuplot-nox.");
+    return;
+  }
+  EpisodeFigureOptions options;
+  options.fault_name =
+      texts.Words(evidence.episode.fault.value_or(""), 0.0).name;
+  Figure figure = EpisodeFigure(evidence, options);
+  figure.width = kPictureWidth;
+  figure.legend_width = kLegendWidth;
+  figure.groups = kGroups;
+  try {
+    page.Picture("evidence",
+                 "Over the time from the first abnormal sample: signals, "
+                 "residuals with their thresholds, decision factors",
+                 SvgElement(figure, limits));
+  } catch (const DataError& error) {
+    page.Line(error.what());
+  }
+}
+
+}  // namespace
+
+std::string IntervalText(double value, double lowest, double highest,
+                         int decimals, const std::string& unit) {
+  const auto number = [decimals](double x) {
+    return report::FormatNumber(x, decimals);
+  };
+  return number(value) + unit +
+         (lowest < highest
+              ? " (" + number(lowest) + " to " + number(highest) + ")"
+              : "");
+}
+
+std::vector<Column> EpisodeFields(const Alarm& alarm,
+                                  const report::FaultTexts& texts, bool utc) {
+  const Episode& e = alarm.episode;
+  const report::FaultWords words =
+      texts.Words(e.fault.value_or(""), e.strength, e.priority);
+  const auto when = [&](std::optional<std::int64_t> stamp_ns) {
+    return ShownTime(stamp_ns, utc) +
+           (stamp_ns ? ", after " + FormatDuration(*stamp_ns - e.detected_ns)
+                     : "");
+  };
+  return {{"episode", "episode_id"},
+          {"valve", "valve_id"},
+          {"source", "source_id"},
+          Field("fault", FaultLine(e, words.name)),
+          Field("check", words.check),
+          Field("severity", std::string(SeverityName(words.severity)) +
+                                ", priority " +
+                                std::to_string(PriorityOf(words.severity)) +
+                                " (" + words.discipline + "; NAMUR NE 107 " +
+                                std::string(NamurName(words.namur)) + ")"),
+          Field("alarm", AlarmLine(alarm, utc)),
+          {"detected", "detected_utc", report::Format::kTime},
+          Field("isolated", when(e.isolated_ns)),
+          Field("cleared", when(e.cleared_ns)),
+          Field("ended", ShownTime(e.ended_ns, utc) + " " +
+                             e.end_reason.value_or("(open)")),
+          Field("strength", StrengthLine(e)),
+          Field("model set",
+                e.model_set + " " + storage::EpisodeIdText(e.model_hash)),
+          {"label", "label"},
+          Field("acknowledged", AckLine(e, utc)),
+          {.heading = "trace", .text = [](const Json& episode) {
+             return episode["trace_instants"].dump() + " instants";
+           }}};
+}
+
+std::string EventSentence(const HistoryEntry& event,
+                          const report::FaultTexts& texts) {
+  if (!event.who.empty()) {
+    return ActionSentence(event, texts);
+  }
+  if (event.kind == "DETECTED") {
+    return "Detected: the readings no longer agree with the normal model.";
+  }
+  if (event.kind == "CLEARED") {
+    return "The readings agree with the normal model again.";
+  }
+  if (event.kind == "CLOSED") {
+    return "The episode ended: " + EndText(event.reason) + ".";
+  }
+  if (event.kind == "RESUMED") {
+    return "The monitor was started again and went on with the episode.";
+  }
+  std::string text = event.kind == "ISOLATED"     ? "Named "
+                     : event.kind == "REISOLATED" ? "The name became "
+                                                  : "Grown worse: ";
+  text += event.faults.empty() ? "none" : NameAndFault(event.faults, texts);
+  text.append(BySimulation(event.layer));
+  text += ", strength " + report::FormatNumber(event.strength, 2);
+  const auto severity =
+      event.priority ? SeverityOf(*event.priority) : std::nullopt;
+  return text +
+         (severity ? ", severity " + std::string(SeverityName(*severity))
+                   : "") +
+         ".";
+}
+
+std::string EpisodeTitle(const Episode& episode,
+                         const report::FaultTexts& texts) {
+  return episode.valve_id + ": " +
+         (episode.fault ? texts.Words(*episode.fault, episode.strength).name
+                        : "fault not named");
+}
+
+report::Report EpisodePage(const EpisodeEvidence& evidence, const Alarm& alarm,
+                           const report::FaultTexts& texts, bool utc,
+                           const GnuplotLimits& limits) {
+  const Episode& e = evidence.episode;
+  report::Report page;
+  const auto text_or_null = [](const std::optional<std::string>& text) {
+    return text ? Json(*text) : Json();
+  };
+  page.document = {{"episode_id", e.episode_id},
+                   {"valve_id", e.valve_id},
+                   {"source_id", storage::EpisodeIdText(e.source_id)},
+                   {"detected_utc", FormatTime(e.detected_ns, true)},
+                   {"label", text_or_null(e.label)},
+                   {"acked_by", text_or_null(e.acked_by)},
+                   {"trace_instants", evidence.trace.size()},
+                   {"story", StoryJson(evidence, texts)}};
+  std::vector<Column> fields = EpisodeFields(alarm, texts, utc);
+  // What to check has a part of its own.
+  std::erase_if(fields, [](const Column& f) { return f.heading == "check"; });
+  page.Fields("", std::move(fields));
+  page.Heading("What happened");
+  page.Table("story",
+             {{"at", "stamp_utc", report::Format::kTime},
+              {.heading = "after the start",
+               .key = "after",
+               .align = report::Align::kRight},
+              {.heading = "event", .key = "text", .wraps = true}},
+             "No event is stored.");
+  if (evidence.look) {
+    page.Line(LookText(*evidence.look, texts, utc));
+  }
+  page.Heading("What to check");
+  AddChecks(e, texts, page);
+  page.Heading("What was found");
+  page.Blanks({"Looked at by", "Date and time", "As found", "Cause",
+               "Work done, parts used", "As left"});
+  page.Checks({"The name was right.", "There was no fault.",
+               "There was another fault: ____________________"});
+  page.Line(
+      "To record it, so that the next model set learns from it:\n"
+      "fdi-store history label " +
+      e.episode_id + " true|false|FAULT --by NAME --comment TEXT");
+  // Last, so that what is to be done fits on the first sheet.
+  AddPicture(evidence, texts, limits, page);
+  return page;
+}
+
+}  // namespace fdi::plot

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+
+#include "storage/models/models.h"
+
+namespace fdi::storage {
+
+/// What watches a loop of the plant.
+enum class LoopWatch : std::uint8_t {
+  kNothing,
+  kAudit,   ///< The audit of loops: no model set is needed.
+  kFaults,  ///< A model set, which names faults.
+};
+std::string_view LoopWatchName(LoopWatch watch);  ///< "nothing", ...
+
+/// How far a row of the plant's table has come.
+enum class LoopState : std::uint8_t {
+  kExpected,   ///< Listed; its record was not read yet.
+  kOnboarded,  ///< Has a model set.
+  kDataOnly,   ///< Its record was read; no model set is asked for or possible.
+  kRefused,    ///< PlantLoop::finding says why.
+};
+std::string_view LoopStateName(LoopState state);  ///< "expected", ...
+
+/// A loop that ought to be there, as the table of the plant states it.
+struct PlantLoop {
+  std::string name;            ///< The id of its valve.
+  std::string service{};       ///< F, P, L, T, A; empty: not said.
+  std::string type{};          ///< Empty: data only.
+  std::optional<int> grade{};  ///< 1 (most important) to 3.
+  std::string group{};         ///< Of valves that may share a cause.
+  LoopWatch watch{LoopWatch::kNothing};
+  LoopState state{LoopState::kExpected};
+  std::string finding{};       ///< One sentence about its record.
+  std::string input_hash{};    ///< Of its row and record; empty: not read.
+  std::int64_t checked_ns{0};  ///< UTC; set by the store.
+};
+
+/// The result for one valve, which ModelStore::Store() stores all or not at
+/// all.
+struct ValveResult {
+  /// The entry if the valve has none yet; an existing one keeps its epoch and
+  /// its model set unless `models` replaces that. Without a pattern only the
+  /// set and the type are stored.
+  ValveEntry entry;
+  std::optional<ModelSet> models;
+  BaselineRecord baseline;  ///< Epoch, set and version are those of the store.
+  /// Makes the type to store from the set as it was saved.
+  std::function<ValveType(const ModelSet&)> type;
+  std::optional<PlantLoop> loop;
+};
+
+}  // namespace fdi::storage

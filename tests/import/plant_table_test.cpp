@@ -1,0 +1,135 @@
+// A table of a plant's loops, its tags, and the columns of one loop out of a
+// file of many.
+#include "import/plant_table.h"
+
+#include <fstream>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "base/error.h"
+#include "import/column_index.h"
+#include "tests/storage/temporary_directory.h"
+
+namespace fdi::importer {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+class PlantTableTest : public ::testing::Test {
+ protected:
+  std::filesystem::path Write(const std::string& name,
+                              const std::string& text) {
+    const auto path = directory_.path() / name;
+    std::ofstream(path) << text;
+    return path;
+  }
+  storage::TemporaryDirectory directory_;
+};
+
+constexpr const char* kToml = R"(
+files = ["day.csv"]
+[defaults]
+op = "{loop}.OP"
+sense = "opening"
+[group.boiler]
+x = "{loop}.ZT"
+op_range = [0, 1]
+[[loop]]
+name = "FIC1"
+group = "boiler"
+service = "f"
+grade = 2
+type = "lublin-actuator-3"
+[[loop]]
+name = "LIC2"
+service = "L"
+type = "data only"
+)";
+constexpr const char* kCsv =
+    "name,group,op,x,op_range,sense,service,grade,type\n"
+    "*,,{loop}.OP,,,opening,,,\n"
+    "*,boiler,,{loop}.ZT,0..1,,,,\n"
+    "FIC1,boiler,,,,,f,2,lublin-actuator-3\n"
+    "LIC2,,,,,,L,,data only\n";
+
+TEST_F(PlantTableTest, TomlAndCsvSayTheSame) {
+  for (const auto& path : {Write("p.toml", kToml), Write("p.csv", kCsv)}) {
+    const PlantTable table = ReadPlantTable(path);
+    ASSERT_EQ(table.rows.size(), 2U);
+    const PlantRow& first = table.rows[0];
+    EXPECT_THAT(first.error, IsEmpty());
+    EXPECT_EQ(first[LoopTag::kOp].pattern, "FIC1.OP");
+    EXPECT_FALSE(first[LoopTag::kOp].own);
+    EXPECT_EQ(first[LoopTag::kX].pattern, "FIC1.ZT");
+    EXPECT_EQ(first[LoopTag::kOp].range, std::pair(0.0, 1.0));
+    EXPECT_EQ(first.sense, Sense::kOpening);
+    EXPECT_EQ(first.service, "F");
+    EXPECT_EQ(first.grade, 2);
+    EXPECT_EQ(first.type, "lublin-actuator-3");
+    const PlantRow& second = table.rows[1];
+    EXPECT_EQ(second[LoopTag::kOp].pattern, "LIC2.OP");
+    EXPECT_THAT(second[LoopTag::kX].pattern, IsEmpty());
+    EXPECT_THAT(second.type, IsEmpty());
+  }
+}
+
+TEST_F(PlantTableTest, WhatIsWrongWithARowIsOfThatRow) {
+  const PlantTable table =
+      ReadPlantTable(Write("p.csv",
+                           "name,op,grade,service,op_range\n"
+                           "A,A.OP,4,,\n"
+                           "B,{tag}.OP,,,\n"
+                           "C,C.OP,,Q,\n"
+                           "D,D.OP,,,5..1\n"
+                           ",E.OP,,,\n"
+                           "F,F.OP,,,\n"));
+  ASSERT_EQ(table.rows.size(), 6U);
+  EXPECT_THAT(table.rows[0].error, HasSubstr("grade is \"4\""));
+  EXPECT_THAT(table.rows[1].error, HasSubstr("{loop}"));
+  EXPECT_THAT(table.rows[2].error, HasSubstr("F, P, L, T or A"));
+  EXPECT_THAT(table.rows[3].error, HasSubstr("LOW..HIGH"));
+  EXPECT_THAT(table.rows[4].error, HasSubstr("no name"));
+  EXPECT_THAT(table.rows[5].error, IsEmpty());
+  EXPECT_THROW(ReadPlantTable(Write("q.csv", "name,opp\nA,A.OP\n")), DataError);
+}
+
+TEST_F(PlantTableTest, StarsMatchAndTwoMatchesAreAmbiguous) {
+  const TagNames names({"U1_FIC1.op", "U1_FIC1.PV", "U2_FIC1.PV"});
+  EXPECT_THAT(names.Find("*FIC1.OP"), ElementsAre("U1_FIC1.op"));
+  EXPECT_THAT(names.Find("*FIC1.PV"), ElementsAre("U1_FIC1.PV", "U2_FIC1.PV"));
+  EXPECT_THAT(names.Find("FIC1*"), IsEmpty());
+}
+
+// Lines keep their numbers, quality and quotes their columns.
+TEST_F(PlantTableTest, AProjectionIsTheTableOfItsColumns) {
+  const auto path = Write("wide.csv",
+                          "Export of Monday\n"
+                          "time,A.OP,\"B, x\",C\n"
+                          "0,1,\"2\",3\n"
+                          "1,4,\"5\",6\n"
+                          "\n"
+                          "2,7,8,9\n"
+                          "3,1,1,1\n");
+  const ColumnIndex index(path, {});
+  EXPECT_THAT(index.tags(), ElementsAre("A.OP", "B, x", "C"));
+  EXPECT_EQ(index.Project({"C", "B, x"}),
+            "Export of Monday\ntime,\"B, "
+            "x\",C\n0,\"2\",3\n1,\"5\",6\n\n2,8,9\n3,1,1\n");
+}
+
+TEST_F(PlantTableTest, TagsOfALongTableAreItsColumns) {
+  const auto path = Write("long.csv",
+                          "time,tag,value\n"
+                          "0,A.OP,1\n0,B.OP,2\n1,A.OP,3\n1,B.OP,4\n"
+                          "2,A.OP,5\n2,B.OP,6\n");
+  const ColumnIndex index(path, {});
+  EXPECT_THAT(index.tags(), ElementsAre("A.OP", "B.OP"));
+  EXPECT_EQ(index.Project({"B.OP"}),
+            "time,tag,value\n\n0,B.OP,2\n\n1,B.OP,4\n\n2,B.OP,6\n");
+}
+
+}  // namespace
+}  // namespace fdi::importer

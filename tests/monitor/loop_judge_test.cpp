@@ -1,0 +1,156 @@
+// A valve without a model set, from its samples to the history.
+#include "monitor/names/loop_judge.h"
+
+#include <algorithm>
+#include <cmath>
+#include <thread>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "diagnosis/fault_catalogue.h"
+#include "monitor/valve_monitor.h"
+#include "storage/history/history_reader.h"
+#include "storage/history/history_writer.h"
+#include "tests/monitor/fake_sinks.h"
+#include "tests/monitor/test_support.h"
+#include "tests/storage/temporary_directory.h"
+
+namespace fdi::monitor {
+namespace {
+
+using testing::ElementsAre;
+
+// Keeps what a tracker tells.
+class LoopOutlet : public FakeOutlet {
+ public:
+  void OnEvent(FaultEvent event) override {
+    kinds.push_back(event.transition.kind);
+    events.push_back(std::move(event));
+  }
+  void OnEvidence(EpisodeTrace trace) override { points += trace.trace.size(); }
+  void OnNormal(const std::string& /*valve*/, std::int64_t /*ns*/) override {
+    ++normal;
+  }
+
+  std::vector<FaultEvent> events;
+  std::vector<TransitionKind> kinds;
+  std::size_t points{0};
+  int normal{0};
+};
+
+class LoopJudgeTest : public testing::Test {
+ protected:
+  LoopJudgeTest() { worker_.Start(); }
+  ~LoopJudgeTest() override { worker_.Stop(); }
+
+  static Sample At(std::uint64_t seq, double x_follows) {
+    Sample sample;
+    sample.seq = seq;
+    sample.source_id = 1;
+    const auto k = static_cast<double>(seq);
+    sample.stamp_ns =
+        (1'700'000'000 + static_cast<std::int64_t>(seq) * 10) * kSecond;
+    const double cv = 50.0 + 10.0 * std::sin(0.02 * k);
+    sample.Set(Signal::kCv, cv);
+    sample.Set(Signal::kX, 50.0 + x_follows * (cv - 50.0));
+    return sample;
+  }
+  // Samples [from, to), each once the answers to those before are there.
+  void Feed(std::uint64_t from, std::uint64_t to, double x_follows) {
+    for (std::uint64_t k = from; k < to; ++k) {
+      const ValveOutcome outcome =
+          valve_.Step(At(k, x_follows), 1, now_, outlet_);
+      last_ = outcome.verdict;
+      models_ = outcome.models;
+      while (worker_.busy()) {
+        std::this_thread::yield();
+      }
+    }
+  }
+
+  AuditWorker worker_;
+  ValveMonitor::TimePoint now_{};
+  LoopOutlet outlet_;
+  ValveMonitor valve_{"V1",
+                      std::nullopt,
+                      {},
+                      nullptr,
+                      std::make_shared<const SeverityCatalogue>(),
+                      &worker_};
+  Verdict last_;
+  const ModelSet* models_{nullptr};
+};
+
+TEST_F(LoopJudgeTest, ALoopThatIsSoundIsJudgedAndNormal) {
+  Feed(1, 720, 1.0);
+  EXPECT_EQ(models_, nullptr);
+  EXPECT_EQ(last_.quality, Quality::kUnassigned);
+
+  Feed(720, 1000, 1.0);
+  ASSERT_NE(models_, nullptr);
+  EXPECT_EQ(models_->name, "audit");
+  EXPECT_EQ(last_.quality, Quality::kLive);
+  EXPECT_EQ(outlet_.normal, 1);
+  EXPECT_TRUE(outlet_.events.empty());
+}
+
+TEST_F(LoopJudgeTest, ARodThatStandsIsAnEpisodeWithItsEvidence) {
+  Feed(1, 1000, 0.0);
+
+  ASSERT_THAT(outlet_.kinds, ElementsAre(TransitionKind::kDetected,
+                                         TransitionKind::kIsolated));
+  const FaultEvent& named = outlet_.events[1];
+  EXPECT_EQ(named.model_set, "audit");
+  ASSERT_EQ(named.candidates.size(), 1U);
+  EXPECT_EQ(named.candidates[0].fault, kNoResponse);
+  EXPECT_TRUE(named.candidates[0].isolated);
+  EXPECT_GE(outlet_.points, LoopWatch::kPoints);
+  EXPECT_TRUE(valve_.episode_open());
+
+  storage::TemporaryDirectory directory;
+  storage::HistoryWriter writer(directory.path() / "history.db");
+  writer.CommitBatch([&] {
+    for (const FaultEvent& event : outlet_.events) {
+      writer.Record(event, event.transition.stamp_ns);
+    }
+  });
+  const auto episodes =
+      storage::HistoryReader(directory.path() / "history.db").List();
+  ASSERT_EQ(episodes.size(), 1U);
+  EXPECT_EQ(episodes[0].fault, "no_response");
+  EXPECT_EQ(episodes[0].layer, "audit");
+  EXPECT_EQ(writer.OpenEpisodes().at(0).layer, Layer::kAudit);
+}
+
+TEST_F(LoopJudgeTest, ItsEpisodeEndsWithTheStreamAndWithAModelSet) {
+  Feed(1, 1000, 0.0);
+  EXPECT_FALSE(valve_.Adopt(std::nullopt, outlet_));  // As it was.
+  ASSERT_TRUE(valve_.EndStream(1, outlet_));
+  ASSERT_EQ(outlet_.kinds.size(), 3U);
+  EXPECT_EQ(outlet_.kinds[2], TransitionKind::kClosed);
+  EXPECT_EQ(outlet_.events[2].transition.reason, EndReason::kStreamEnded);
+  EXPECT_FALSE(valve_.episode_open());
+}
+
+// What does not fit is refused, and the loop asks again.
+TEST(AuditWorkerTest, AFewWindowsMayWait) {
+  AuditWorker worker;
+  std::vector<std::future<std::optional<loop::Audit>>> answers;
+  loop::Window window;
+  window.op = window.pv = std::vector<double>(60, 1.0);
+  while (worker.has_room()) {
+    answers.push_back(worker.Submit(window));
+  }
+  EXPECT_EQ(answers.size(), AuditWorker::kCapacity);
+  window.pv.pop_back();  // Cannot be audited.
+  answers.push_back(worker.Submit(window));
+  worker.Start();
+  EXPECT_FALSE(answers.back().get());
+  EXPECT_TRUE(answers.front().get());
+  worker.Stop();
+  EXPECT_FALSE(worker.Submit(window).get());
+}
+
+}  // namespace
+}  // namespace fdi::monitor

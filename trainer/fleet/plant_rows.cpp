@@ -1,0 +1,37 @@
+#include "trainer/fleet/plant_rows.h"
+
+namespace fdi::trainer {
+
+using importer::LoopTag;
+
+storage::PlantLoop LoopOf(const importer::PlantRow& row) {
+  storage::PlantLoop loop;
+  loop.name = row.name;
+  loop.service = row.service;
+  loop.type = row.type;
+  loop.grade = row.grade;
+  loop.group = row.group;
+  return loop;
+}
+
+storage::ValveEntry EntryOf(const importer::PlantRow& row) {
+  storage::ValveEntry entry;
+  entry.pattern = row.name;
+  entry.type = row.type.empty() ? "data only" : row.type;
+  entry.sense = row.sense;
+  entry.signals = MaskOf(Signal::kCv);
+  const auto add = [&](LoopTag tag, Signal signal) {
+    if (!row[tag].pattern.empty()) {
+      entry.signals = static_cast<SignalMask>(entry.signals | MaskOf(signal));
+    }
+  };
+  add(LoopTag::kSp, Signal::kSp);
+  add(LoopTag::kX, Signal::kX);
+  add(row.FlowTag().value_or(LoopTag::kF), Signal::kF);
+  add(LoopTag::kP1, Signal::kP1);
+  add(LoopTag::kP2, Signal::kP2);
+  add(LoopTag::kT1, Signal::kT1);
+  return entry;
+}
+
+}  // namespace fdi::trainer
