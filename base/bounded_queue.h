@@ -1,11 +1,11 @@
 #pragma once
 
 #include <chrono>
-#include <condition_variable>
 #include <cstddef>
-#include <mutex>
 #include <utility>
 #include <vector>
+
+#include "base/mutex.h"
 
 namespace fdi {
 
@@ -22,13 +22,13 @@ class BoundedQueue {
   explicit BoundedQueue(std::size_t capacity) : capacity_(capacity) {}
 
   bool HasRoom() const {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     return items_.size() < capacity_;
   }
 
   /// @returns false if the queue is closed, before or while waiting.
   bool WaitForRoom() {
-    std::unique_lock lock(mutex_);
+    MutexLock lock(mutex_);
     return WaitForRoom(lock);
   }
 
@@ -36,14 +36,14 @@ class BoundedQueue {
   /// before or while waiting.
   template <typename U>
   bool Push(U&& item) {
-    std::unique_lock lock(mutex_);
+    MutexLock lock(mutex_);
     return WaitForRoom(lock) && Append(std::forward<U>(item));
   }
 
   /// @returns false, dropping the item, if the queue is full or closed.
   template <typename U>
   bool TryPush(U&& item) {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     return !closed_ && items_.size() < capacity_ &&
            Append(std::forward<U>(item));
   }
@@ -53,8 +53,8 @@ class BoundedQueue {
   /// @returns false once the queue is closed and drained.
   bool PopAll(std::vector<T>& batch, std::chrono::milliseconds timeout) {
     batch.clear();
-    std::unique_lock lock(mutex_);
-    arrival_.wait_for(lock, timeout, [this] {
+    MutexLock lock(mutex_);
+    arrival_.wait_for(lock, timeout, [this]() REQUIRES(mutex_) {
       return closed_ || interrupted_ || !items_.empty();
     });
     interrupted_ = false;
@@ -68,38 +68,40 @@ class BoundedQueue {
 
   /// Whether PopAll() made room in a full queue since the last call.
   bool Reopened() {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     return std::exchange(reopened_, false);
   }
 
   /// Makes the current PopAll(), or else the next one, return at once.
   void Interrupt() {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     interrupted_ = true;
     arrival_.notify_one();
   }
 
   /// Rejects further items; those in the queue can still be taken.
   void Close() {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     closed_ = true;
     arrival_.notify_all();
     room_.notify_all();
   }
 
   std::size_t size() const {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     return items_.size();
   }
 
  private:
-  bool WaitForRoom(std::unique_lock<std::mutex>& lock) {
-    room_.wait(lock, [this] { return closed_ || items_.size() < capacity_; });
+  bool WaitForRoom(MutexLock& lock) REQUIRES(mutex_) {
+    room_.wait(lock, [this]() REQUIRES(mutex_) {
+      return closed_ || items_.size() < capacity_;
+    });
     return !closed_;
   }
 
   template <typename U>
-  bool Append(U&& item) {
+  bool Append(U&& item) REQUIRES(mutex_) {
     items_.push_back(std::forward<U>(item));
     if (items_.size() == 1) {  // A consumer only sleeps on an empty queue.
       arrival_.notify_one();
@@ -108,13 +110,13 @@ class BoundedQueue {
   }
 
   const std::size_t capacity_;
-  mutable std::mutex mutex_;
-  std::condition_variable arrival_;
-  std::condition_variable room_;
-  std::vector<T> items_;
-  bool reopened_{false};
-  bool interrupted_{false};
-  bool closed_{false};
+  mutable Mutex mutex_;
+  CondVar arrival_;
+  CondVar room_;
+  std::vector<T> items_ GUARDED_BY(mutex_);
+  bool reopened_ GUARDED_BY(mutex_){false};
+  bool interrupted_ GUARDED_BY(mutex_){false};
+  bool closed_ GUARDED_BY(mutex_){false};
 };
 
 }  // namespace fdi

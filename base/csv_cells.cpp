@@ -17,6 +17,7 @@
 #include <zlib.h>
 
 #include "base/error.h"
+#include "base/text.h"
 
 namespace fdi {
 namespace {
@@ -227,11 +228,7 @@ std::string Quoted(std::string_view text) {
 }
 
 std::string Listed(const std::vector<std::string>& names) {
-  std::string list;
-  for (const std::string& name : names) {
-    list += (list.empty() ? "" : ",") + name;
-  }
-  return list;
+  return JoinText(names, ",");
 }
 
 //     grouped = 1*3DIGIT sign 3DIGIT       not beginning with 0
@@ -329,14 +326,20 @@ std::string PlainText(std::string_view text) {
       {"Ź", "z"}, {"Ć", "c"}, {"Ę", "e"}, {"Ą", "a"},  {"Á", "a"}, {"Í", "i"}};
   std::string plain;
   for (std::size_t i = 0; i < text.size(); ++i) {
-    const auto letter = std::ranges::find_if(kLetters, [&](const auto& entry) {
-      return entry.first == text.substr(i, 2);
-    });
-    plain += text.size() - i > 1 && letter != std::end(kLetters)
-                 ? std::string(letter->second)
-                 : std::string(1, static_cast<char>(std::tolower(
-                                      static_cast<unsigned char>(text[i]))));
-    i += text.size() - i > 1 && letter != std::end(kLetters) ? 1U : 0U;
+    const auto c = static_cast<unsigned char>(text[i]);
+    constexpr unsigned char kAsciiEnd = 0x80;
+    // Most text is ASCII, and there is a lot of it.
+    const auto letter =
+        c < kAsciiEnd
+            ? std::end(kLetters)
+            : std::ranges::find(kLetters, text.substr(i, 2),
+                                [](const auto& e) { return e.first; });
+    if (letter != std::end(kLetters)) {
+      plain += letter->second;
+      ++i;
+    } else {
+      plain += static_cast<char>(std::tolower(c));
+    }
   }
   return plain;
 }

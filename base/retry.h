@@ -3,10 +3,20 @@
 #include <chrono>
 #include <condition_variable>
 #include <exception>
-#include <mutex>
 #include <stop_token>
 
+#include "base/mutex.h"
+
 namespace fdi {
+
+/// Waits for `pause`, or until `stop` if that comes first.
+inline void PauseUntil(const std::stop_token& stop,
+                       std::chrono::milliseconds pause) {
+  Mutex mutex;
+  std::condition_variable_any stopped;
+  MutexLock lock(mutex);
+  stopped.wait_for(lock, stop, pause, [] { return false; });
+}
 
 /// The loop of a thread that must not end the process: calls `work` until
 /// `stop`. What it throws goes to `report`, and the next call comes a `pause`
@@ -15,8 +25,6 @@ namespace fdi {
 template <typename Work, typename Report>
 void RetryUntil(const std::stop_token& stop, std::chrono::milliseconds pause,
                 const Work& work, const Report& report) {
-  std::mutex mutex;
-  std::condition_variable_any stopped;
   while (!stop.stop_requested()) {
     try {
       work();
@@ -25,8 +33,7 @@ void RetryUntil(const std::stop_token& stop, std::chrono::milliseconds pause,
         report(error);
       } catch (const std::exception&) {
       }
-      std::unique_lock lock(mutex);
-      stopped.wait_for(lock, stop, pause, [] { return false; });
+      PauseUntil(stop, pause);
     }
   }
 }

@@ -13,6 +13,7 @@
 #include <regex>
 
 #include "base/error.h"
+#include "base/text.h"
 #include "base/time_units.h"
 
 namespace fdi {
@@ -35,6 +36,7 @@ constexpr const char* kTimeForms =
 //
 //     time    = date [("T" / "t" / " ") clock] [offset]
 //     date    = YYYY s month s day / day s month s (YYYY / YY)   one s per date
+//             / "Jan" ... "Dec" " " day ", " YYYY [","]
 //     month   = number / "Jan" ... "Dec"
 //     clock   = hh ":" mm [":" ss [("." / ",") 1*DIGIT]] [[" "] ("AM" / "PM")]
 //     offset  = [" "] ("Z" / "UTC" / "GMT" / ("+" / "-") hh [[":"] mm])
@@ -96,14 +98,6 @@ class Scanner {
   std::string_view rest_;
 };
 
-std::string Lower(std::string_view text) {
-  std::string lower(text);
-  std::ranges::transform(lower, lower.begin(), [](unsigned char c) {
-    return static_cast<char>(std::tolower(c));
-  });
-  return lower;
-}
-
 // 1..12 for "Oct" etc., in English, which historians use.
 std::optional<int> MonthOf(std::string_view word) {
   constexpr std::string_view kMonths = "janfebmaraprmayjunjulaugsepoctnovdec";
@@ -113,9 +107,36 @@ std::optional<int> MonthOf(std::string_view word) {
              : std::nullopt;
 }
 
-// 2026-11-20, 20.11.2026, 20-Nov-2026, 20-Nov-26, 20.11.26; 20/11/2026 and
-// 20/11/26 by `order`.
+// mktime() and timegm() would turn 31 February into 3 March without an error.
+bool TakeDate(int year, int month, int day, std::tm& fields) {
+  fields.tm_year = year - 1900;
+  fields.tm_mon = month - 1;
+  fields.tm_mday = day;
+  return std::chrono::year_month_day{
+      std::chrono::year(year), std::chrono::month(static_cast<unsigned>(month)),
+      std::chrono::day(static_cast<unsigned>(day))}
+      .ok();
+}
+
+// Nov 20, 2026
+bool ScanAmericanDate(Scanner& in, std::tm& fields) {
+  const auto month = MonthOf(in.Word());
+  const auto day = in.Take(" ") ? in.Number() : std::nullopt;
+  if (!month || !day || !in.Take(",") || !in.Take(" ")) {
+    return false;
+  }
+  std::size_t digits = 0;
+  const auto year = in.Number(&digits);
+  in.Take(",");
+  return year && digits == 4 && TakeDate(*year, *month, *day, fields);
+}
+
+// 2026-11-20, 20.11.2026, 20-Nov-2026, 20-Nov-26, 20.11.26, Nov 20, 2026;
+// 20/11/2026 and 20/11/26 by `order`.
 bool ScanDate(Scanner& in, DateOrder order, std::tm& fields) {
+  if (std::isalpha(static_cast<unsigned char>(in.next())) != 0) {
+    return ScanAmericanDate(in, fields);
+  }
   std::size_t digits = 0;
   const auto first = in.Number(&digits);
   const bool iso =
@@ -152,15 +173,7 @@ bool ScanDate(Scanner& in, DateOrder order, std::tm& fields) {
       std::swap(day, month);
     }
   }
-  fields.tm_year = *year - 1900;
-  fields.tm_mon = *month - 1;
-  fields.tm_mday = *day;
-  // mktime() and timegm() would turn 31 February into 3 March without an error.
-  return std::chrono::year_month_day{
-      std::chrono::year(*year),
-      std::chrono::month(static_cast<unsigned>(*month)),
-      std::chrono::day(static_cast<unsigned>(*day))}
-      .ok();
+  return TakeDate(*year, *month, *day, fields);
 }
 
 // " 14:56", "T14:56:11.5", "14:56:11,5 PM"

@@ -84,13 +84,14 @@ std::size_t HeapBytes() {
   return info.uordblks + info.hblkhd;
 }
 
-// 10 000 loops without a model set, a sample each second, whose windows are
-// full: 600 s in a row, in which each is audited once. Argument 0: with the
+// 10 000 loops, a sample each second, whose windows are full: 1200 s in a row,
+// in which each is audited once. Argument 0: with the
 // audits, or only the windows.
 void FollowManyLoops(benchmark::State& state) {
   const bool audits = state.range(0) != 0;
   constexpr std::uint64_t kLoops = 10'000;
-  constexpr std::uint64_t kSeconds = 600;
+  constexpr auto kSeconds =
+      static_cast<std::uint64_t>(LoopWatch::kHop * LoopWatch::kInterval_s);
   const std::size_t before = HeapBytes();
   std::vector<LoopWatch> loops;
   const auto severities = std::make_shared<const SeverityCatalogue>();

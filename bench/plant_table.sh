@@ -75,27 +75,30 @@ paste -d, time.csv columns/* >plant.csv
 rows=$((types * per_type + data_only))
 echo "$rows loops, $types types, $data_only data only, $(wc -c <plant.csv) bytes"
 
-# Seconds and peak memory of a command: "label: S s, M MB".
+# Time, processor time and peak memory of a command:
+# "label: S s, C s of CPU, M MB"; its seconds remain in $took.
+TIMEFORMAT='%R %U %S'
 measured() {  # LABEL COMMAND...
-  local label=$1 begin peak=0 now pid
+  local label=$1 peak=0 now pid status=0
   shift
-  begin=$(date +%s.%N)
-  "$@" >out.txt 2>err.txt &
-  pid=$!
-  while kill -0 "$pid" 2>/dev/null; do
-    now=$(awk '/VmHWM/ { print $2 }' "/proc/$pid/status" 2>/dev/null || true)
-    peak=${now:-$peak}
-    sleep 0.1
-  done
-  wait "$pid" || { cat err.txt; return 1; }
-  awk -v label="$label" -v begin="$begin" -v end="$(date +%s.%N)" \
+  {
+    time {
+      "$@" >out.txt 2>err.txt &
+      pid=$!
+      while kill -0 "$pid" 2>/dev/null; do
+        now=$(awk '/VmHWM/ { print $2 }' "/proc/$pid/status" 2>/dev/null || true)
+        peak=${now:-$peak}
+        sleep 0.2
+      done
+      wait "$pid" || status=$?
+    }
+  } 2>time.txt
+  [ "$status" -eq 0 ] || { cat err.txt; return 1; }
+  read -r took user system <time.txt
+  awk -v label="$label" -v took="$took" -v user="$user" -v kernel="$system" \
     -v peak="$peak" 'BEGIN {
-      printf "%s: %.1f s, %.0f MB\n", label, end - begin, peak / 1024 }'
-}
-onboard() {  # DATA OPTION...
-  local data=$1
-  shift
-  "$bin/fdi-trainer" --data "$data" onboard --plant plant.toml "$@"
+      printf "%s: %.1f s, %.1f s of CPU, %.0f MB\n", label, took,
+             user + kernel, peak / 1024 }'
 }
 sets() {  # DATA: the sets that are assigned, by their content
   "$bin/fdi-store" --data "$1" models list --json |
@@ -113,13 +116,14 @@ done
 measured 'dry run of 1000 rows' "$bin/fdi-trainer" --data dry onboard \
   --plant thousand.toml --dry-run
 measured 'all rows' "$bin/fdi-trainer" --data whole onboard --plant plant.toml
+half=$(awk -v took="$took" 'BEGIN { print took / 2 }')
 tail -3 out.txt
 measured 'second run' "$bin/fdi-trainer" --data whole onboard --plant plant.toml
 tail -1 out.txt
 
-onboard killed >/dev/null 2>&1 &
+"$bin/fdi-trainer" --data killed onboard --plant plant.toml >/dev/null 2>&1 &
 victim=$!
-sleep "${FDI_KILL_AFTER:-30}"
+sleep "$half"
 kill -9 "$victim" 2>/dev/null || true
 wait "$victim" 2>/dev/null || true
 measured 'after a kill' "$bin/fdi-trainer" --data killed onboard \

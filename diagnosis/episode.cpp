@@ -222,6 +222,7 @@ void Episode::Step(const Sample& sample, const ObserverBank& bank,
     begun_ = true;
   }
   if (begun_ && findings.settled) {
+    faults_.PushInputs(sample);
     faults_.Update(bank);
   }
   ApplyEvidence(verdict);
@@ -240,6 +241,7 @@ void Episode::Step(const Sample& sample, const ObserverBank& bank,
   // floor, so NameFloor() comes after Isolate().
   if (findings.settled) {
     Isolate(sample, findings, verdict);
+    ApplyMisfits(verdict);
     JudgeUnknown(verdict);
   }
   NameFloor(verdict);
@@ -261,6 +263,7 @@ void Episode::Step(const Sample& sample, const ObserverBank& bank,
 
 void Episode::Hold(Verdict& verdict) const {
   ApplyEvidence(verdict);
+  ApplyMisfits(verdict);
 }
 
 // Before the gathering has begun, the evidence is that of an earlier episode.
@@ -293,6 +296,8 @@ void Episode::Open(std::int64_t stamp_ns, Verdict& verdict) {
   contender_run_ = 0;
   proven_run_ = 0;
   early_ = false;
+  refuted_run_ = 0;
+  misfits_ = 0;
   Emit(TransitionKind::kDetected, detection_stamp_ns_, verdict);
 }
 
@@ -401,6 +406,47 @@ FaultSet Episode::LossBeside(FaultSet set, FaultSet floor,
   return of_process || of_meter ? 0 : loss;
 }
 
+// Fit does not choose among faults, evidence does. But where none of a name
+// fits any more, the name is taken back: what the episode shows is outside all
+// that is known. Samples that normal operation explains refute nothing: the
+// fault may have gone, and the episode keeps the name until it is cleared.
+void Episode::Withdraw(FaultSet misfits, Verdict& verdict) {
+  if (verdict.normal_factor >= models_->decision.isolation_threshold) {
+    return;
+  }
+  const int most = std::max(models_->decision.isolation_samples,
+                            models_->decision.reisolation_samples);
+  refuted_run_ =
+      std::max(0, refuted_run_ + (IsAllOf(verdict.isolated, misfits) ? 1 : -1));
+  if (refuted_run_ < most) {
+    return;
+  }
+  refuted_run_ = 0;
+  early_ = false;
+  without_fault_ = most;
+  verdict.isolated = floor_;
+  verdict.state = floor_ != 0 ? State::kIsolated : State::kDetected;
+  verdict.unknown = floor_ != 0 ? Unknown::kNone : Unknown::kOutsideKnown;
+  Emit(TransitionKind::kReisolated, verdict.stamp_ns, verdict);
+}
+
+// Some faults, all of them misfits; findings of the floor do not count.
+bool Episode::IsAllOf(FaultSet faults, FaultSet misfits) const {
+  const FaultSet known = faults & ~floor_names_;
+  return known != 0 && (known & ~misfits) == 0;
+}
+
+// Of an episode without a name, what does not fit is no candidate.
+void Episode::ApplyMisfits(Verdict& verdict) const {
+  constexpr double kShare = 0.25;  // of T; a candidate has 0.5
+  const double most = kShare * models_->decision.isolation_threshold;
+  for (std::size_t i = 0; i < models_->faults.size(); ++i) {
+    if ((verdict.isolated & ~floor_names_) == 0 && Has(misfits_, i)) {
+      verdict.fault_factors[i] = std::min(verdict.fault_factors[i], most);
+    }
+  }
+}
+
 // Before t_k, and whether the line has lost its flow once there is a name. The
 // floor takes its time: what it is about to find holds an early name back.
 void Episode::NameEarly(const Sample& sample, FaultSet beginning,
@@ -421,7 +467,13 @@ void Episode::Isolate(const Sample& sample, const Findings& findings,
   // Before any return, so that the window is full when a hold ends or the valve
   // no longer looks normal.
   isolation_.Push(FactorsFrom(threshold, verdict));
+  // A stuck transmitter is certain, whatever its observers say.
+  misfits_ = findings.stuck != 0 ? 0 : faults_.misfits();
+  Withdraw(misfits_, verdict);
   FaultSet supported = isolation_.Supported();
+  if (IsAllOf(supported, misfits_)) {
+    supported = 0;
+  }
   if (isolation_held_ || verdict.normal_factor >= threshold) {
     contender_run_ = 0;
     proven_run_ = 0;

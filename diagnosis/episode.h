@@ -148,6 +148,9 @@ class Episode {
   void Open(std::int64_t stamp_ns, Verdict& verdict);
   FaultSet Proven(const Verdict& verdict);
   FaultSet LossBeside(FaultSet set, FaultSet floor, const Sample& sample) const;
+  void Withdraw(FaultSet misfits, Verdict& verdict);
+  bool IsAllOf(FaultSet faults, FaultSet misfits) const;
+  void ApplyMisfits(Verdict& verdict) const;
   void NameEarly(const Sample& sample, FaultSet beginning, Verdict& verdict);
   void Isolate(const Sample& sample, const Findings& findings,
                Verdict& verdict);
@@ -177,7 +180,10 @@ class Episode {
   int proven_run_{0};      // samples in a row
   bool early_{false};      // isolated before t_k
   FaultSet contender_{0};  // candidate to replace the isolated set
-  int contender_run_{0};   // samples that supported it and no other since
+  FaultSet misfits_{0};    // do not fit the last t_k samples
+  int refuted_run_{
+      0};  // samples in which no fault of the name fits, less others
+  int contender_run_{0};  // samples that supported it and no other since
 };
 
 }  // namespace fdi

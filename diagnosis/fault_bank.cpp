@@ -15,11 +15,14 @@ namespace {
 constexpr double kMemoryOfContradiction = 4.0;
 // With an allowance for interpolation, so many supports beyond it suffice.
 constexpr double kBeyondAllowance = 2.0;
+constexpr std::array kInputs{Signal::kP1, Signal::kP2, Signal::kT1};
 
 }  // namespace
 
 FaultBank::FaultBank(std::shared_ptr<const FaultPlan> plan)
-    : plan_(std::move(plan)), trained_(plan_) {
+    : plan_(std::move(plan)),
+      trained_(plan_),
+      inputs_(plan_->models().decision.isolation_samples, kInputs.size()) {
   for (const StrengthPath& path : plan_->paths()) {
     trackers_.emplace_back(*plan_, path);
   }
@@ -45,6 +48,10 @@ void FaultBank::Restart() {
   trained_.Clear();
   effects_.fill(0.0);
   allowance_ = 0.0;
+  misfits_ = 0;
+  inputs_.Restart();
+  odd_ = 0;
+  usual_ = 0;
   for (StrengthTracker& tracker : trackers_) {
     tracker.Restart();
   }
@@ -93,7 +100,17 @@ void FaultBank::Update(const ObserverBank& bank) {
   trained_.Gather(bank);
   for (StrengthTracker& tracker : trackers_) {
     tracker.Step(bank);
+    if (plan_->judges_fit()) {
+      tracker.PushFit(bank, trained_);
+    }
   }
+  misfits_ = 0;
+  FaultSet fitting = 0;
+  for (const StrengthTracker& tracker : trackers_) {
+    (Fits(tracker) ? fitting : misfits_) |= FaultSet{1}
+                                            << tracker.path().fault_index;
+  }
+  misfits_ &= ~fitting;
   allowance_ = Allowance();
   const double support = plan_->models().decision.evidence_support;
   const double least =
@@ -103,6 +120,38 @@ void FaultBank::Update(const ObserverBank& bank) {
   for (StrengthTracker& tracker : trackers_) {
     tracker.RaiseEvidence(least);
   }
+}
+
+void FaultBank::PushInputs(const Sample& sample) {
+  constexpr double kOdd = 5.0;
+  const ValidityRegion& region = plan_->models().validity;
+  const std::array ranges{region.p1, region.p2, region.t1};
+  std::array<double, kInputs.size()> z{};
+  for (std::size_t i = 0; i < z.size(); ++i) {
+    z[i] = !sample.Has(kInputs[i]) ? std::numeric_limits<double>::quiet_NaN()
+           : ranges[i].Contains(sample[kInputs[i]]) ? 0.0
+                                                    : kOdd;
+  }
+  inputs_.Push(z);
+  odd_ = 0;
+  usual_ = 0;
+  for (std::size_t i = 0; i < z.size(); ++i) {
+    const SignalMask input = MaskOf(kInputs[i]);
+    odd_ |= inputs_.mean(i) > 0.5 * kOdd ? input : SignalMask{0};
+    usual_ |= inputs_.mean(i) <= 0.5 * kOdd ? input : SignalMask{0};
+  }
+}
+
+// Where one of P1, P2 and T1 is not as in normal operation, it is a fault that
+// acts on it, and a fault that always moved one has moved it.
+bool FaultBank::SuitsInputs(const StrengthTracker& tracker) const {
+  const StrengthPath& path = tracker.path();
+  return !plan_->judges_fit() ||
+         ((odd_ & ~path.inputs) == 0 && (usual_ & path.moved) == 0);
+}
+
+bool FaultBank::Fits(const StrengthTracker& tracker) const {
+  return !plan_->judges_fit() || (tracker.fits() && SuitsInputs(tracker));
 }
 
 double FaultBank::EvidenceMembership(double behind) const {
@@ -144,7 +193,8 @@ FaultSet FaultBank::Unrefuted(double margin) const {
   FaultSet unrefuted = 0;
   for (const StrengthTracker& tracker : trackers_) {
     const double evidence = tracker.evidence(trained_);
-    if (evidence == best && !tracker.accounts()) {
+    if (evidence == best && !(tracker.accounts() && tracker.fits_so_far() &&
+                              SuitsInputs(tracker))) {
       return 0;
     }
     if (best - evidence - allowance_ < margin) {

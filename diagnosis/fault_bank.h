@@ -4,6 +4,7 @@
 #include <memory>
 #include <vector>
 
+#include "diagnosis/fit_window.h"
 #include "diagnosis/observer_evidence.h"
 #include "diagnosis/strength_tracker.h"
 #include "diagnosis/verdict.h"
@@ -47,25 +48,37 @@ class FaultBank {
   /// open episode.
   void Update(const ObserverBank& bank);
 
+  /// Call before Update(): whether P1, P2 and T1 are as in normal operation.
+  void PushInputs(const Sample& sample);
+
   /// Applies the evidence so far to the factors set by Score().
   void ApplyEvidence(Verdict& verdict) const;
 
   /// The faults that the evidence does not refute: L_best − L_f − a < `margin`;
   /// nothing while it does not refute normal operation, or while the best one
-  /// does not account for what is seen.
+  /// does not account for what is seen or does not fit it so far.
   FaultSet Unrefuted(double margin) const;
+
+  /// The faults that do not fit the last t_k samples at any strength or sign.
+  FaultSet misfits() const { return misfits_; }
 
  private:
   double BestEvidence() const;
   void UpdateEffect(const ObserverBank& bank);
   double Allowance() const;
   double EvidenceMembership(double behind) const;
+  bool SuitsInputs(const StrengthTracker& tracker) const;
+  bool Fits(const StrengthTracker& tracker) const;
 
   std::shared_ptr<const FaultPlan> plan_;
   ObserverEvidence trained_;
   std::vector<StrengthTracker> trackers_;       // one per fault and direction
   std::array<double, kMaxChannels> effects_{};  // E by channel
   double allowance_{0.0};                       // a
+  FitWindow inputs_;                            // 0 as usual, 5 elsewhere
+  SignalMask odd_{0};  // not as usual in most of the last t_k samples
+  SignalMask usual_{0};
+  FaultSet misfits_{0};
 };
 
 }  // namespace fdi

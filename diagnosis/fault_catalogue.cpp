@@ -2,11 +2,10 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
-#include <charconv>
 
 #include "base/error.h"
 #include "base/suggestion.h"
+#include "base/text.h"
 
 namespace fdi {
 namespace {
@@ -27,21 +26,7 @@ std::optional<int> NumberAfter(std::string_view text, std::string_view prefix) {
     return std::nullopt;
   }
   text.remove_prefix(prefix.size());
-  int number = 0;
-  const auto [end, error] =
-      std::from_chars(text.data(), text.data() + text.size(), number);
-  if (error != std::errc{} || end != text.data() + text.size()) {
-    return std::nullopt;
-  }
-  return number;
-}
-
-std::string Lower(std::string_view text) {
-  std::string lower(text);
-  std::transform(lower.begin(), lower.end(), lower.begin(), [](char c) {
-    return static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  });
-  return lower;
+  return ParseWhole<int>(text);
 }
 
 }  // namespace
@@ -102,6 +87,9 @@ std::string DidYouMeanFault(std::string_view name,
   const std::string lower = Lower(name);
   if (NumberAfter(lower, "f") || NumberAfter(lower, "paper")) {
     return "";  // Well-formed, but there is no such number.
+  }
+  if (ParseFinding(lower)) {
+    return " (a finding: it says what is seen, not what is wrong)";
   }
   for (const int fault : kFaultsAndFindings) {
     others.push_back(FaultName(fault));

@@ -3,8 +3,25 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/median.h"
+#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/fit_window.h"
+
 namespace fdi {
 namespace {
+
+// Those of P1, P2 and T1 that `fault` changes by itself; the others stay as in
+// normal operation, but for what the flow does to them. f17 moves either
+// pressure; of every other fault only a reading hides what acts on the valve.
+SignalMask InputsOf(int fault) {
+  const FaultFacts& facts = FaultFactsOf(fault);
+  if (facts.acts_on != ActsOn::kInputs) {
+    return 0;
+  }
+  return facts.hides ? MaskOf(*facts.hides)
+                     : static_cast<SignalMask>(MaskOf(Signal::kP1) |
+                                               MaskOf(Signal::kP2));
+}
 
 // Reach beyond the trained strengths, as factors; less with a single observer,
 // which cannot show what strength does.
@@ -34,14 +51,12 @@ double ChannelTime(const ModelSet& models, std::size_t c) {
   for (const Observer& observer : models.observers) {
     all.push_back(std::max(observer.channels[c].correlation_time, 1.0));
   }
-  const auto middle = all.begin() + static_cast<std::ptrdiff_t>(all.size() / 2);
-  std::nth_element(all.begin(), middle, all.end());
   const auto same =
       std::count_if(models.channels.begin(), models.channels.end(),
                     [&](const ChannelSpec& channel) {
                       return channel.output == models.channels[c].output;
                     });
-  return *middle * static_cast<double>(same);
+  return Median(std::move(all)) * static_cast<double>(same);
 }
 
 void AddNode(const ObserverPlan& plan, std::size_t index, StrengthPath& path) {
@@ -50,7 +65,8 @@ void AddNode(const ObserverPlan& plan, std::size_t index, StrengthPath& path) {
   for (std::size_t c = 0; c < observer.channels.size(); ++c) {
     const ChannelObserver& channel = observer.channels[c];
     path.points.push_back({plan.slot(index, c), channel.residual_sd,
-                           channel.model.saturation, channel.membership});
+                           channel.model.saturation, channel.membership,
+                           channel.fit});
   }
 }
 
@@ -99,6 +115,15 @@ PathPlace StrengthPath::PlaceOf(double strength) const {
   return place;
 }
 
+// The first node is normal operation.
+SignalMask MovedAlong(const ObserverPlan& plan, const StrengthPath& path) {
+  SignalMask moved = kBasicSignals;
+  for (std::size_t i = 1; i < path.nodes.size(); ++i) {
+    moved &= plan.models().observers[path.nodes[i].observer].moved;
+  }
+  return moved;
+}
+
 StrengthPath MakeStrengthPath(const ObserverPlan& plan,
                               const std::vector<std::size_t>& observers) {
   StrengthPath path;
@@ -111,13 +136,16 @@ StrengthPath MakeStrengthPath(const ObserverPlan& plan,
   path.sign = last.strength < 0.0 ? -1.0 : 1.0;
   path.fault_index =
       static_cast<std::size_t>(FaultIndex(plan.models(), last.fault));
+  path.inputs = InputsOf(last.fault);
+  path.moved = MovedAlong(plan, path);
   SetReach(path);
   return path;
 }
 
 FaultPlan::FaultPlan(std::shared_ptr<const ObserverPlan> observers)
     : observers_(std::move(observers)),
-      memory_(1.0 - 1.0 / models().decision.evidence_window) {
+      memory_(1.0 - 1.0 / models().decision.evidence_window),
+      judges_fit_(JudgesFit(models())) {
   for (const Observer& observer : models().observers) {
     fault_indices_.push_back(
         static_cast<std::size_t>(FaultIndex(models(), observer.fault)));

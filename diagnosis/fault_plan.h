@@ -34,13 +34,16 @@ struct StrengthPath {
     double sd{1.0};
     double saturation{0.0};
     Trapezoid membership;
+    FitBounds fit;
   };
 
   PathPlace PlaceOf(double strength) const;
 
   std::size_t fault_index{0};
   double sign{1.0};
-  double lowest{0.0};  ///< Range of |s|.
+  SignalMask inputs{0};  ///< P1, P2, T1 that the fault acts on.
+  SignalMask moved{0};   ///< Those that it moved at every trained strength.
+  double lowest{0.0};    ///< Range of |s|.
   double highest{0.0};
   std::vector<Node> nodes;
   std::vector<Point> points;                   ///< By node and channel.
@@ -68,6 +71,8 @@ class FaultPlan {
   double channel_time(std::size_t channel) const {
     return channel_times_[channel];
   }
+  /// The set says how a fault that acts fits (FitBounds).
+  bool judges_fit() const { return judges_fit_; }
   /// λ
   double memory() const { return memory_; }
 
@@ -76,6 +81,7 @@ class FaultPlan {
   std::vector<std::size_t> fault_indices_;
   std::vector<double> channel_times_;
   double memory_;
+  bool judges_fit_{false};
   std::vector<StrengthPath> paths_;
 };
 

@@ -71,6 +71,10 @@ double LeastFlowAt(const FloorLimits& floor, double x, double dp) {
                   floor.flow_high * std::sqrt(share));
 }
 
+bool IsShut(double x, double cv) {
+  return x >= kShut && cv >= kShut;
+}
+
 Floor::Floor(const ModelSet& models)
     : limits_(models.floor ? &*models.floor : nullptr),
       first_(models.faults.size() -
@@ -95,7 +99,7 @@ void Floor::Push(const Sample& sample) {
   }
   const bool has_x = sample.Has(Signal::kX);
   if (sample.mode != ValveMode::kAuto || !sample.Has(Signal::kCv) ||
-      !(has_x || sample.Has(Signal::kF))) {
+      !(has_x || (sample.Has(Signal::kF) && limits_->flow_share > 0.0))) {
     Restart();
     return;
   }
@@ -199,7 +203,7 @@ void Floor::PushFlow(const Sample& sample) {
   const double flow = sample[Signal::kF];
   const double dp = DpOf(sample);
   const double margin = limits_->flow_margin * limits_->flow_high;
-  const bool shut = x >= kShut && sample[Signal::kCv] >= kShut;
+  const bool shut = IsShut(x, sample[Signal::kCv]);
   Count(kShutFlow, shut && flow > margin, flow / limits_->flow_high,
         limits_->flow_samples, sample.stamp_ns);
   const double most = limits_->flow_factor *

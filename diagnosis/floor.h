@@ -50,6 +50,8 @@ double FlowAt(const FloorLimits& floor, double x, double dp);
 /// deviation/2, dp), but no more than the record has shown, with less pressure
 /// less. An opening beyond the record passes what the widest one there did.
 double LeastFlowAt(const FloorLimits& floor, double x, double dp);
+/// Command and rod shut the valve.
+bool IsShut(double x, double cv);
 
 /// Wide limits that always apply in AUTO (FloorLimits): at every command,
 /// inside and outside the trained region, from the first sample on.

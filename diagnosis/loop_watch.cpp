@@ -6,6 +6,7 @@
 #include <limits>
 #include <utility>
 
+#include "base/usual_period.h"
 #include "diagnosis/fault_catalogue.h"
 
 namespace fdi {
@@ -21,6 +22,7 @@ constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 // The interval [ms] is in the low half of the hash.
 constexpr std::uint64_t kHashBase = 0xA0D1'7000'0000'0000ULL;
 constexpr double kMsPerSecond = 1e3;
+constexpr double kOtherInterval = 0.2;  // Of the interval: it is another one.
 
 // A reading to be relied upon, else NaN.
 double ReadingOf(const Sample& sample, Signal signal) {
@@ -92,21 +94,6 @@ int FindingOf(loop::Verdict verdict) {
   return 0;
 }
 
-loop::Audit AuditValve(loop::Window window) {
-  const loop::Audit by_x = loop::AuditWindow(window);
-  if (window.x.empty() || by_x.verdict != loop::Verdict::kUndetermined ||
-      window.pv == window.x) {
-    return by_x;
-  }
-  window.x.clear();
-  const loop::Audit by_flow = loop::AuditWindow(window);
-  // A play that X does not show is none of the valve.
-  return by_flow.verdict == loop::Verdict::kStiction ||
-                 FindingOf(by_flow.verdict) == 0
-             ? by_x
-             : by_flow;
-}
-
 LoopWatch::LoopWatch(std::size_t phase,
                      std::shared_ptr<const SeverityCatalogue> severities)
     : phase_(phase), severities_(std::move(severities)) {
@@ -168,7 +155,8 @@ bool LoopWatch::AddPoint(const Sample& sample, double period_s) {
     return whole;
   }
   const double interval_s =
-      std::max(kInterval_s, std::round(period_s * kMsPerSecond) / kMsPerSecond);
+      std::max(kInterval_s,
+               std::round(UsualPeriod(period_s) * kMsPerSecond) / kMsPerSecond);
   if (ring_.empty()) {
     ring_.reserve(kPoints);
     interval_s_ = interval_s;
@@ -183,7 +171,8 @@ bool LoopWatch::AddPoint(const Sample& sample, double period_s) {
       return true;
     }
     // Also before at_ms overflows, after 49 days.
-    if (since_s > kGapIntervals * interval_s_ || interval_s != interval_s_ ||
+    if (since_s > kGapIntervals * interval_s_ ||
+        std::abs(interval_s - interval_s_) > kOtherInterval * interval_s_ ||
         at_s * kMsPerSecond > std::numeric_limits<std::uint32_t>::max()) {
       Restart();
       return AddPoint(sample, period_s);

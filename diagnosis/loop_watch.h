@@ -27,19 +27,16 @@ std::shared_ptr<const ModelSet> AuditModels(std::uint64_t content_hash);
 /// episode (undetermined, quantised).
 int FindingOf(loop::Verdict verdict);
 
-/// The audit of a loop whose window has X: read off X; if that says nothing,
-/// an oscillation that F tells.
-loop::Audit AuditValve(loop::Window window);
-
-/// Follows a loop that no model set judges: keeps a sliding window of its
-/// readings in AUTO and turns the audits of it into verdicts and transitions,
-/// as the engine does of its samples.
+/// Follows a loop: keeps a sliding window of its readings in AUTO and turns the
+/// audits of it into verdicts and transitions, as the engine does of its
+/// samples.
 ///
 /// - A point each 10 s, or each sample if these are slower; 720 points are a
 ///   window, two hours or more. It begins anew at a change of mode, source or
 ///   epoch, at a gap of three intervals, and where CV, or both F and X, are
 ///   missing.
-/// - A full window is audited each 60 points. Which of them is `phase`, so that
+/// - A full window is audited each 120 points. Which of them is `phase`, so
+/// that
 ///   the loops of a plant take turns.
 /// - Three windows in a row with the same finding begin an episode, or rename
 ///   it; three in which OP moves by 1 % and nothing is found end it. Each
@@ -50,7 +47,7 @@ loop::Audit AuditValve(loop::Window window);
 class LoopWatch {
  public:
   static constexpr std::size_t kPoints = 720;
-  static constexpr std::size_t kHop = 60;
+  static constexpr std::size_t kHop = 120;
   static constexpr int kConfirmations = 3;
   static constexpr double kInterval_s = 10.0;
 

@@ -55,11 +55,6 @@ void ValidateChannel(const ModelSet& models, const ChannelSpec& channel) {
         where + "thresholds must enclose zero");
   Check(channel.windows.size() <= kMaxWindows, models,
         where + "at most 4 windows are accepted");
-  const DriftLimits& drift = channel.drift;
-  Check(std::isfinite(drift.lower_mean) && drift.lower_mean <= 0.0 &&
-            std::isfinite(drift.upper_mean) && drift.upper_mean >= 0.0 &&
-            std::isfinite(drift.log_scale) && drift.log_scale >= 0.0,
-        models, where + "limits of a drift must be finite and enclose zero");
   for (const WindowLimits& window : channel.windows) {
     Check(window.length >= 2 && window.length <= 100000, models,
           where + "windows must be 2 to 100000 samples long");
@@ -101,6 +96,13 @@ void ValidateObserver(const ModelSet& models, const Observer& observer) {
           where + "correlation time must be at least 1 sample");
     Check(channel.interpolation_error >= 0.0, models,
           where + "interpolation error must not be negative");
+    const FitBounds& fit = channel.fit;
+    Check(
+        fit == FitBounds{} || (fit.lower_mean < 0.0 && fit.upper_mean > 0.0 &&
+                               fit.upper_square > 0.0 &&
+                               std::isfinite(fit.upper_mean - fit.lower_mean) &&
+                               std::isfinite(fit.upper_square)),
+        models, where + "limits of a fit must be finite and enclose zero");
     const Trapezoid& m = channel.membership;
     Check(m.a <= m.b && m.b <= m.c && m.c <= m.d && std::isfinite(m.d - m.a),
           models, where + "corners of the membership are not ascending");

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -50,16 +51,6 @@ struct WindowLimits {
   SignalRange command{kUnbounded};  ///< Means of CV for which it applies [%].
 };
 
-/// How far the limits of a channel may follow a drift of the healthy valve
-/// (Detection::AdaptLimits); zeros: no drift.
-struct DriftLimits {
-  double lower_mean{0.0};  ///< <= 0 [unit].
-  double upper_mean{0.0};  ///< >= 0 [unit].
-  double log_scale{0.0};   ///< >= 0, of the deviation.
-
-  bool operator==(const DriftLimits&) const = default;
-};
-
 /// A residual channel of the model set.
 struct ChannelSpec {
   std::string name;  ///< "X", "F", ...
@@ -68,7 +59,19 @@ struct ChannelSpec {
   double upper_threshold{0.0};  ///< or above this is abnormal [unit].
   std::vector<WindowLimits>
       windows{};  ///< Slow and small faults; may be empty.
-  DriftLimits drift{};
+  /// How far limits were allowed to follow a drift, in sets of before 1.0,
+  /// which keep their bytes and hash with it. Nothing uses it: limits stay.
+  std::array<double, 3> former_drift{};
+};
+
+/// What the residual of a fault observer, in its deviations, shows over the
+/// last t_k samples of its own condition (FitWindow); zeros: not known.
+struct FitBounds {
+  double lower_mean{0.0};    ///< < 0
+  double upper_mean{0.0};    ///< > 0
+  double upper_square{0.0};  ///< Of the mean square; > 0.
+
+  bool operator==(const FitBounds&) const = default;
 };
 
 /// One channel of one observer.
@@ -86,6 +89,7 @@ struct ChannelObserver {
   /// [-].
   double interpolation_error{0.5};
   ValidationFigures validation;
+  FitBounds fit{};
 };
 
 /// One observer: normal operation (fault 0) or one fault condition.
@@ -94,6 +98,9 @@ struct Observer {
   int fault{0};                           ///< 0 = normal, else 1..22.
   double strength{0.0};                   ///< Of the trained condition; signed.
   std::vector<ChannelObserver> channels;  ///< One per ModelSet::channels.
+  /// Those of P1, P2 and T1 that are outside normal operation in all of the
+  /// condition's own data; stored with the limits of the fit.
+  SignalMask moved{0};
 };
 
 /// Settings of detection and isolation; see docs/method.md.

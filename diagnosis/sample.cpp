@@ -1,7 +1,6 @@
 #include "diagnosis/sample.h"
 
-#include <algorithm>
-#include <cctype>
+#include "base/csv_cells.h"
 
 namespace fdi {
 namespace {
@@ -30,13 +29,6 @@ constexpr std::array<SignalFacts, kSignalCount> kFacts{{
 constexpr std::array<std::string_view, 5> kModeNames = {
     "AUTO", "MANUAL", "INHIBITED", "OUT_OF_SERVICE", "CALIBRATING"};
 
-bool EqualIgnoringCase(std::string_view a, std::string_view b) {
-  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](char x, char y) {
-    return std::tolower(static_cast<unsigned char>(x)) ==
-           std::tolower(static_cast<unsigned char>(y));
-  });
-}
-
 }  // namespace
 
 std::string_view SignalName(Signal signal) {
@@ -49,7 +41,7 @@ std::string_view SignalUnit(Signal signal) {
 
 std::optional<Signal> ParseSignal(std::string_view name) {
   for (std::size_t i = 0; i < kSignalCount; ++i) {
-    if (EqualIgnoringCase(name, kFacts[i].name)) {
+    if (SameName(name, kFacts[i].name)) {
       return static_cast<Signal>(i);
     }
   }
@@ -66,7 +58,7 @@ std::string_view ValveModeName(ValveMode mode) {
 
 std::optional<ValveMode> ParseValveMode(std::string_view name) {
   for (std::size_t i = 0; i < kModeNames.size(); ++i) {
-    if (EqualIgnoringCase(name, kModeNames[i])) {
+    if (SameName(name, kModeNames[i])) {
       return static_cast<ValveMode>(i);
     }
   }

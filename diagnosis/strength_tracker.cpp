@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace fdi {
 namespace {
@@ -13,6 +14,8 @@ constexpr double kRateDeviation = 1.0 / 1500.0;
 // An effect on a channel counts from this share of the deviation on.
 constexpr double kMinEffect = 0.25;
 constexpr double kAccounted = 0.5;  // of the normal observer's residual
+// The effect of a fault may be off by this share, as in the second look.
+constexpr double kEffectError = 0.05;
 
 double Lane(const std::vector<Quad>& quads, std::size_t slot) {
   return quads[slot / kLanes].lane[slot % kLanes];
@@ -33,6 +36,7 @@ StrengthTracker::StrengthTracker(const FaultPlan& plan,
     : plan_(&plan),
       path_(&path),
       channels_(plan.models().channels.size()),
+      fit_(plan.models().decision.isolation_samples, channels_),
       cells_(kStrengthCells * channels_, 0.0) {}
 
 void StrengthTracker::Restart() {
@@ -44,6 +48,8 @@ void StrengthTracker::Restart() {
   total_ = 0.0;
   evidence_.fill(0.0);
   factor_ = 0.0;
+  fit_.Restart();
+  misfit_ = 0.0;
   std::fill(cells_.begin(), cells_.end(), 0.0);
 }
 
@@ -149,7 +155,7 @@ StrengthTracker::Prediction StrengthTracker::At(const ObserverBank& bank,
       path_->points[place.nearest * channels_ + channel].saturation;
   return {Residual(saturation, bank.reading(static_cast<int>(channel)),
                    segment.low + segment.slope * place.from_low),
-          segment.slope, variance + error * error};
+          segment.slope, variance + error * error, error * error};
 }
 
 void StrengthTracker::Step(const ObserverBank& bank) {
@@ -336,6 +342,36 @@ void StrengthTracker::UpdateFactor(const ObserverBank& bank) {
       furthest = normal / path_->points[c].sd;
       accounts_ = std::abs(p.residual) < kAccounted * normal;
     }
+  }
+}
+
+void StrengthTracker::PushFit(const ObserverBank& bank,
+                              const ObserverEvidence& trained) {
+  const StrengthPath::Node& best = BestNode(trained);
+  const bool is_trained = trained.total(best.observer) >= total_;
+  const PathPlace place =
+      path_->PlaceOf(is_trained ? best.strength : strength_);
+  std::array<double, kMaxChannels> z;
+  z.fill(std::numeric_limits<double>::quiet_NaN());
+  for (std::size_t c = 0; c < channels_; ++c) {
+    if (bank.active(static_cast<int>(c))) {
+      const Prediction p =
+          At(bank, c, SegmentOf(bank, c, place.segment), place);
+      const double sd = path_->points[place.nearest * channels_ + c].sd;
+      const double most = kMaxFitVariance * sd * sd;
+      const double effect = bank.residual(0, static_cast<int>(c)) - p.residual;
+      const double off = std::isnan(effect) ? 0.0 : kEffectError * effect;
+      z[c] = p.residual /
+             std::sqrt(std::min(p.variance, most + p.error) + off * off);
+    }
+  }
+  fit_.Push({z.data(), channels_});
+  misfit_ = 0.0;
+  // Normal operation, the first node, has no limits.
+  const std::size_t node = std::max<std::size_t>(place.nearest, 1);
+  for (std::size_t c = 0; c < channels_; ++c) {
+    const FitBounds& limits = path_->points[node * channels_ + c].fit;
+    misfit_ = std::max(misfit_, fit_.Excess(c, limits));
   }
 }
 

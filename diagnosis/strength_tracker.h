@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "diagnosis/fault_plan.h"
+#include "diagnosis/fit_window.h"
 #include "diagnosis/observer_bank.h"
 #include "diagnosis/observer_evidence.h"
 
@@ -68,6 +69,15 @@ class StrengthTracker {
   /// tracked strength.
   double factor() const { return factor_; }
 
+  /// Takes the residuals of the best explanation, tracked or trained, into the
+  /// window that fits() judges. Call after Step().
+  void PushFit(const ObserverBank& bank, const ObserverEvidence& trained);
+  /// False if the best explanations of the last t_k samples do not look like
+  /// the fault's own validation data (FitBounds). True until there are so many.
+  bool fits() const { return !fit_.full() || fits_so_far(); }
+  /// The same of fewer samples, within wider limits.
+  bool fits_so_far() const { return misfit_ <= 1.0; }
+
   const StrengthPath& path() const { return *path_; }
 
  private:
@@ -83,6 +93,7 @@ class StrengthTracker {
     double residual;
     double slope;
     double variance;  // of the residual, interpolation error included
+    double error;     // variance of the interpolation error
   };
   using Parts = std::array<double, kMaxChannels>;  // evidence by channel
 
@@ -117,6 +128,8 @@ class StrengthTracker {
   double factor_{0.0};
   bool refutable_{false};
   bool accounts_{false};
+  FitWindow fit_;
+  double misfit_{0.0};         // 1 at the limit
   std::vector<double> cells_;  // evidence by cell and channel
 };
 

@@ -80,19 +80,23 @@ Intake CheckValues(const ModelSet& models, SignalMask required,
 
 // What Save() writes and Restore() reads, little endian and without padding:
 //
-//     snapshot  = format:u32 content_hash:u64 coverage detection
-//     coverage  = stamped:u8 last_stamp_ns:i64 armed:u8
-//     detection = windows healthy_s:f64 drift*
-//     windows   = (window window)*  residual and CV, by channel and length
-//     window    = length:i32 count:i32 mean:f64 variance:f64
-//     drift     = mean:f64 log_scale:f64 mean_full_ns:i64 scale_full_ns:i64
+//     snapshot = format:u32 content_hash:u64 coverage windows
+//     coverage = stamped:u8 last_stamp_ns:i64 armed:u8
+//     windows  = (window window)*  residual and CV, by channel and length
+//     window   = length:i32 count:i32 mean:f64 variance:f64
 //
-// There are kMaxChannels drifts, and as many windows as the model set has,
-// which content_hash identifies. A change to any part, also in the Save() of
-// ResidualWindow, needs another format number.
-constexpr std::uint32_t kSnapshotFormat = 3;
+// There are as many windows as the model set has, which content_hash
+// identifies. A change to any part, also in the Save() of ResidualWindow, needs
+// another format number.
+constexpr std::uint32_t kSnapshotFormat = 4;
 // Samples in a row, until nothing is known.
 constexpr int kMaxUncertainRun = 60;
+
+// Whether the limits are so wide that every known fault looks normal.
+bool SeesNoFault(const ModelSet& models) {
+  const auto known = std::ssize(models.faults) - FindingCount(models);
+  return known > 0 && std::ssize(models.undetectable) >= known;
+}
 
 }  // namespace
 
@@ -105,7 +109,8 @@ struct Diagnosis {
         detection(plan->models()),
         stuck(plan->models()),
         floor(plan->models()),
-        episode(plan->faults()) {}
+        episode(plan->faults()),
+        sees_no_fault(SeesNoFault(plan->models())) {}
 
   std::shared_ptr<const EnginePlan> plan;
   ObserverBank bank;
@@ -114,6 +119,7 @@ struct Diagnosis {
   StuckReadings stuck;
   Floor floor;
   Episode episode;
+  bool sees_no_fault;
 };
 
 class ValveEngine::Impl {
@@ -135,9 +141,6 @@ class ValveEngine::Impl {
   const ModelSet& models() const { return diagnosis_->plan->models(); }
   const Verdict& verdict() const { return verdict_; }
   bool episode_open() const { return verdict_.state != State::kNormal; }
-  FollowedDrift followed_drift(std::size_t channel) const {
-    return diagnosis_->detection.followed_drift(channel);
-  }
 
  private:
   void ClearVerdict();
@@ -271,7 +274,9 @@ void ValveEngine::Impl::ReadResiduals() {
                                    : std::numeric_limits<double>::quiet_NaN();
   }
   verdict_.confidence =
-      static_cast<double>(diagnosis_->bank.active_channels()) / channels;
+      diagnosis_->sees_no_fault
+          ? 0.0
+          : static_cast<double>(diagnosis_->bank.active_channels()) / channels;
 }
 
 Quality ValveEngine::Impl::Judge(const Sample& sample) {
@@ -325,12 +330,9 @@ void ValveEngine::Impl::Decide(const Sample& sample) {
   const bool was_open = episode_open();
   diagnosis_->episode.Step(sample, diagnosis_->bank, findings, verdict_);
   // After an episode the windows still contain its fault, which would open the
-  // next one at once. During an episode the limits do not adapt, or they would
-  // follow the fault.
+  // next one at once.
   if (was_open && !episode_open()) {
     detection.Restart();
-  } else if (findings.settled && !episode_open()) {
-    detection.AdaptLimits(sample.stamp_ns);
   }
 }
 
@@ -439,10 +441,6 @@ const ModelSet& ValveEngine::models() const {
 
 bool ValveEngine::episode_open() const {
   return impl_->episode_open();
-}
-
-FollowedDrift ValveEngine::followed_drift(std::size_t channel) const {
-  return impl_->followed_drift(channel);
 }
 
 }  // namespace fdi

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "diagnosis/engine_plan.h"
-#include "diagnosis/followed_drift.h"
 #include "diagnosis/model_set.h"
 #include "diagnosis/sample.h"
 #include "diagnosis/verdict.h"
@@ -72,8 +71,6 @@ class ValveEngine {
   const Verdict& verdict() const;
   const ModelSet& models() const;
   bool episode_open() const;
-  /// Of a channel of models(): how far its limits have followed the valve.
-  FollowedDrift followed_drift(std::size_t channel) const;
 
  private:
   class Impl;

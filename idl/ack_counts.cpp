@@ -11,7 +11,7 @@ constexpr std::size_t kMaxAcknowledgements = 16'384;
 
 std::uint32_t AckCounts::Next(const WriterGuid& reader, std::uint32_t entity,
                               std::uint32_t count, bool first_word) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   const States::key_type key(reader, entity);
   auto found = recent_.find(key);
   if (found == recent_.end()) {

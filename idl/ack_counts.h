@@ -3,9 +3,9 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
-#include <mutex>
 #include <utility>
 
+#include "base/mutex.h"
 #include "idl/writer_pace.h"
 
 namespace fdi::idl {
@@ -34,9 +34,9 @@ class AckCounts {
   };
   using States = std::map<std::pair<WriterGuid, std::uint32_t>, State>;
 
-  std::mutex mutex_;
-  States recent_;
-  States older_;  ///< Dropped when `recent_` is full again.
+  Mutex mutex_;
+  States recent_ GUARDED_BY(mutex_);
+  States older_ GUARDED_BY(mutex_);  ///< Dropped when `recent_` is full again.
 };
 
 }  // namespace fdi::idl

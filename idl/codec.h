@@ -3,11 +3,11 @@
 #include <atomic>
 #include <cstdint>
 #include <exception>
-#include <mutex>
 #include <tuple>
 #include <type_traits>
 #include <unordered_set>
 
+#include "base/mutex.h"
 #include "idl/fast_dds.h"
 #include "idl/wire.h"
 #if FDI_FAST_DDS == 2
@@ -109,7 +109,7 @@ class CheckedType : public Generated {
     if constexpr (kKeyHasGaps) {
       return Generated().getKey(data, handle, force_md5);
     }
-    const std::lock_guard lock(key_mutex_);
+    const MutexLock lock(key_mutex_);
     return Generated::getKey(data, handle, force_md5);
   }
 #else
@@ -128,7 +128,7 @@ class CheckedType : public Generated {
     if constexpr (kKeyHasGaps) {
       return Generated().compute_key(data, handle, force_md5);
     }
-    const std::lock_guard lock(key_mutex_);
+    const MutexLock lock(key_mutex_);
     return Generated::compute_key(data, handle, force_md5);
   }
   // For a message without a key hash. Without a handle it would belong to no
@@ -194,7 +194,7 @@ class CheckedType : public Generated {
     if (TryDeserialize(payload, data) && IsComplete(payload, data)) {
       return true;
     }
-    const std::lock_guard lock(objects_mutex_);
+    const MutexLock lock(objects_mutex_);
     if (!objects_of_library_.contains(data)) {
       refused_.fetch_add(1, std::memory_order_relaxed);
       return false;
@@ -205,18 +205,19 @@ class CheckedType : public Generated {
     return false;
   }
   void* RegisterObject(void* data) {
-    const std::lock_guard lock(objects_mutex_);
+    const MutexLock lock(objects_mutex_);
     objects_of_library_.insert(data);
     return data;
   }
   void UnregisterObject(void* data) {
-    const std::lock_guard lock(objects_mutex_);
+    const MutexLock lock(objects_mutex_);
     objects_of_library_.erase(data);
   }
 
-  std::mutex key_mutex_;
-  std::mutex objects_mutex_;
-  std::unordered_set<const void*> objects_of_library_;
+  Mutex key_mutex_;
+  Mutex objects_mutex_;
+  std::unordered_set<const void*> objects_of_library_
+      GUARDED_BY(objects_mutex_);
   std::atomic<std::uint64_t> refused_{0};
 };
 

@@ -4,12 +4,10 @@
 #include <array>
 #include <cerrno>
 #include <chrono>
-#include <condition_variable>
 #include <cstdlib>
 #include <cstring>
 #include <exception>
 #include <filesystem>
-#include <mutex>
 #include <optional>
 #include <set>
 #include <sstream>
@@ -22,7 +20,9 @@
 #include <netinet/in.h>
 #include <sys/socket.h>
 
+#include "base/mutex.h"
 #include "base/passing_error.h"
+#include "base/retry.h"
 
 namespace fdi::idl {
 namespace {
@@ -35,17 +35,17 @@ constexpr const char* kGroup = "239.255.0.1";
 class Missing {
  public:
   void Set(const std::string& addresses) {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     addresses_ = addresses;
   }
   std::string Get() const {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     return addresses_;
   }
 
  private:
-  mutable std::mutex mutex_;
-  std::string addresses_;
+  mutable Mutex mutex_;
+  std::string addresses_ GUARDED_BY(mutex_);
 };
 
 Missing& TheMissing() {
@@ -161,11 +161,8 @@ InterfaceWatch::~InterfaceWatch() {
 }
 
 void InterfaceWatch::Run(const std::stop_token& stop) {
-  std::mutex mutex;
-  std::condition_variable_any never;
   while (!stop.stop_requested()) {
-    std::unique_lock lock(mutex);
-    never.wait_for(lock, stop, kPeriod, [] { return false; });
+    PauseUntil(stop, kPeriod);
     try {
       Look();
     } catch (const std::exception&) {  // No descriptor, say: a second later.

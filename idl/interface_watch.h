@@ -22,9 +22,8 @@ std::map<std::string, unsigned> LocalAddresses();
 /// A thread compares the numbers once a second and sets both anew.
 class InterfaceWatch {
  public:
-  /// @param interfaces as DdsOptions::interfaces; of loopback alone, which
-  /// never
-  ///   changes, nothing is watched.
+  /// @param interfaces as DdsOptions::interfaces. Loopback alone never changes,
+  ///   so it is not watched.
   InterfaceWatch(std::string interfaces, LogSink log);
   ~InterfaceWatch();
   InterfaceWatch(const InterfaceWatch&) = delete;

@@ -3,13 +3,13 @@
 #include <cstdint>
 #include <cstring>
 #include <map>
-#include <mutex>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include <fastdds/dds/log/Log.hpp>
 
+#include "base/mutex.h"
 #include "idl/participant_impl.h"
 
 namespace fdi::idl {
@@ -21,9 +21,9 @@ constexpr auto kQuietTime = std::chrono::seconds(10);
 
 // Process-wide, like the library's log.
 struct Registry {
-  std::mutex mutex;
-  bool installed{false};
-  std::vector<const LogSink*> sinks;
+  Mutex mutex;
+  bool installed GUARDED_BY(mutex){false};
+  std::vector<const LogSink*> sinks GUARDED_BY(mutex);
 };
 
 // Never destroyed: the library's log thread outlives our statics.
@@ -62,7 +62,7 @@ class Throttle : public eprosima::fastdds::dds::LogConsumer {
     }
     seen = {now, seen.count + 1, 0};
     Registry& registry = GlobalRegistry();
-    const std::lock_guard lock(registry.mutex);
+    const MutexLock lock(registry.mutex);
     if (!registry.sinks.empty() && *registry.sinks.back()) {
       (*registry.sinks.back())(LevelOf(entry.kind), line);
     }
@@ -81,7 +81,7 @@ class Throttle : public eprosima::fastdds::dds::LogConsumer {
 
 LibraryLog::LibraryLog(LogSink sink) : sink_(std::move(sink)) {
   Registry& registry = GlobalRegistry();
-  const std::lock_guard lock(registry.mutex);
+  const MutexLock lock(registry.mutex);
   if (!registry.installed) {
     Log::ClearConsumers();
     Log::RegisterConsumer(std::make_unique<Throttle>());
@@ -92,7 +92,7 @@ LibraryLog::LibraryLog(LogSink sink) : sink_(std::move(sink)) {
 
 LibraryLog::~LibraryLog() {
   Registry& registry = GlobalRegistry();
-  const std::lock_guard lock(registry.mutex);
+  const MutexLock lock(registry.mutex);
   std::erase(registry.sinks, &sink_);
 }
 

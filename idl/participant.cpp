@@ -400,7 +400,7 @@ Participant::Impl::~Impl() {
 
 dds::Topic* Participant::Impl::TopicOf(const std::string& topic,
                                        const dds::TypeSupport& type) {
-  const std::lock_guard lock(topics_mutex_);
+  const MutexLock lock(topics_mutex_);
   dds::Topic*& found = topics_[topic];
   if (found == nullptr) {
     Check(type.register_type(handle_), "register_type of " + topic);
@@ -420,7 +420,7 @@ void Participant::Impl::ReportIncompatible(const std::string& topic,
   const auto own = ours.find(id);
   std::string theirs = "unknown";
   {
-    const std::lock_guard lock(remotes_mutex_);
+    const MutexLock lock(remotes_mutex_);
     for (const PolicyTexts& remote : remotes_[{topic, remote_is_writer}]) {
       const auto text = remote.find(id);
       if (own != ours.end() && text != remote.end() &&
@@ -442,7 +442,7 @@ void Participant::Impl::ReportIncompatible(const std::string& topic,
 }
 
 void Participant::Impl::StorePolicies(const RemoteKey& key, PolicyTexts texts) {
-  const std::lock_guard lock(remotes_mutex_);
+  const MutexLock lock(remotes_mutex_);
   // Ours are few; others may use any number of names, also like ours.
   if (!key.first.starts_with("fdi/v1/") ||
       (remotes_.size() >= kMaxRemembered && !remotes_.contains(key))) {
@@ -465,7 +465,7 @@ void Participant::Impl::onParticipantAuthentication(
     return;
   }
   {
-    const std::lock_guard lock(remotes_mutex_);
+    const MutexLock lock(remotes_mutex_);
     if (std::ranges::find(refused_guids_, info.guid) != refused_guids_.end()) {
       return;
     }

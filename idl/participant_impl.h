@@ -4,11 +4,9 @@
 #include <array>
 #include <atomic>
 #include <chrono>
-#include <condition_variable>
 #include <deque>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <utility>
@@ -18,6 +16,7 @@
 #include <fastdds/dds/topic/Topic.hpp>
 #include <fastdds/dds/topic/TypeSupport.hpp>
 
+#include "base/mutex.h"
 #include "idl/fast_dds.h"
 #include "idl/interface_watch.h"
 #include "idl/participant.h"
@@ -59,7 +58,7 @@ class Matched {
  public:
   void Set(int count) {
     {
-      const std::lock_guard lock(mutex_);
+      const MutexLock lock(mutex_);
       count_.store(count);
     }
     changed_.notify_all();
@@ -68,14 +67,14 @@ class Matched {
   int count() const { return count_.load(); }
 
   bool WaitFor(int count, std::chrono::milliseconds timeout) const {
-    std::unique_lock lock(mutex_);
+    MutexLock lock(mutex_);
     return changed_.wait_until(lock, DeadlineIn(timeout),
                                [&] { return count_.load() >= count; });
   }
 
  private:
-  mutable std::mutex mutex_;
-  mutable std::condition_variable changed_;
+  mutable Mutex mutex_;
+  mutable CondVar changed_;
   std::atomic<int> count_{0};
 };
 
@@ -165,11 +164,13 @@ class Participant::Impl : private dds::DomainParticipantListener {
   std::shared_ptr<DatagramLog> datagrams_;  // Shared with the transports.
   ProfileFile profiles_;
   std::atomic<std::uint64_t> refused_{0};
-  std::mutex remotes_mutex_;
-  std::map<RemoteKey, std::deque<PolicyTexts>> remotes_;  // Newest first.
-  std::deque<rtps::GUID_t> refused_guids_;                // Newest first.
-  std::mutex topics_mutex_;  // Separate: held during library calls.
-  std::map<std::string, dds::Topic*> topics_;
+  Mutex remotes_mutex_;
+  std::map<RemoteKey, std::deque<PolicyTexts>> remotes_
+      GUARDED_BY(remotes_mutex_);  // Newest first.
+  std::deque<rtps::GUID_t> refused_guids_
+      GUARDED_BY(remotes_mutex_);  // Newest first.
+  Mutex topics_mutex_;             // Separate: held during library calls.
+  std::map<std::string, dds::Topic*> topics_ GUARDED_BY(topics_mutex_);
   dds::DomainParticipant* handle_{nullptr};
   std::optional<InterfaceWatch> interfaces_;
 };

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cerrno>
 #include <filesystem>
-#include <mutex>
 #include <string_view>
 #include <system_error>
 #include <vector>
@@ -12,6 +11,7 @@
 #include <tinyxml2.h>
 
 #include "base/error.h"
+#include "base/mutex.h"
 #include "base/passing_error.h"
 #include "idl/participant_impl.h"
 #include "idl/qos.h"
@@ -150,9 +150,9 @@ void CheckProfile(const std::string& path, const std::string& name,
 // The library keeps profiles by name for the lifetime of the process and
 // refuses to load a file twice.
 void LoadOnce(const std::string& path) {
-  static std::mutex mutex;
+  static Mutex mutex;
   static std::string loaded;
-  const std::lock_guard lock(mutex);
+  const MutexLock lock(mutex);
   const std::string absolute = std::filesystem::absolute(path).string();
   if (loaded == absolute) {
     return;

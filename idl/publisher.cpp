@@ -2,13 +2,13 @@
 #include <atomic>
 #include <functional>
 #include <map>
-#include <mutex>
 #include <thread>
 
 #include <fastdds/dds/publisher/DataWriter.hpp>
 #include <fastdds/dds/publisher/DataWriterListener.hpp>
 #include <fastdds/dds/publisher/Publisher.hpp>
 
+#include "base/mutex.h"
 #include "idl/codec.h"
 #include "idl/endpoint.h"
 #include "idl/participant_impl.h"
@@ -90,7 +90,8 @@ struct Publisher<Message>::Impl : dds::DataWriterListener {
 
   // The instance of `message`, which is already encoded in `wire`; nullptr
   // beyond the limit.
-  const dds::InstanceHandle_t* InstanceOf(const Message& message) {
+  const dds::InstanceHandle_t* InstanceOf(const Message& message)
+      REQUIRES(mutex) {
     auto found = instances.find(KeyOf(message));
     if (found == instances.end()) {
       const dds::InstanceHandle_t handle = writer->register_instance(&wire);
@@ -105,7 +106,7 @@ struct Publisher<Message>::Impl : dds::DataWriterListener {
 
   // Makes room for a new valve before its message is encoded: `wire` is needed
   // for the key of the one that goes.
-  void MakeRoomFor(const Message& message) {
+  void MakeRoomFor(const Message& message) REQUIRES(mutex) {
     if (!replaces || instances.size() < static_cast<std::size_t>(valves) ||
         instances.contains(KeyOf(message))) {
       return;
@@ -118,7 +119,7 @@ struct Publisher<Message>::Impl : dds::DataWriterListener {
   }
 
   // The library frees the place once all readers have acknowledged the end.
-  void Unregister(const Message& ended) {
+  void Unregister(const Message& ended) REQUIRES(mutex) {
     const auto found = instances.find(KeyOf(ended));
     if (found == instances.end()) {
       return;
@@ -186,14 +187,14 @@ struct Publisher<Message>::Impl : dds::DataWriterListener {
   std::atomic<std::uint64_t> incompatible{0};
   // Held while Write() waits for room, because `wire` has to keep its message
   // until the library accepts it: all threads that write wait together.
-  std::mutex mutex;  // Guards what follows.
+  Mutex mutex;
   struct Instance {
     dds::InstanceHandle_t handle;
     std::uint64_t last_write;
   };
-  std::map<Key<Message>, Instance, std::less<>> instances;
-  std::uint64_t writes{0};
-  typename Traits::Wire wire;
+  std::map<Key<Message>, Instance, std::less<>> instances GUARDED_BY(mutex);
+  std::uint64_t writes GUARDED_BY(mutex){0};
+  typename Traits::Wire wire GUARDED_BY(mutex);
 };
 
 template <typename Message>
@@ -209,7 +210,7 @@ WriteResult Publisher<Message>::Write(const Message& message,
                                       std::stop_token stop,
                                       std::chrono::milliseconds timeout) {
   Impl& impl = *impl_;
-  const std::lock_guard lock(impl.mutex);
+  const MutexLock lock(impl.mutex);
   impl.MakeRoomFor(message);
   Impl::Traits::Encode(message, impl.wire);
   const dds::InstanceHandle_t* instance = impl.InstanceOf(message);
@@ -230,7 +231,7 @@ WriteResult Publisher<Message>::Write(const Message& message,
 template <typename Message>
 void Publisher<Message>::Dispose(const Message& message) {
   Impl& impl = *impl_;
-  const std::lock_guard lock(impl.mutex);
+  const MutexLock lock(impl.mutex);
   const auto found = impl.instances.find(KeyOf(message));
   if (found == impl.instances.end()) {
     return;
@@ -247,7 +248,7 @@ void Publisher<Message>::Dispose(const Message& message) {
 
 template <typename Message>
 void Publisher<Message>::Unregister(const Message& message) {
-  const std::lock_guard lock(impl_->mutex);
+  const MutexLock lock(impl_->mutex);
   impl_->Unregister(message);
 }
 
@@ -284,7 +285,7 @@ int Publisher<Message>::total_matched() const {
 
 template <typename Message>
 void Publisher<Message>::ClearHistory() {
-  const std::lock_guard lock(impl_->mutex);
+  const MutexLock lock(impl_->mutex);
   std::size_t removed = 0;
   impl_->writer->clear_history(&removed);
 }

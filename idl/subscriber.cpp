@@ -3,7 +3,6 @@
 #include <chrono>
 #include <cstring>
 #include <functional>
-#include <mutex>
 #include <set>
 #include <unordered_map>
 #include <vector>
@@ -14,6 +13,7 @@
 #include <fastdds/dds/subscriber/Subscriber.hpp>
 
 #include "base/bounded_queue.h"
+#include "base/mutex.h"
 #include "idl/codec.h"
 #include "idl/endpoint.h"
 #include "idl/gap_counter.h"
@@ -133,9 +133,9 @@ struct Subscriber<Message>::Impl : dds::DataReaderListener {
   void LetWritersFinish() {
     const Duration two_heartbeats{0, 100'000'000};
     const auto end = std::chrono::steady_clock::now() + kMaxFinalDrain;
-    const std::lock_guard lock(drain_mutex);
+    const MutexLock lock(drain_mutex);
     dds::SampleInfo info;
-    const auto take = [&] {
+    const auto take = [&]() REQUIRES(drain_mutex) {
       return reader->take_next_sample(&wire, &info) == return_code::RETCODE_OK;
     };
     bool behind = take();
@@ -187,23 +187,23 @@ struct Subscriber<Message>::Impl : dds::DataReaderListener {
     // read it, and drains once more.
     pending.store(true);
     while (pending.load()) {
-      const std::unique_lock lock(drain_mutex, std::try_to_lock);
-      if (!lock.owns_lock()) {
+      if (!drain_mutex.try_lock()) {
         return;
       }
+      const MutexLock lock(drain_mutex, std::adopt_lock);
       pending.store(false);
       DrainLocked(waits);
     }
   }
 
-  void DrainLocked(bool waits) noexcept {
+  void DrainLocked(bool waits) noexcept REQUIRES(drain_mutex) {
     dds::SampleInfo info;
     while (waits ? queue.WaitForRoom() : queue.HasRoom()) {
       if (reader->take_next_sample(&wire, &info) != return_code::RETCODE_OK) {
         // Only now, because numbers that are still in the library look missing:
         // after a backlog it returns messages valve by valve, not in the order
         // of writing.
-        const std::lock_guard lock(status_mutex);
+        const MutexLock lock(status_mutex);
         missing = gaps.missing();
         return;
       }
@@ -215,7 +215,7 @@ struct Subscriber<Message>::Impl : dds::DataReaderListener {
     }
   }
 
-  void Accept(const dds::SampleInfo& info) {
+  void Accept(const dds::SampleInfo& info) REQUIRES(drain_mutex) {
     Item item;
     item.reception = {info.source_timestamp.to_ns(),
                       info.reception_timestamp.to_ns(),
@@ -245,7 +245,8 @@ struct Subscriber<Message>::Impl : dds::DataReaderListener {
 
   // Sets the key of the disposed instance. A dispose carries only the instance
   // handle, an MD5 sum of the key, which `keys` maps back.
-  bool FindKey(const dds::InstanceHandle_t& handle, Message& message) {
+  bool FindKey(const dds::InstanceHandle_t& handle, Message& message)
+      REQUIRES(drain_mutex) {
     const auto found = keys.find(handle);
     if (found == keys.end()) {
       return false;
@@ -256,7 +257,7 @@ struct Subscriber<Message>::Impl : dds::DataReaderListener {
   }
 
   void Add(std::uint64_t SubscriberStatus::*count, std::uint64_t more = 1) {
-    const std::lock_guard lock(status_mutex);
+    const MutexLock lock(status_mutex);
     counted.*count += more;
   }
 
@@ -273,7 +274,7 @@ struct Subscriber<Message>::Impl : dds::DataReaderListener {
   void on_liveliness_changed(
       dds::DataReader* /*reader*/,
       const dds::LivelinessChangedStatus& status) override {
-    const std::lock_guard lock(status_mutex);
+    const MutexLock lock(status_mutex);
     counted.alive = status.alive_count;
   }
 
@@ -281,7 +282,7 @@ struct Subscriber<Message>::Impl : dds::DataReaderListener {
       dds::DataReader* /*reader*/,
       const dds::RequestedIncompatibleQosStatus& status) override {
     {
-      const std::lock_guard lock(status_mutex);
+      const MutexLock lock(status_mutex);
       counted.incompatible = status.total_count;
     }
     bus.ReportIncompatible(Traits::kTopic, true, status.last_policy_id,
@@ -303,7 +304,7 @@ struct Subscriber<Message>::Impl : dds::DataReaderListener {
       return;
     }
     Add(&SubscriberStatus::rejected_instances, status.total_count_change);
-    const std::lock_guard lock(status_mutex);
+    const MutexLock lock(status_mutex);
     if (refused_valves.size() < kRefusedLimit) {
       refused_valves.insert(status.last_instance_handle);
     }
@@ -326,15 +327,17 @@ struct Subscriber<Message>::Impl : dds::DataReaderListener {
   std::atomic<std::uint64_t> received{0};  // Handed out; likewise `ended`.
   std::atomic<std::uint64_t> ended{0};
 
-  mutable std::mutex status_mutex;  // Guards what follows.
-  SubscriberStatus counted;         // Its `lost` is the library's count,
-  std::uint64_t missing{0};         // this is that of `gaps`.
-  std::set<dds::InstanceHandle_t> refused_valves;
+  mutable Mutex status_mutex;
+  SubscriberStatus counted
+      GUARDED_BY(status_mutex);  // Its `lost` is the library's count,
+  std::uint64_t missing GUARDED_BY(status_mutex){0};  // this is that of `gaps`.
+  std::set<dds::InstanceHandle_t> refused_valves GUARDED_BY(status_mutex);
 
-  std::mutex drain_mutex;  // Guards what follows.
-  GapCounter gaps{NowNs()};
-  typename Traits::Wire wire;
-  std::unordered_map<dds::InstanceHandle_t, Key<Message>, HandleHash> keys;
+  Mutex drain_mutex;
+  GapCounter gaps GUARDED_BY(drain_mutex){NowNs()};
+  typename Traits::Wire wire GUARDED_BY(drain_mutex);
+  std::unordered_map<dds::InstanceHandle_t, Key<Message>, HandleHash> keys
+      GUARDED_BY(drain_mutex);
 };
 
 template <typename Message>
@@ -369,7 +372,7 @@ SubscriberStatus Subscriber<Message>::status() const {
   const Impl& impl = *impl_;
   const auto* type = dynamic_cast<const typename Impl::Type*>(impl.type.get());
   const std::uint64_t refused_bytes = type == nullptr ? 0 : type->refused();
-  const std::lock_guard lock(impl.status_mutex);
+  const MutexLock lock(impl.status_mutex);
   SubscriberStatus status = impl.counted;
   status.received = impl.received.load(std::memory_order_relaxed);
   status.ended = impl.ended.load(std::memory_order_relaxed);

@@ -55,7 +55,7 @@ WriterPace::State& WriterPace::Find(const WriterGuid& writer,
 
 bool WriterPace::Admit(const WriterGuid& writer, std::int64_t number,
                        std::int64_t left_out, Clock::time_point now) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   State& state = Find(writer, number, now);
   const std::int64_t allowed = state.burst + Growth(now - state.last_message);
   const std::int64_t cost = std::max<std::int64_t>(0, number - state.number) +

@@ -4,8 +4,9 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
-#include <mutex>
 #include <unordered_map>
+
+#include "base/mutex.h"
 
 namespace fdi::idl {
 
@@ -45,11 +46,11 @@ class WriterPace {
   using States = std::unordered_map<WriterGuid, State, Hash>;
 
   State& Find(const WriterGuid& writer, std::int64_t number,
-              Clock::time_point now);
+              Clock::time_point now) REQUIRES(mutex_);
 
-  std::mutex mutex_;
-  States recent_;
-  States older_;  ///< Dropped when `recent_` is full again.
+  Mutex mutex_;
+  States recent_ GUARDED_BY(mutex_);
+  States older_ GUARDED_BY(mutex_);  ///< Dropped when `recent_` is full again.
 };
 
 }  // namespace fdi::idl

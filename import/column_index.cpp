@@ -29,21 +29,24 @@ std::string_view FirstLines(std::string_view text, std::size_t count) {
   return text.substr(0, end);
 }
 
-// Whether a record that ends with `line` goes on, because a quote that began a
-// cell is open.
-bool EndsInQuote(std::string_view line, char separator) {
-  bool quoted = false;
-  bool at_begin = true;
-  for (const char c : line) {
-    if (c == '"' && (at_begin || quoted)) {
-      quoted = !quoted;
-      at_begin = !quoted;  // The second of a doubled quote reopens it.
-    } else if (!quoted) {
-      at_begin = c == separator || (at_begin && c == ' ');
+// The quotes of a record, line by line.
+struct OpenQuote {
+  bool quoted{false};
+  bool at_begin{true};
+
+  // Whether the record goes on after `line`, because a quote is open.
+  bool Take(std::string_view line, char separator) {
+    for (const char c : line) {
+      if (c == '"' && (at_begin || quoted)) {
+        quoted = !quoted;
+        at_begin = !quoted;  // The second of a doubled quote reopens it.
+      } else if (!quoted) {
+        at_begin = c == separator || (at_begin && c == ' ');
+      }
     }
+    return quoted;
   }
-  return quoted;
-}
+};
 
 // A long table of many tags does not show in its first lines that the tags
 // repeat; its header does.
@@ -82,11 +85,12 @@ std::string_view Trimmed(std::string_view cell) {
 ColumnIndex::ColumnIndex(const std::filesystem::path& path,
                          const ColumnMap& map, std::size_t max_lines)
     : source_(path.string()), text_(ReadTextFile(path)) {
-  if (max_lines > 0) {
+  FindForm(map);
+  // The first lines of a long table have few of its tags.
+  if (max_lines > 0 && !form_.long_table) {
     text_.resize(FirstLines(text_, max_lines).size());
     text_.shrink_to_fit();
   }
-  FindForm(map);
   IndexRows();
 }
 
@@ -133,10 +137,12 @@ void ColumnIndex::IndexRows() {
     const std::size_t first_line = line++;
     std::size_t end = std::min(text_.find('\n', begin), text_.size());
     if (std::memchr(text_.data() + begin, '"', end - begin) != nullptr) {
-      const auto record = [&] {
-        return std::string_view(text_).substr(begin, end - begin);
-      };
-      while (end < text_.size() && EndsInQuote(record(), form_.separator)) {
+      OpenQuote quote;
+      std::size_t from = begin;
+      while (quote.Take(std::string_view(text_).substr(from, end - from),
+                        form_.separator) &&
+             end < text_.size()) {
+        from = end;
         end = std::min(text_.find('\n', end + 1), text_.size());
         ++line;
       }

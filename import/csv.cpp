@@ -1,16 +1,15 @@
 #include "import/csv.h"
 
 #include <algorithm>
-#include <array>
 #include <cctype>
 #include <cerrno>
-#include <charconv>
 #include <cmath>
 #include <cstring>
 #include <ostream>
 #include <utility>
 
 #include "base/error.h"
+#include "base/text.h"
 #include "diagnosis/fault_catalogue.h"
 #include "import/layout.h"
 #include "import/tag_map.h"
@@ -325,7 +324,7 @@ bool CsvReader::IsMarker() {
     return true;
   }
   const auto first = static_cast<unsigned char>(cell.front());
-  if (std::isalpha(first) == 0 && first < 0x80) {
+  if ((std::isalpha(first) == 0 && first < 0x80) || ScanTime(cell)) {
     return false;
   }
   ++markers_;
@@ -690,11 +689,7 @@ void CsvReader::CheckHeader() const {
   require(fault_column_ || !strength_column_, "fault (or fault_no)");
   require(strength_column_ || !fault_column_, kStrengthColumn);
   if (!missing.empty()) {
-    std::string names;
-    for (const std::string& name : missing) {
-      names += (names.empty() ? "" : ", ") + name;
-    }
-    Refuse("missing column " + names + "; the header is " +
+    Refuse("missing column " + JoinText(missing) + "; the header is " +
            Quoted(Listed(names_)) + kSniff);
   }
 }
@@ -901,16 +896,13 @@ bool CsvReader::TakeTime(CsvRow& row) {
   }
   std::int64_t& stamp_ns = row.labelled.sample.stamp_ns;
   // Nanoseconds since 1970 have more digits than a double.
-  std::int64_t count = 0;
-  const auto [end, error] =
-      std::from_chars(cell.data(), cell.data() + cell.size(), count);
-  const bool whole = error == std::errc() && end == cell.data() + cell.size();
+  const auto count = ParseWhole<std::int64_t>(cell);
   if (time_form_ == TimeForm::kFileTime) {
-    if (!whole || count < kFileTimeOf1970 ||
-        count - kFileTimeOf1970 > kMaxFileTime) {
+    if (!count || *count < kFileTimeOf1970 ||
+        *count - kFileTimeOf1970 > kMaxFileTime) {
       throw DataError(NoTime(cell));
     }
-    stamp_ns = (count - kFileTimeOf1970) * 100;
+    stamp_ns = (*count - kFileTimeOf1970) * 100;
   } else if (time_form_ == TimeForm::kElapsed ||
              time_form_ == TimeForm::kUnix) {
     row.t_s = Number(*time_column_) * time_scale_;
@@ -919,8 +911,8 @@ bool CsvReader::TakeTime(CsvRow& row) {
              NumberText(row.t_s) +
              " s is beyond 100 years; try unit under [time] of --map");
     }
-    stamp_ns = whole && time_form_ == TimeForm::kUnix
-                   ? count * std::llround(time_scale_ * 1e9)
+    stamp_ns = count && time_form_ == TimeForm::kUnix
+                   ? *count * std::llround(time_scale_ * 1e9)
                    : std::llround(row.t_s * 1e9);
     stamp_ns += time_form_ == TimeForm::kElapsed ? options_.start_ns : 0;
   } else if (const auto utc = UtcOf(cell)) {

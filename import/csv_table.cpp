@@ -9,6 +9,7 @@
 #include "base/correlation.h"
 #include "base/error.h"
 #include "base/log.h"
+#include "base/median.h"
 #include "base/usual_period.h"
 #include "import/csv.h"
 #include "import/layout.h"
@@ -353,9 +354,7 @@ double TableReader::Phase() const {
   for (const CsvRow& row : rows_) {
     off.push_back(std::remainder(row.t_s - rows_.front().t_s, period_s_));
   }
-  const auto middle = off.begin() + static_cast<std::ptrdiff_t>(off.size() / 2);
-  std::nth_element(off.begin(), middle, off.end());
-  return *middle;
+  return Median(std::move(off));
 }
 
 void TableReader::PutOnGrid() {

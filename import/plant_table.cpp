@@ -269,7 +269,7 @@ std::vector<PlantRow> RowsOf(const RawTable& raw) {
   return rows;
 }
 
-// A number, a flag or a list of the file as text, as in a cell of CSV.
+// A number, a range or a list of the file as text, as in a cell of CSV.
 std::string CellOf(TomlReader& table, const std::string& key) {
   const auto tried = [](const auto& read) -> std::optional<std::string> {
     try {
@@ -397,6 +397,9 @@ RawTable ReadCells(const std::string& text, const PlantTable& table) {
     }
     if (const auto name = row.cells.find("name");
         name != row.cells.end() && name->second == "*") {
+      if (!row.error.empty()) {
+        throw DataError(row.place + ": " + row.error);
+      }
       const std::string group = row.cells["group"];
       row.cells.erase("name");
       raw.defaults[group] = std::move(row.cells);
@@ -559,6 +562,16 @@ TagMatch MatchTags(const PlantRow& row, const TagNames& names,
 
 namespace {
 
+// Readings that are beyond the range by a tenth are none.
+void Bound(const std::optional<std::pair<double, double>>& range,
+           ColumnMapping& mapping) {
+  if (range) {
+    const double margin = 0.1 * (range->second - range->first);
+    mapping.lowest = range->first - margin;
+    mapping.highest = range->second + margin;
+  }
+}
+
 // The reading in the unit of the signal; see ReadUnit() of tag_map.cpp.
 ColumnMapping MappingOf(const PlantRow& row, LoopTag tag, Signal signal,
                         const std::string& column, ColumnMap& map) {
@@ -576,9 +589,12 @@ ColumnMapping MappingOf(const PlantRow& row, LoopTag tag, Signal signal,
         std::string(LoopTagName(tag)) + "_unit is " +
         (name.empty() ? std::string("missing") : Quoted(name)) +
         "; accepted are" + UnitNames(signal) +
-        (IsGasUnit(name) ? "; a flow at standard conditions is not converted: "
-                           "name the unit in which it is a mass, or type f = -"
-                         : ""));
+        (IsGasUnit(name)
+             ? "; a flow at standard conditions is not converted: "
+               "name the unit in which it is a mass, or type " +
+                   std::string(tag == LoopTag::kF ? "f" : "service") +
+                   " = -, and the flow is left out"
+             : ""));
   }
   mapping.scale = unit->scale;
   mapping.offset = unit->offset;
@@ -587,16 +603,11 @@ ColumnMapping MappingOf(const PlantRow& row, LoopTag tag, Signal signal,
   if (name == "mA" && !range) {
     range = std::pair(4.0, 20.0);
   }
-  if (range) {
-    const auto [low, high] = *range;
-    if (percent) {
-      mapping.scale = 100.0 / (high - low);
-      mapping.offset = -low * mapping.scale;
-    }
-    const double margin = 0.1 * (high - low);
-    mapping.lowest = low - margin;
-    mapping.highest = high + margin;
+  if (range && percent) {
+    mapping.scale = 100.0 / (range->second - range->first);
+    mapping.offset = -range->first * mapping.scale;
   }
+  Bound(range, mapping);
   if (percent) {
     mapping.sense = row.sense;
   }
@@ -617,11 +628,12 @@ ColumnMap LoopColumns(const PlantRow& row, const TagMatch& match,
         MappingOf(row, LoopTag::kX, Signal::kX, match[LoopTag::kX], file));
   }
   // PV and SP keep their own unit: nothing depends on it there.
-  if (!match[LoopTag::kPv].empty()) {
-    file.columns.push_back({match[LoopTag::kPv], Signal::kF});
-  }
-  if (!match[LoopTag::kSp].empty()) {
-    file.columns.push_back({match[LoopTag::kSp], Signal::kSp});
+  for (const auto& [tag, signal] : {std::pair(LoopTag::kPv, Signal::kF),
+                                    std::pair(LoopTag::kSp, Signal::kSp)}) {
+    if (!match[tag].empty()) {
+      Bound(row[tag].range,
+            file.columns.emplace_back(ColumnMapping{match[tag], signal}));
+    }
   }
   file.flow_unit = FlowUnit::kM3PerHour;
   file.mode_column = match[LoopTag::kMode];

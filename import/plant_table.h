@@ -24,8 +24,8 @@ struct TagCell {
   std::string pattern{};  ///< Placeholders replaced; * stands for anything.
   bool own{false};        ///< Stated in the row itself, not as a default.
   std::string unit{};
-  /// In the file. Of op, x and sp it is 0..100 %; readings of others that are
-  /// beyond it by a tenth are none.
+  /// In the file. Of op and x it is 0..100 %. Readings that are beyond it by a
+  /// tenth are none.
   std::optional<std::pair<double, double>> range{};
 };
 

@@ -1,10 +1,10 @@
 #include "import/quality.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cstdint>
 
 #include "base/csv_cells.h"
+#include "base/text.h"
 
 namespace fdi::importer {
 namespace {
@@ -48,13 +48,7 @@ bool IsListed(std::string_view cell, const std::vector<std::string>& words) {
 std::optional<std::uint32_t> CodeOf(std::string_view cell) {
   const bool hex = cell.starts_with("0x") || cell.starts_with("0X");
   cell.remove_prefix(hex ? 2 : 0);
-  std::uint32_t code = 0;
-  const auto [end, error] = std::from_chars(
-      cell.data(), cell.data() + cell.size(), code, hex ? 16 : 10);
-  return !cell.empty() && error == std::errc() &&
-                 end == cell.data() + cell.size()
-             ? std::optional(code)
-             : std::nullopt;
+  return ParseWhole<std::uint32_t>(cell, hex ? 16 : 10);
 }
 
 }  // namespace

@@ -6,12 +6,12 @@
 #include <cmath>
 #include <cstdio>
 #include <map>
-#include <span>
 #include <sstream>
 #include <utility>
 
 #include "base/correlation.h"
 #include "base/error.h"
+#include "base/text.h"
 #include "base/usual_period.h"
 #include "import/layout.h"
 #include "import/tag_map.h"
@@ -48,6 +48,7 @@ constexpr RoleWords kRoleWords[] = {
     {Role::kSetpoint,
      "setpoint|set point|sollwert|consigne|consigna|zadan|fuhrungsgr",
      "|sp|spt|w|lsp|rsp|"},
+    {Role::kPosition, "realiment|retroaliment", ""},
     {Role::kSupply,
      "supply|instrument air|zuluft|steuerluft|air comprim|alimentation|"
      "alimentacion|zasilan",
@@ -58,10 +59,11 @@ constexpr RoleWords kRoleWords[] = {
      "|op|out|co|cv|mv|cmd|ao|lmn|mn|yout|wyj|"},
     {Role::kPosition,
      "position|travel|stem|opening|stellung|ruckmeld|rueckmeld|feedback|"
-     "readback|recopie|ouverture|posicion|apertura|carrera|realiment|polozen|"
+     "readback|recopie|ouverture|posicion|apertura|carrera|polozen|"
      "pozycj|otwarci|hub|lift|skok|course",
      "|x|pos|zt|zi|zit|gt|gi|zso|zsc|fb|fbk|rb|rbv|"},
     {Role::kLevel, "level|fullstand|niveau|nivel|poziom", "|lt|li|lit|"},
+    {Role::kTemperature, "temp", "|t1|"},
     {Role::kUpstream,
      "upstream|inlet|vordruck|eingangsdruck|vor ventil|amont|aguas arriba|"
      "przed zaw",
@@ -71,9 +73,8 @@ constexpr RoleWords kRoleWords[] = {
      "aguas abajo|za zaw",
      "|p2|"},
     {Role::kPressure, "press|druck|presion|cisnien", ""},
-    {Role::kTemperature, "temp", "|t1|"},
-    {Role::kFlow, "flow|durchfl|menge|strom|debit|caudal|przeplyw|strumien",
-     ""},
+    {Role::kFlow,
+     "flow|durchfl|menge|strom|debit|caudal|flujo|przeplyw|strumien", ""},
 };
 
 /// Units of quantities that no signal has.
@@ -158,10 +159,12 @@ NamedUnit UnitIn(const std::string& name) {
 std::optional<Role> RoleOfTag(const std::vector<std::string>& tokens) {
   for (std::size_t i = tokens.size(); i-- > 0;) {
     const std::string letters = Letters(tokens[i]);
-    // "pv" without a number is the process value of the tag before it.
+    // "pv" without a number is the process value of the tag before it, and
+    // "pid1" a block of it.
     if (letters.empty() || letters.size() > 4 ||
+        (tokens.size() > 1 && IsToken(letters, "|pid|ai|ao|di|do|fb|")) ||
         (letters == tokens[i] && tokens.size() > 1 &&
-         IsToken(letters, "|pv|iv|val|value|i|a|b|no|st|ai|ao|di|do|db|"))) {
+         IsToken(letters, "|pv|iv|val|value|i|a|b|no|st|db|"))) {
       continue;
     }
     if (letters.ends_with('v') || letters == "ven" || letters == "rv") {
@@ -191,12 +194,47 @@ struct NameGuess {
   bool by_word{false};
 };
 
+bool HasWordOf(const std::string& plain, Role role) {
+  return std::ranges::any_of(kRoleWords, [&](const RoleWords& known) {
+    return known.role == role && HasWord(plain, known.words);
+  });
+}
+
+// Two words that say one thing: the set point of a position is the command, and
+// "pression sortie", which begins with what is measured, no output.
+std::optional<Role> RoleOfTwoWords(const std::string& plain,
+                                   const std::vector<std::string>& tokens) {
+  const bool wanted = HasWordOf(plain, Role::kSetpoint) ||
+                      std::ranges::find(tokens, "soll") != tokens.end();
+  if (wanted && HasWordOf(plain, Role::kPosition)) {
+    return Role::kCommand;
+  }
+  if (tokens.empty() || HasWordOf(plain, Role::kSupply)) {
+    return std::nullopt;
+  }
+  if (HasWordOf(tokens.front(), Role::kTemperature)) {
+    return Role::kTemperature;
+  }
+  if (HasWordOf(tokens.front(), Role::kPressure)) {
+    if (HasWord(plain, "entree|entrada|wlot|eingang")) {
+      return Role::kUpstream;
+    }
+    if (HasWord(plain, "sortie|salida|wylot|ausgang")) {
+      return Role::kDownstream;
+    }
+  }
+  return std::nullopt;
+}
+
 // Words first, then the attribute behind a tag (".OP"), then its letters. The
 // output of a transmitter ("FT17.OUT") is what it measures.
 NameGuess RoleOf(const std::string& name, const std::string& about) {
   const std::string plain = PlainText(name + ' ' + about);
   const std::vector<std::string> tokens = Tokens(PlainText(name));
   const auto tag = RoleOfTag(tokens);
+  if (const auto role = RoleOfTwoWords(plain, tokens)) {
+    return {role, true};
+  }
   for (const RoleWords& known : kRoleWords) {
     if (HasWord(plain, known.words)) {
       return {known.role, true};
@@ -883,11 +921,7 @@ std::string TomlText(const std::string& text) {
 }
 
 std::string TomlList(const std::vector<std::string>& texts) {
-  std::string list;
-  for (const std::string& text : texts) {
-    list += (list.empty() ? "" : ", ") + TomlText(text);
-  }
-  return '[' + list + ']';
+  return '[' + JoinText(texts, ", ", TomlText) + ']';
 }
 
 std::string TomlPair(const std::vector<double>& pair) {

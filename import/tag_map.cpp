@@ -6,6 +6,7 @@
 #include <CLI/CLI.hpp>
 
 #include "base/error.h"
+#include "base/text.h"
 #include "base/time_text.h"
 #include "base/toml_reader.h"
 
@@ -279,11 +280,8 @@ void ReadTime(TomlReader table, ColumnMap& map) {
   const std::string unit = table.Text("unit").value_or("auto");
   const auto form = std::ranges::find(kTimeNames, unit, &TimeName::name);
   if (form == std::end(kTimeNames)) {
-    std::string names;
-    for (const TimeName& known : kTimeNames) {
-      names += (names.empty() ? "" : ", ") + std::string(known.name);
-    }
-    table.Refuse("unit", "'" + unit + "' is none of " + names);
+    table.Refuse("unit", "'" + unit + "' is none of " +
+                             JoinText(kTimeNames, ", ", &TimeName::name));
   }
   map.time_form = form->unit.form;
   map.time_scale = form->unit.scale;

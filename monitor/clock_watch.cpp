@@ -20,7 +20,10 @@ ClockWatch::ClockWatch(std::function<std::int64_t()> utc_now_ns, LogSink log)
     : utc_now_ns_(std::move(utc_now_ns)), log_(std::move(log)) {}
 
 void ClockWatch::OnVerdict(const std::string& valve_id, const Sample& sample,
-                           const ValveOutcome& /*outcome*/) {
+                           const ValveOutcome& outcome) {
+  if (OutOfOrder(outcome.verdict.intake)) {
+    return;  // A publisher that was superseded may go on for long.
+  }
   const auto [known, fresh] = sources_.try_emplace(valve_id, sample.source_id);
   if (!fresh &&
       std::exchange(known->second, sample.source_id) == sample.source_id) {

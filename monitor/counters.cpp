@@ -1,8 +1,7 @@
 #include "monitor/counters.h"
 
-#include <algorithm>
-#include <cctype>
-#include <charconv>
+#include "base/csv_cells.h"
+#include "base/text.h"
 
 namespace fdi::monitor {
 namespace {
@@ -84,14 +83,6 @@ constexpr std::array<CounterInfo, kCounterCount> kInfos{{
 }};
 static_assert(!kInfos.back().help.empty(), "a counter has no description");
 
-std::string Lower(std::string_view text) {
-  std::string lower(text);
-  std::ranges::transform(lower, lower.begin(), [](unsigned char c) {
-    return static_cast<char>(std::tolower(c));
-  });
-  return lower;
-}
-
 // Escapes \ " and line feed in a label's value.
 void AppendEscaped(std::string_view value, std::string& text) {
   for (const char c : value) {
@@ -168,10 +159,7 @@ void Exposition::Value(std::uint64_t value, Label label) {
 }
 
 void Exposition::Value(double value, Label label) {
-  std::array<char, 32> digits{};  // A double needs 24.
-  const auto end =
-      std::to_chars(digits.data(), digits.data() + digits.size(), value).ptr;
-  Line(std::string_view(digits.data(), end), label);
+  Line(NumberText(value), label);
 }
 
 void Exposition::Line(std::string_view value, Label label) {

@@ -118,7 +118,9 @@ bool EpisodeTracker::Adopt(const FaultEvent& event, EpisodeOutlet& outlet) {
   if (!open_) {
     untold_.clear();
   }
-  if (!open_ || !standby_ || open_->episode.source_id != event.source_id) {
+  // Of a valve with a model set one may be the audit's.
+  if (!open_ || !standby_ || open_->episode.source_id != event.source_id ||
+      open_->episode.model_hash != event.model_hash) {
     return false;
   }
   Follow(episode, outlet);
@@ -316,13 +318,16 @@ void EpisodeTracker::TryRecovery(const Sample& sample, const ModelSet& models,
   if (!recovered_ || WaitsForLeader()) {
     return;
   }
-  // The bits of its faults mean nothing in another model set.
-  if (recovered_->model_hash != models.content_hash) {
+  // A standby waits for longer: the leader ends it first.
+  const std::int64_t patience_ns = (standby_ ? 2 : 1) * window_ns_;
+  // The bits of its faults mean nothing in another model set. What the audit
+  // found, it does not find again within that time.
+  if (recovered_->model_hash != models.content_hash &&
+      recovered_->layer != Layer::kAudit) {
     CloseRecovered(EndReason::kModelChanged, sample.stamp_ns, outlet);
-  } else if (recovered_->source_id != sample.source_id ||
-             sample.stamp_ns - first_stamp_ns_ >
-                 (standby_ ? 2 : 1) *
-                     window_ns_) {  // The leader ends it first.
+  } else if (recovered_->model_hash != models.content_hash ||
+             recovered_->source_id != sample.source_id ||
+             sample.stamp_ns - first_stamp_ns_ > patience_ns) {
     CloseRecovered(EndReason::kUnknown, sample.stamp_ns, outlet);
   }
 }
@@ -386,6 +391,7 @@ bool EpisodeTracker::Begin(const Transition& transition, const Verdict& verdict,
   }
   open_->teller = standby_ ? Teller::kNobody : Teller::kWe;
   open_->episode.source_id = verdict.source_id;
+  open_->episode.model_hash = models.content_hash;
   open_->episode.detection_stamp_ns = transition.detection_stamp_ns;
   open_->episode.episode_id =
       EpisodeId(valve_id_, verdict.source_id, transition.detection_stamp_ns);

@@ -121,6 +121,8 @@ class EpisodeTracker {
            accepted_stamp_ns_ - ended_.ended_ns > window_ns_;
   }
   std::size_t trace_bytes() const { return trace_.bytes(); }
+  /// The instants are evidence of an open episode.
+  bool tracing() const { return open_ && open_->tracing; }
 
  private:
   enum class Teller : std::uint8_t { kNobody, kWe, kLeader };

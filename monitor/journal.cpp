@@ -53,7 +53,7 @@ void Journal::Stop() {
     return;
   }
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     stopping_ = true;
     stop_by_ = Clock::now() + options_.stop_limit;
     work_.notify_one();
@@ -63,7 +63,7 @@ void Journal::Stop() {
   FirstError errors;
   errors.Try([this] { writer_.Join(); });
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     publishing_ends_ = true;
     unsent_changed_.notify_one();
   }
@@ -71,14 +71,20 @@ void Journal::Stop() {
   // From here on this thread alone uses the queues and the history. What it
   // cannot write is not tried again; the events among it count as lost.
   options_.tries = 1;
-  for (Deferred& each : std::exchange(deferred_, {})) {
-    records_.push_back(std::move(each.record));
+  {
+    const MutexLock lock(mutex_);
+    for (Deferred& each : std::exchange(deferred_, {})) {
+      records_.push_back(std::move(each.record));
+    }
   }
   MarkDelivered(Clock::now(), kLastDelivery);
   WriteRecords();
-  for (const Record& record : std::exchange(records_, {})) {
-    if (std::holds_alternative<PendingEvent>(record)) {
-      counters_.Add(Counter::kEventsLost);
+  {
+    const MutexLock lock(mutex_);
+    for (const Record& record : std::exchange(records_, {})) {
+      if (std::holds_alternative<PendingEvent>(record)) {
+        counters_.Add(Counter::kEventsLost);
+      }
     }
   }
   CommitBuffered();
@@ -104,7 +110,7 @@ void Journal::OnEvent(FaultEvent event) {
   auto pending = std::make_shared<Pending>();
   pending->event = std::move(event);
   pending->deadline = Clock::now() + options_.patience;
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   // The bus does not take events as fast as they come. What is committed and
   // not published, the next session publishes.
   if (unsent_.size() < options_.max_records) {
@@ -130,12 +136,12 @@ void Journal::MarkPublished(const FaultEvent& event) {
   auto pending = std::make_shared<Pending>();
   pending->event = event;
   pending->published = Clock::now();
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   undelivered_.push_back(std::move(pending));
 }
 
 void Journal::OnEvidence(EpisodeTrace trace) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   // Points are bounded rather than traces, because memory grows with points.
   const std::size_t points = trace.trace.size();
   if (trace_points_ + points > options_.max_trace_points) {
@@ -148,17 +154,17 @@ void Journal::OnEvidence(EpisodeTrace trace) {
 }
 
 void Journal::OnLook(EpisodeLook look) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   AddLocked(std::move(look));
 }
 
 void Journal::OnStrength(StrengthPoint point) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   AddLocked(point);
 }
 
 void Journal::OnNormal(const std::string& valve_id, std::int64_t stamp_ns) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   AddLocked(Normal{valve_id, stamp_ns});
 }
 
@@ -170,19 +176,19 @@ void Journal::OnGap(DataGap gap) {
         return "valve=" + LogValue(gap.valve_id) + " reason=" + gap.reason;
       },
       LogLevel::kInfo);
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   AddLocked(std::move(gap));
 }
 
 void Journal::OnResumed(const OpenEpisode& episode, std::int64_t stamp_ns) {
   log_.Line(LogLevel::kInfo,
             "episode_resumed valve=" + LogValue(episode.valve_id));
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   AddLocked(Resumption{episode.episode_id, stamp_ns, episode.valve_id});
 }
 
 void Journal::Commit(Checkpoint checkpoint) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   checkpoint_ = Merged(std::move(checkpoint_), std::move(checkpoint));
   work_.notify_one();
 }
@@ -191,7 +197,9 @@ bool Journal::AddLocked(Record record) {
   if (records_.size() >= options_.max_records) {
     log_.Report(
         LogId::kHistoryLost, "history_dropped",
-        [this] { return "waiting=" + std::to_string(records_.size()); },
+        [this]() REQUIRES(mutex_) {
+          return "waiting=" + std::to_string(records_.size());
+        },
         LogLevel::kError);
     return false;
   }
@@ -207,24 +215,24 @@ void Journal::SetStageLocked(Pending& pending, bool committed) {
 }
 
 Journal::Backlog Journal::backlog() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return {records_.size(), trace_points_};
 }
 
 void Journal::Write() {
-  const auto has_work = [this] {
+  const auto has_work = [this]() REQUIRES(mutex_) {
     return stopping_ || !records_.empty() || !checkpoint_.empty() ||
            trace_points_ >= kPointsPerCommit;
   };
   while (true) {
     bool last_attempt = false;
     {
-      std::unique_lock lock(mutex_);
+      MutexLock lock(mutex_);
       // Not has_work: what could not be written is still queued, so the thread
       // would retry without a pause.
       if (degraded_) {
         work_.wait_for(lock, options_.retry_period,
-                       [this] { return stopping_; });
+                       [this]() REQUIRES(mutex_) { return stopping_; });
       } else {
         work_.wait_for(lock, options_.commit_period, has_work);
       }
@@ -238,7 +246,7 @@ void Journal::Write() {
     } else if (degraded_) {
       Recovered();
     }
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     const bool idle =
         records_.empty() && traces_.empty() && checkpoint_.empty();
     // An attempt that failed before Stop() is not the last one: the history may
@@ -257,7 +265,7 @@ bool Journal::WriteWaiting() {
       return false;
     }
     {
-      const std::lock_guard lock(mutex_);
+      const MutexLock lock(mutex_);
       // A commit is due even without evidence: it stores gaps and marks, which
       // are only buffered, and the sign of life from which the next session
       // dates a crash.
@@ -277,7 +285,7 @@ bool Journal::WriteRecords() {
   std::vector<const Record*> batch;
   while (true) {
     {
-      const std::lock_guard lock(mutex_);
+      const MutexLock lock(mutex_);
       // A deque: pointers stay valid, as only this thread takes from the front.
       const std::size_t count = std::min(records_.size(), kRecordsPerCommit);
       batch.clear();
@@ -291,7 +299,7 @@ bool Journal::WriteRecords() {
     if (!WriteBatch(batch)) {
       return false;
     }
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     records_.erase(
         records_.begin(),
         records_.begin() + static_cast<std::ptrdiff_t>(batch.size()));
@@ -346,7 +354,7 @@ bool Journal::WriteBatch(std::vector<const Record*> batch, int failures) {
   });
   const auto set_stages = [this](const std::vector<const Record*>& records,
                                  bool stored) {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     for (const Record* record : records) {
       if (const auto* event = std::get_if<PendingEvent>(record)) {
         SetStageLocked(**event, stored);
@@ -461,7 +469,7 @@ void Journal::SetAside(const Record& record, const std::string& reason) {
 bool Journal::WriteCheckpoint() {
   Checkpoint checkpoint;
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     checkpoint = std::exchange(checkpoint_, {});
   }
   if (checkpoint.empty() ||
@@ -469,7 +477,7 @@ bool Journal::WriteCheckpoint() {
                     checkpoint_failures_, [&] { checkpoint = {}; })) {
     return true;
   }
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   // The failed one is the older one: of two accumulators of a valve the newer
   // one is kept.
   checkpoint_ = Merged(std::move(checkpoint), std::move(checkpoint_));
@@ -486,7 +494,7 @@ bool Journal::WriteTraces() {
     std::optional<EpisodeTrace> trace;
     bool late = false;
     {
-      const std::lock_guard lock(mutex_);
+      const MutexLock lock(mutex_);
       if (traces_.empty()) {
         break;
       }
@@ -509,7 +517,7 @@ bool Journal::WriteTraces() {
 }
 
 bool Journal::HasQueuedEvent() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return std::ranges::any_of(records_, [](const Record& record) {
     return std::holds_alternative<PendingEvent>(record);
   });
@@ -563,7 +571,7 @@ bool Journal::Attempt(const std::function<void()>& call) {
 // After one event has failed, those queued behind it need not wait for their
 // deadlines.
 void Journal::FailWaitingEvents() {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   for (const Record& record : records_) {
     if (const auto* event = std::get_if<PendingEvent>(&record)) {
       SetStageLocked(**event, false);
@@ -583,11 +591,12 @@ void Journal::Recovered() {
 // Waits for the oldest unsent event only, which keeps the order. Each deadline
 // runs from the arrival of its event, so the delays do not add up.
 void Journal::PublishAll() {
-  std::unique_lock lock(mutex_);
+  MutexLock lock(mutex_);
   while (true) {
     const bool awake = unsent_changed_.wait_for(
-        lock, options_.commit_period,
-        [this] { return publishing_ends_ || !unsent_.empty(); });
+        lock, options_.commit_period, [this]() REQUIRES(mutex_) {
+          return publishing_ends_ || !unsent_.empty();
+        });
     lock.unlock();
     MarkDelivered(Clock::now() - options_.delivery_time, {});
     lock.lock();
@@ -598,9 +607,10 @@ void Journal::PublishAll() {
       continue;
     }
     const PendingEvent next = unsent_.front();
-    unsent_changed_.wait_until(lock, next->deadline, [this, &next] {
-      return publishing_ends_ || next->stage != Pending::Stage::kWaiting;
-    });
+    unsent_changed_.wait_until(
+        lock, next->deadline, [this, &next]() REQUIRES(mutex_) {
+          return publishing_ends_ || next->stage != Pending::Stage::kWaiting;
+        });
     const bool persisted = next->stage == Pending::Stage::kCommitted;
     unsent_.pop_front();
     lock.unlock();
@@ -613,10 +623,10 @@ void Journal::PublishAll() {
 // the oldest ones beyond max_undelivered in any case.
 void Journal::MarkDelivered(Clock::time_point limit,
                             std::chrono::milliseconds patience) {
-  const auto due = [&] {
+  const auto due = [&]() REQUIRES(mutex_) {
     return !undelivered_.empty() && undelivered_.front()->published <= limit;
   };
-  std::unique_lock lock(mutex_);
+  MutexLock lock(mutex_);
   bool acknowledged = due();
   lock.unlock();
   // Without the lock, because it may wait for subscribers. What is published
@@ -649,7 +659,7 @@ void Journal::Publish(const PendingEvent& pending, bool persisted) {
   }
   if (sent) {
     counters_.Add(Counter::kEvents);
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     pending->published = Clock::now();
     undelivered_.push_back(pending);
   } else {

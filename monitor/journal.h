@@ -2,15 +2,14 @@
 
 #include <atomic>
 #include <chrono>
-#include <condition_variable>
 #include <cstdint>
 #include <deque>
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <variant>
 #include <vector>
 
+#include "base/mutex.h"
 #include "base/worker.h"
 #include "monitor/checkpoint.h"
 #include "monitor/counters.h"
@@ -131,9 +130,9 @@ class Journal : public EpisodeOutlet {
     int failures;
   };
 
-  // Used by callers. Functions named Locked require mutex_.
-  bool AddLocked(Record record);
-  void SetStageLocked(Pending& pending, bool committed);
+  // Used by callers.
+  bool AddLocked(Record record) REQUIRES(mutex_);
+  void SetStageLocked(Pending& pending, bool committed) REQUIRES(mutex_);
 
   // Used by the history thread.
   void Write();
@@ -177,18 +176,19 @@ class Journal : public EpisodeOutlet {
   int buffered_failures_{0};
   int checkpoint_failures_{0};
 
-  mutable std::mutex mutex_;                // Guards what follows.
-  std::condition_variable work_;            // For the history thread,
-  std::condition_variable unsent_changed_;  // for the publisher.
-  std::deque<Record> records_;
-  std::deque<PendingEvent> unsent_;
-  std::deque<PendingEvent> undelivered_;  // Published; oldest first.
-  std::deque<EpisodeTrace> traces_;
-  std::size_t trace_points_{0};
-  Checkpoint checkpoint_;
-  bool stopping_{false};
-  bool publishing_ends_{false};
-  Clock::time_point stop_by_;
+  mutable Mutex mutex_;
+  CondVar work_;            // For the history thread,
+  CondVar unsent_changed_;  // for the publisher.
+  std::deque<Record> records_ GUARDED_BY(mutex_);
+  std::deque<PendingEvent> unsent_ GUARDED_BY(mutex_);
+  std::deque<PendingEvent> undelivered_
+      GUARDED_BY(mutex_);  // Published; oldest first.
+  std::deque<EpisodeTrace> traces_ GUARDED_BY(mutex_);
+  std::size_t trace_points_ GUARDED_BY(mutex_){0};
+  Checkpoint checkpoint_ GUARDED_BY(mutex_);
+  bool stopping_ GUARDED_BY(mutex_){false};
+  bool publishing_ends_ GUARDED_BY(mutex_){false};
+  Clock::time_point stop_by_ GUARDED_BY(mutex_);
 
   Worker writer_;
   Worker publisher_;

@@ -94,8 +94,9 @@ Pipeline::Pipeline(PipelineOptions options, PipelineSinks sinks,
       looks_(options_.second_look
                  ? std::make_unique<LookWorker>(LookReportOf(context_))
                  : nullptr),
-      audits_(options_.loop_audit ? std::make_unique<AuditWorker>() : nullptr) {
-}
+      audits_(options_.loop_audit
+                  ? std::make_unique<AuditWorker>(options_.audit_all_loops)
+                  : nullptr) {}
 
 Pipeline::~Pipeline() {
   try {
@@ -294,7 +295,7 @@ void Pipeline::Evict(Valve& valve) {
   journal_.Commit(std::move(checkpoint));
   decisions_.Remove(id);
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     std::erase(names_, id);
   }
   by_id_.erase(id);
@@ -339,7 +340,7 @@ Pipeline::Valve& Pipeline::AddValve(std::string_view valve_id) {
   }
   by_id_[id] = valve.get();
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     names_.push_back(id);
   }
   return *valves_.emplace_back(std::move(valve));
@@ -421,8 +422,8 @@ void Pipeline::Adopt(FaultEvent event) {
   // they would mean other faults, but an end is an end.
   if (parts && parts->plan->models().content_hash == event.model_hash) {
     event.models = parts->plan->shared_models();
-  } else if (!parts && AuditModels(event.model_hash) != nullptr) {
-    event.models = AuditModels(event.model_hash);
+  } else if (auto audit = AuditModels(event.model_hash)) {
+    event.models = std::move(audit);
   } else if (event.transition.kind != TransitionKind::kClosed) {
     log_.Line(LogLevel::kInfo,
               "event_not_adopted valve=" + LogValue(event.valve_id) +
@@ -531,50 +532,12 @@ void Pipeline::Poll(TimePoint now) {
   // which there are ten a second or more.
   if (now - last_poll_ >= kPollPeriod) {
     last_poll_ = now;
-    for (const std::unique_ptr<Valve>& valve : valves_) {
-      UpdateDrift(*valve);
-    }
     CheckSilentValves(now);
   }
   if (now - last_checkpoint_ >= options_.checkpoint_period) {
     last_checkpoint_ = now;
     TakeCheckpoint(false);
   }
-}
-
-void Pipeline::UpdateDrift(Valve& valve) {
-  valve.monitor.ReadDrift(drift_);
-  valve.drift_used = 0.0;
-  for (std::size_t c = 0; c < drift_.size(); ++c) {
-    valve.drift_used = std::max(valve.drift_used, drift_[c].used());
-    ReportDriftAtBound(valve, c, drift_[c]);
-  }
-  if (!drift_.empty()) {
-    Tell(
-        [&](ValveListener& each) { each.OnDrift(valve.monitor.id(), drift_); });
-  }
-}
-
-// Once, as it stays so for days. Not by Report(), which would leave out another
-// valve that gets there within its interval.
-void Pipeline::ReportDriftAtBound(Valve& valve, std::size_t channel,
-                                  const FollowedDrift& drift) {
-  const auto report = [&](std::size_t place, bool full, const char* direction,
-                          double followed) {
-    if (full && !valve.drift_full[place]) {
-      log_.Line(LogLevel::kWarning,
-                LogLine(LogId::kDriftAtBound, "drift_at_bound",
-                        "valve=" + LogValue(valve.monitor.id()) + " channel=" +
-                            valve.monitor.models()->channels[channel].name +
-                            " direction=" + direction +
-                            " followed=" + ThreeDigits(followed)));
-    }
-    valve.drift_full[place] = full;
-  };
-  report(2 * channel, drift.mean_full_ns != 0, drift.mean < 0.0 ? "down" : "up",
-         drift.mean);
-  report(2 * channel + 1, drift.scale_full_ns != 0, "wider",
-         std::exp(drift.log_scale));
 }
 
 void Pipeline::CheckSilentValves(TimePoint now) {
@@ -636,10 +599,9 @@ void Pipeline::UpdateCensus() {
                              monitor.verdict().quality != Quality::kSettling
                          ? 1
                          : 0;
-    census.near_bound += valve->drift_used >= kNearBound ? 1 : 0;
   }
   // Counted without the lock: readers wait for the copy, not for all valves.
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   census_ = census;
 }
 
@@ -669,13 +631,13 @@ void Pipeline::TakeCheckpoint(bool urgent) {
 }
 
 void Pipeline::Reassign(std::shared_ptr<const ModelResolver> resolver) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   next_resolver_ = std::move(resolver);
 }
 
 void Pipeline::AdoptNextResolver() {
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (!next_resolver_) {
       return;
     }
@@ -712,12 +674,12 @@ void Pipeline::AdoptNextResolver() {
 }
 
 ValveCensus Pipeline::census() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return census_;
 }
 
 std::vector<std::string> Pipeline::valve_names() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return names_;
 }
 

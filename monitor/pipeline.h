@@ -1,11 +1,9 @@
 #pragma once
 
-#include <bitset>
 #include <chrono>
 #include <cstdint>
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -13,7 +11,7 @@
 #include <unordered_set>
 #include <vector>
 
-#include "diagnosis/followed_drift.h"
+#include "base/mutex.h"
 #include "diagnosis/records/ended_episode.h"
 #include "monitor/counters.h"
 #include "monitor/heartbeat.h"
@@ -41,8 +39,9 @@ struct PipelineOptions {
   std::chrono::milliseconds recovery_window{60'000};
   std::chrono::milliseconds checkpoint_period{60'000};
   JournalOptions journal;
-  bool second_look{true};  ///< By simulation, for model sets with physics.
-  bool loop_audit{true};   ///< Of valves without a model set.
+  bool second_look{true};       ///< By simulation, for model sets with physics.
+  bool loop_audit{true};        ///< Of valves without a model set.
+  bool audit_all_loops{false};  ///< And of those with one.
   /// By which episodes get their severity; without bands all are medium.
   std::shared_ptr<const SeverityCatalogue> severities{
       std::make_shared<const SeverityCatalogue>()};
@@ -66,8 +65,7 @@ struct ValveCensus {
   std::uint64_t ended{0};
   std::uint64_t open_episodes{0};
   std::uint64_t trace_bytes{0};
-  std::uint64_t judged{0};      ///< Not silent, with a model set, and settled.
-  std::uint64_t near_bound{0};  ///< Drifted that far (kNearBound).
+  std::uint64_t judged{0};  ///< Not silent, with a model set, and settled.
 };
 
 /// From samples to decisions, events and records. The thread that takes samples
@@ -164,11 +162,8 @@ class Pipeline {
  private:
   struct Valve {
     ValveMonitor monitor;
-    bool known;  // Never evicted.
-    // Limits at the bound of their drift: two for each channel.
-    std::bitset<std::size_t{2} * kMaxChannels> drift_full{};
-    double drift_used{0.0};  // The largest share of a bound.
-    SignalMask missing{0};   // Of an accepted sample; said when it changes.
+    bool known;             // Never evicted.
+    SignalMask missing{0};  // Of an accepted sample; said when it changes.
   };
   struct Hash {
     using is_transparent = void;
@@ -190,9 +185,6 @@ class Pipeline {
   void Recover(const std::vector<OpenEpisode>& episodes);
   EpisodeTracker& Recovered(const std::string& valve_id);
   void AdoptNextResolver();
-  void UpdateDrift(Valve& valve);
-  void ReportDriftAtBound(Valve& valve, std::size_t channel,
-                          const FollowedDrift& drift);
   void CheckSilentValves(TimePoint now);
   void AwaitRecovery();
   void ExpireRecovery();
@@ -220,7 +212,6 @@ class Pipeline {
   // Known valves without a slot yet; unknown ones leave that many slots free.
   std::unordered_set<std::string, Hash, std::equal_to<>> reserved_;
   std::vector<Valve*> idle_;  // Silent unknown valves, as of the last Poll().
-  std::vector<FollowedDrift> drift_;         // Of the valve at hand in Poll().
   std::unordered_set<std::size_t> refused_;  // Hashes of ids.
   // What is known of the episodes of valves without a slot.
   std::unordered_map<std::string, EpisodeTracker> recovered_;
@@ -234,10 +225,10 @@ class Pipeline {
   TimePoint last_poll_;
   TimePoint last_checkpoint_;
 
-  mutable std::mutex mutex_;  // Guards what follows.
-  std::shared_ptr<const ModelResolver> next_resolver_;
-  std::vector<std::string> names_;
-  ValveCensus census_;
+  mutable Mutex mutex_;
+  std::shared_ptr<const ModelResolver> next_resolver_ GUARDED_BY(mutex_);
+  std::vector<std::string> names_ GUARDED_BY(mutex_);
+  ValveCensus census_ GUARDED_BY(mutex_);
 };
 
 }  // namespace fdi::monitor

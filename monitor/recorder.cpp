@@ -117,7 +117,10 @@ void Recorder::Close() {
     Fail(error.what());
     CountDropped(std::exchange(pending_, 0));
   }
-  missing_more_ = false;
+  {
+    const MutexLock lock(missing_mutex_);
+    missing_more_ = false;
+  }
   ReportMissing();
 }
 
@@ -127,7 +130,7 @@ void Recorder::CountDropped(std::uint64_t samples) {
   }
   context_.counters.Add(Counter::kRecordDropped, samples);
   const std::int64_t now_ns = context_.utc_now_ns();
-  const std::lock_guard lock(missing_mutex_);
+  const MutexLock lock(missing_mutex_);
   if (!missing_) {
     missing_ = DataGap{"", now_ns, now_ns, "record_dropped"};
   }
@@ -141,7 +144,7 @@ void Recorder::CountDropped(std::uint64_t samples) {
 void Recorder::ReportMissing() {
   std::optional<DataGap> gap;
   {
-    const std::lock_guard lock(missing_mutex_);
+    const MutexLock lock(missing_mutex_);
     if (!std::exchange(missing_more_, false)) {
       gap = std::exchange(missing_, std::nullopt);
     }

@@ -4,10 +4,10 @@
 #include <chrono>
 #include <cstdint>
 #include <functional>
-#include <mutex>
 #include <optional>
 
 #include "base/bounded_queue.h"
+#include "base/mutex.h"
 #include "base/worker.h"
 #include "monitor/counters.h"
 #include "monitor/heartbeat.h"
@@ -95,9 +95,11 @@ class Recorder : public ValveListener {
   std::chrono::steady_clock::time_point last_commit_;
   BoundedQueue<ReceivedSample> queue_;
 
-  std::mutex missing_mutex_;        // Guards what follows.
-  std::optional<DataGap> missing_;  // Not yet reported.
-  bool missing_more_{false};        // Dropped since the last commit.
+  Mutex missing_mutex_;
+  std::optional<DataGap> missing_
+      GUARDED_BY(missing_mutex_);  // Not yet reported.
+  bool missing_more_ GUARDED_BY(missing_mutex_){
+      false};  // Dropped since the last commit.
 
   Worker worker_;
 };

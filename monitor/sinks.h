@@ -3,13 +3,11 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
-#include <span>
 #include <stdexcept>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "diagnosis/followed_drift.h"
 #include "diagnosis/model_set.h"
 #include "diagnosis/records/episode_look.h"
 #include "diagnosis/records/fault_event.h"
@@ -190,10 +188,6 @@ class ValveListener {
   /// The valve fell silent (kStale, kEnded), until its next sample.
   virtual void OnSilence(const std::string& /*valve_id*/, Silence /*silence*/) {
   }
-  /// How far the limits of the valve have followed its drift, by channel of its
-  /// model set; several times a second.
-  virtual void OnDrift(const std::string& /*valve_id*/,
-                       std::span<const FollowedDrift> /*drift*/) {}
   /// The valve was evicted. Adds to `last` what is still to be stored of it.
   virtual void OnRemoved(const std::string& /*valve_id*/,
                          Checkpoint& /*last*/) {}

@@ -24,7 +24,7 @@ std::string LogLine(LogId id, std::string_view event, std::string_view fields) {
 
 bool LogLimit::Admit(std::string_view kind, std::uint64_t& not_shown) {
   const auto now = std::chrono::steady_clock::now();
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   auto place = windows_.find(kind);
   if (place == windows_.end()) {
     place = windows_.emplace(std::string(kind), Window{}).first;

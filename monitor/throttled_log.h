@@ -4,12 +4,12 @@
 #include <cstdint>
 #include <functional>
 #include <map>
-#include <mutex>
 #include <string>
 #include <string_view>
 #include <utility>
 
 #include "base/log.h"
+#include "base/mutex.h"
 
 namespace fdi::monitor {
 
@@ -33,7 +33,6 @@ enum class LogId : std::uint8_t {
   kShadow = 115,         ///< shadow_not_compared
   kMissingSignal = 116,  ///< sample_rejected reason=missing_signal
   kOverShare = 117,      ///< sample_rejected reason=over_share
-  kDriftAtBound = 118,   ///< drift_at_bound
   kPartlyJudged = 119,   ///< valve_partly_judged
   kUnsent = 121,         ///< publication_failed
   kUnpersisted = 122,    ///< event_unpersisted
@@ -79,8 +78,8 @@ class LogLimit {
   };
 
   LogLimitOptions options_;
-  std::mutex mutex_;
-  std::map<std::string, Window, std::less<>> windows_;
+  Mutex mutex_;
+  std::map<std::string, Window, std::less<>> windows_ GUARDED_BY(mutex_);
 };
 
 /// Writes lines with the ids above; of each id the first immediately and then

@@ -34,12 +34,22 @@ ValveMonitor::ValveMonitor(const std::string& id,
       looks_(looks),
       severities_(std::move(severities)),
       tracker_(id, options),
-      audits_(audits),
       judge_(id_, audits, severities_) {
   if (parts) {
     engine_.emplace(*parts);
   }
   NameEpisodes();
+}
+
+void ValveMonitor::Recover(const OpenEpisode& episode) {
+  tracker_.Recover(episode);
+  normal_by_audit_ = episode.layer == Layer::kAudit;
+}
+
+void ValveMonitor::Recover(EpisodeTracker tracker) {
+  tracker_ = std::move(tracker);
+  const OpenEpisode* const open = tracker_.recovering();
+  normal_by_audit_ = open != nullptr && open->layer == Layer::kAudit;
 }
 
 void ValveMonitor::NameEpisodes() {
@@ -55,7 +65,7 @@ void ValveMonitor::NameEpisodes() {
 // The name by the word of the leader is one more input of the name.
 void ValveMonitor::StandBy(bool standby, EpisodeOutlet& outlet) {
   const std::optional<FaultSet> announced = tracker_.StandBy(standby, outlet);
-  if (announced && names_) {
+  if (announced && names_ && !judge_.watch().episode_open()) {
     names_->SetAnnounced(*announced);
   }
 }
@@ -138,9 +148,12 @@ ValveOutcome ValveMonitor::Step(const Sample& sample, std::uint64_t writer,
   if (verdict.intake != Intake::kSuperseded) {
     writer_ = writer;
   }
+  StepAudit(sample, verdict, outlet);
   // First the tracker, which opens the episode that looks and strengths belong
-  // to.
-  tracker_.Step(sample, verdict, models_, outlet);
+  // to. The evidence of an episode of the audit is the loop.
+  if (!judge_.watch().episode_open() || !tracker_.tracing()) {
+    tracker_.Step(sample, verdict, models_, outlet);
+  }
   tracker_.Take(names_->TakeLook(), outlet);
   tracker_.Take(names_->TakeStrengths(), outlet);
   ConfirmNormal(verdict, outlet);
@@ -166,19 +179,42 @@ ValveOutcome ValveMonitor::StepLoop(const Sample& sample, std::uint64_t writer,
   if (models_) {
     tracker_.Advance(sample, verdict, *models_, outlet);
   }
+  TellOfLoop(sample, outlet);
+  return {verdict, models_.get(), swapped, isolation_held_, 0, period_s()};
+}
+
+// The loop of a valve with a model set is followed while the observers find
+// nothing: their finding says more, and a window with it would be a second
+// alarm of the same thing. After their episode a window begins anew.
+void ValveMonitor::StepAudit(const Sample& sample, const Verdict& verdict,
+                             EpisodeOutlet& outlet) {
+  if (verdict.detected) {
+    CloseAudit(EndReason::kSuperseded, outlet);
+  } else if (judge_.beside_models() && CountsAsTime(verdict)) {
+    judge_.Step(sample, period_s());
+    TellOfLoop(sample, outlet);
+  }
+}
+
+void ValveMonitor::TellOfLoop(const Sample& sample, EpisodeOutlet& outlet) {
+  const LoopWatch& watch = judge_.watch();
+  const Verdict& verdict = watch.verdict();
   // The evidence of an episode is the window; then a point now and again. At
   // all samples it would take more memory than everything else of a loop.
   const std::span<const Transition> told = verdict.Transitions();
   if (!told.empty() && told.front().kind == TransitionKind::kDetected) {
-    tracker_.Remember(watch.Points(), *models_);
+    std::vector<Sample> before = watch.Points();
+    before.pop_back();  // This sample.
+    tracker_.Remember(before, *watch.models());
   }
-  if (!told.empty() || (watch.episode_open() && watch.at_point())) {
-    tracker_.Step(LoopWatch::Reduced(sample), verdict, models_, outlet);
+  if (!told.empty() ||
+      (watch.episode_open() && watch.at_point() && tracker_.tracing())) {
+    tracker_.Step(LoopWatch::Reduced(sample), verdict, watch.models(), outlet);
   }
   if (watch.found_normal() && tracker_.recovering() == nullptr) {
+    normal_by_audit_ = false;
     outlet.OnNormal(id_, verdict.stamp_ns);
   }
-  return {verdict, models_.get(), swapped, isolation_held_, 0, period_s()};
 }
 
 // The shorter one of the last two intervals: a gap is no period.
@@ -195,9 +231,12 @@ void ValveMonitor::MeasurePeriod(std::int64_t stamp_ns) {
 
 // An alarm whose data ended stays until the valve is seen to be normal: for as
 // many samples as end an episode, once after each start or end of the stream.
+// What the audit found, the audit alone finds normal.
 void ValveMonitor::ConfirmNormal(const Verdict& verdict,
                                  EpisodeOutlet& outlet) {
-  if (verdict.detected || tracker_.recovering() != nullptr) {
+  if (verdict.detected || tracker_.recovering() != nullptr ||
+      (normal_by_audit_ && judge_.beside_models()) ||
+      judge_.watch().episode_open()) {
     normal_samples_ = 0;
   } else if (verdict.intake == Intake::kAccepted &&
              verdict.quality == Quality::kLive &&
@@ -226,13 +265,6 @@ void ValveMonitor::TakeCheckpoint(Checkpoint& checkpoint) {
   if (engine_ && seen_ && !stale_ && !ended_) {
     checkpoint.accumulators.push_back(
         {id_, source_id_, models_->content_hash, stamp_ns_, engine_->Save()});
-  }
-}
-
-void ValveMonitor::ReadDrift(std::vector<FollowedDrift>& drift) const {
-  drift.clear();
-  for (std::size_t c = 0; models_ && c < models_->channels.size(); ++c) {
-    drift.push_back(engine_->followed_drift(c));
   }
 }
 
@@ -267,17 +299,20 @@ bool ValveMonitor::Adopt(const std::optional<EngineParts>& parts,
       End(*closed, outlet);
     }
   } else if (parts) {
-    Close(EndReason::kModelChanged, outlet);
+    if (!judge_.beside_models()) {  // Else what the audit has found goes on.
+      CloseAudit(EndReason::kModelChanged, outlet);
+    }
     engine_.emplace(*parts);
     engine_->HoldIsolation(isolation_held_);
   } else {
-    Close(EndReason::kModelChanged, outlet);
+    if (const auto closed = engine_->EndEpisode(EndReason::kModelChanged)) {
+      End(*closed, outlet);
+    }
     engine_.reset();
     // The period is measured anew, beginning with that of the old set.
     unassigned_period_ns_ = std::llround(models_->sample_period_s * 1e9);
     unassigned_interval_ns_.reset();
     stamp_ns_ = 0;
-    judge_ = LoopJudge(id_, audits_, severities_);
   }
   // The old set has to last until here: the end of the episode is recorded with
   // it. answer_ may point into names_, which is replaced.
@@ -337,12 +372,20 @@ void ValveMonitor::ExpireRecovery(std::int64_t now_ns, EpisodeOutlet& outlet) {
 
 void ValveMonitor::Close(EndReason reason, EpisodeOutlet& outlet) {
   normal_samples_ = 0;
+  CloseAudit(reason, outlet);
   const std::optional<Transition> closed =
-      engine_ ? engine_->EndEpisode(reason) : judge_.End(reason);
+      engine_ ? engine_->EndEpisode(reason) : std::nullopt;
   // It may be the verdict of names_, which still shows the episode.
   answer_ = nullptr;
   if (closed) {
     End(*closed, outlet);
+  }
+}
+
+void ValveMonitor::CloseAudit(EndReason reason, EpisodeOutlet& outlet) {
+  if (const std::optional<Transition> closed = judge_.End(reason)) {
+    normal_by_audit_ = reason != EndReason::kSuperseded;
+    tracker_.End(*closed, judge_.watch().models(), outlet);
   }
 }
 

@@ -8,7 +8,6 @@
 #include <utility>
 #include <vector>
 
-#include "diagnosis/followed_drift.h"
 #include "diagnosis/valve_engine.h"
 #include "monitor/checkpoint.h"
 #include "monitor/episode_tracker.h"
@@ -21,6 +20,9 @@ namespace fdi::monitor {
 /// One valve of the plant: its engine, its episodes and their names, its clock.
 /// A valve without a model set is judged by the audit of its loop (LoopJudge),
 /// with the set of AuditModels(); until it is, its quality is UNASSIGNED.
+/// Of a valve with one the audit tells, if it is to (AuditWorker), while the
+/// engine finds nothing: its verdicts are those of the engine, its episodes
+/// those of either.
 ///
 /// One thread at a time.
 class ValveMonitor {
@@ -31,7 +33,7 @@ class ValveMonitor {
   /// @param looks performs second looks if the model set has physics, and
   ///   outlives this; null: none.
   /// @param severities by which episodes get their priority.
-  /// @param audits of the loop without a model set; outlives this; null: none.
+  /// @param audits of the loop; outlives this; null: none.
   ValveMonitor(const std::string& id, const std::optional<EngineParts>& parts,
                const TraceOptions& options, LookWorker* looks = nullptr,
                std::shared_ptr<const SeverityCatalogue> severities =
@@ -39,9 +41,9 @@ class ValveMonitor {
                AuditWorker* audits = nullptr);
 
   /// Call before the first Step().
-  void Recover(const OpenEpisode& episode) { tracker_.Recover(episode); }
+  void Recover(const OpenEpisode& episode);
   /// The same. @param tracker knows earlier episodes of the valve.
-  void Recover(EpisodeTracker tracker) { tracker_ = std::move(tracker); }
+  void Recover(EpisodeTracker tracker);
 
   /// See EpisodeTracker.
   void StandBy(bool standby, EpisodeOutlet& outlet);
@@ -114,12 +116,11 @@ class ValveMonitor {
   bool stale() const { return stale_; }
   bool ended() const { return ended_; }
   bool episode_open() const {
-    return engine_ ? engine_->episode_open() : judge_.watch().episode_open();
+    return (engine_ && engine_->episode_open()) ||
+           judge_.watch().episode_open();
   }
   /// An episode of an earlier session or another monitor may go on here.
   bool recovering() const { return tracker_.recovering() != nullptr; }
-  /// How far its limits have followed a drift, by channel of models().
-  void ReadDrift(std::vector<FollowedDrift>& drift) const;
   std::size_t trace_bytes() const { return tracker_.trace_bytes(); }
 
  private:
@@ -127,10 +128,14 @@ class ValveMonitor {
 
   ValveOutcome StepLoop(const Sample& sample, std::uint64_t writer,
                         bool swapped, EpisodeOutlet& outlet);
+  void StepAudit(const Sample& sample, const Verdict& verdict,
+                 EpisodeOutlet& outlet);
+  void TellOfLoop(const Sample& sample, EpisodeOutlet& outlet);
   bool RestartsEngine(const Sample& sample) const;
   void RecordPosition(const Sample& sample);
   void MeasurePeriod(std::int64_t stamp_ns);
   void Close(EndReason reason, EpisodeOutlet& outlet);
+  void CloseAudit(EndReason reason, EpisodeOutlet& outlet);
   void End(const Transition& closed, EpisodeOutlet& outlet);
   void NameEpisodes();
   void ConfirmNormal(const Verdict& verdict, EpisodeOutlet& outlet);
@@ -146,8 +151,7 @@ class ValveMonitor {
   std::unique_ptr<EpisodeNames> names_;  // Null: no model set.
   const Verdict* answer_{nullptr};       // On the last sample.
   EpisodeTracker tracker_;
-  AuditWorker* audits_;
-  LoopJudge judge_;  // While there is no engine.
+  LoopJudge judge_;
   CoverageBook coverage_;
   std::optional<Accumulator> saved_;
   std::uint64_t source_id_{0};
@@ -156,6 +160,7 @@ class ValveMonitor {
   // Normal samples since nothing was open here, up to what a valve needs to be
   // normal again.
   int normal_samples_{0};
+  bool normal_by_audit_{false};  // Its last episode is not confirmed yet.
   // Without a model set: the period of the samples, and the last interval.
   std::int64_t unassigned_period_ns_{1'000'000'000};
   std::optional<std::int64_t> unassigned_interval_ns_;

@@ -19,6 +19,7 @@
 #include "storage/history/certainty.h"
 #include "storage/history/history_reader.h"
 #include "storage/models/models.h"
+#include "storage/models/plant_loops.h"
 
 namespace fdi::planner {
 namespace {
@@ -34,39 +35,35 @@ constexpr double kLikelyAudit = 0.5;
 // A loop that was judged for a smaller share of the time is listed as such.
 constexpr double kMostlyJudged = 0.5;
 
-// What an audit's verdict means for the plant, in words of docs/loops.md.
-struct VerdictWords {
-  std::string_view verdict;
-  Severity severity;
-  const char* name;
-  const char* who;
-  const char* check;
-};
-constexpr std::array<VerdictWords, 7> kVerdicts{{
-    {"no_response", Severity::kHigh, "PV does not answer OP", "instrument",
-     "Stroke the valve in manual. If nothing moves it is stuck, shut or "
-     "isolated; if it moves, the transmitter is dead."},
-    {"stiction", Severity::kMedium, "Valve sticks", "mechanical",
-     "Step OP by a little in manual, both ways. Then look at packing, "
-     "positioner and linkage."},
-    {"frozen", Severity::kMedium, "Reading of PV repeats itself", "instrument",
-     "Check the transmitter, its channel and the historian."},
-    {"saturated", Severity::kLow, "OP at an end of its range", "process",
-     "Compare the size of the valve with the operating point."},
-    {"tuning", Severity::kLow, "Controller makes the loop oscillate", "control",
-     "Tune the controller."},
-    {"external", Severity::kLow, "Oscillation comes from outside the loop",
-     "process",
-     "Find the loop with the same period that is sticky or badly tuned."},
-    {"quantised", Severity::kLow, "PV has too few values", "instrument",
-     "Check the range of the transmitter and the compression of the "
-     "historian."},
-}};
+// The finding of the fault catalogue that a verdict of the audit is, by its
+// name; empty: nothing to do.
+std::string FindingOf(const std::string& verdict) {
+  constexpr std::array<std::pair<std::string_view, const char*>, 6> kFindings{{
+      {"no_response", "no_response"},
+      {"stiction", "stiction"},
+      {"frozen", "reading_frozen"},
+      {"saturated", "output_saturated"},
+      {"tuning", "oscillation_tuning"},
+      {"external", "oscillation_external"},
+  }};
+  for (const auto& [name, finding] : kFindings) {
+    if (verdict == name) {
+      return finding;
+    }
+  }
+  return "";
+}
 
-const VerdictWords* WordsOf(const std::string& verdict) {
-  const auto found =
-      std::ranges::find(kVerdicts, verdict, &VerdictWords::verdict);
-  return found == kVerdicts.end() ? nullptr : &*found;
+// The catalogue has no finding for it: it is a matter of the historian.
+constexpr const char* kQuantised = "quantised";
+report::FaultWords QuantisedWords() {
+  report::FaultWords words;
+  words.name = "PV has too few values";
+  words.check =
+      "Check the range of the transmitter and the compression of the "
+      "historian.";
+  words.discipline = "instrument";
+  return words;
 }
 
 // Why a valve was not judged, by QualityName().
@@ -293,21 +290,24 @@ void Fleet::FindAudits() {
   std::map<std::string, Finding> by_loop;
   for (const FleetAudit& audit : query_.audits) {
     Know(audit.loop);
-    const VerdictWords* words = WordsOf(audit.verdict);
-    if (words == nullptr) {
+    const std::string name = FindingOf(audit.verdict);
+    if (name.empty() && audit.verdict != kQuantised) {
       continue;
     }
+    const report::FaultWords words =
+        name.empty() ? QuantisedWords()
+                     : texts_.Words(name, audit.band_pct.value_or(0.0) / 100.0);
     Finding finding;
     finding.valves = {audit.loop};
     finding.found_by = "audit";
     finding.fault = audit.verdict;
-    finding.name = words->name;
-    finding.severity = words->severity;
+    finding.name = words.name;
+    finding.severity = words.severity;
     finding.grade = GradeOf(audit.loop);
     finding.certainty = audit.sure ? "sure" : "likely";
     finding.confidence = audit.sure ? kSureAudit : kLikelyAudit;
-    finding.who = words->who;
-    finding.check = words->check;
+    finding.who = words.discipline;
+    finding.check = words.check;
     finding.why = audit.reason;
     if (audit.band_pct) {
       finding.why +=
@@ -495,6 +495,9 @@ Json Fleet::ShelvedJson() const {
     return list;
   }
   for (const storage::Shelf& shelf : history_->Shelves(query_.now_ns)) {
+    if (!IsActive(shelf, query_.now_ns)) {
+      continue;
+    }
     list.push_back({{"valve_id", shelf.valve_id},
                     {"fault", OrNull(shelf.fault)},
                     {"until_utc", FormatTime(shelf.until_ns, true)},
@@ -619,10 +622,14 @@ Json ChangesJson(const Json& last, const std::string& file, const Json& now) {
                         {"now", OrNull(SaidText(after[valve]))}});
       }
     }
-    return {{"last_utc", last.at("made_utc")},
+    Json coverage;
+    for (const char* key : {"loops", "named_faults", "audit", "nothing"}) {
+      coverage[key] = last.at("coverage").at(key).get<std::size_t>();
+    }
+    return {{"last_utc", last.at("made_utc").get<std::string>()},
             {"file", file},
             {"loops", list},
-            {"coverage", last.at("coverage")}};
+            {"coverage", coverage}};
   } catch (const Json::exception& error) {
     throw DataError(file + " is no report of this program (" + error.what() +
                     "); move it away, or name another --output");
@@ -883,19 +890,14 @@ std::vector<FleetLoop> LoopsOf(const std::filesystem::path& models) {
     return loops;
   }
   storage::ModelStore store(models);
-  // Since version 4 of the schema.
-  storage::Database& database = store.database();
-  if (database.QueryInt64("SELECT count(*) FROM sqlite_master WHERE type = "
-                          "'table' AND name = 'plant_loop'") == 1) {
-    storage::Statement rows = database.Prepare(
-        "SELECT name, grade, finding FROM plant_loop ORDER BY name");
-    while (rows.Step()) {
-      FleetLoop& loop = loops.emplace_back();
-      std::optional<std::int64_t> grade;
-      rows.Read(0, loop.valve_id, grade, loop.finding);
-      if (grade) {
-        loop.grade = static_cast<int>(*grade);
-      }
+  for (const storage::PlantLoop& row : store.Loops()) {
+    FleetLoop& loop = loops.emplace_back();
+    loop.valve_id = row.name;
+    loop.grade = row.grade;
+    // Of other rows the finding is a verdict, or how the set was made.
+    if (row.state == storage::LoopState::kRefused ||
+        row.finding.starts_with("not judged")) {
+      loop.finding = row.finding;
     }
   }
   for (const storage::ValveEntry& entry : store.Valves()) {

@@ -8,13 +8,15 @@
 #include <utility>
 
 #include "base/error.h"
+#include "base/text.h"
 #include "base/time_units.h"
 #include "diagnosis/fault_catalogue.h"
 
 namespace fdi::planner {
 namespace {
 
-constexpr double kMinLiveHours = 1.0;  // A day needs this many.
+constexpr double kMinLiveHours = 1.0;                // A day needs this many.
+constexpr std::int64_t kMinLiveMs = kMsPerHour / 4;  // An hour needs this.
 // Below this share of LIVE time, days are missing because the valve runs
 // outside the trained region and not because it has not been followed for long
 // enough.
@@ -113,8 +115,10 @@ class Cells {
 // With r = y − ŷ, the sums give Σŷ = Σy − Σr. A deviation is the ratio of sums
 // 100 Σr / Σŷ, in which the quantum cancels. It is not a mean of ratios, which
 // samples with a small ŷ would dominate.
+//
+// @param at Day or hour, as the cells are counted.
 void AddResiduals(const HealthHour& hour, const HealthLimit& limit,
-                  Cells& cells) {
+                  std::int64_t at, Cells& cells) {
   for (std::size_t b = 0; b < hour.bins.size(); ++b) {
     for (std::size_t c = 0; c < hour.bins[b].size(); ++c) {
       const ResidualSums& sums = hour.bins[b][c];
@@ -126,9 +130,9 @@ void AddResiduals(const HealthHour& hour, const HealthLimit& limit,
       const double quantum = hour.channels[c].quantum();
       const double expected = static_cast<double>(sums.output) - r;
       if (limit.kind == Kind::kDeviation) {
-        cells.Add(DayOf(hour), static_cast<int>(b), 100.0 * r, expected, n);
+        cells.Add(at, static_cast<int>(b), 100.0 * r, expected, n);
       } else {
-        cells.Add(DayOf(hour), static_cast<int>(b), r * quantum, n, n);
+        cells.Add(at, static_cast<int>(b), r * quantum, n, n);
       }
     }
   }
@@ -268,7 +272,7 @@ HealthSeries SeriesOf(std::span<const HealthHour> all,
     if (limit.kind == Kind::kStrength) {
       AddStrengths(hour, limit.fault, cells);
     } else if (!limit.cumulative()) {
-      AddResiduals(hour, limit, cells);
+      AddResiduals(hour, limit, DayOf(hour), cells);
     }
   }
   if (limit.cumulative()) {
@@ -281,6 +285,34 @@ HealthSeries SeriesOf(std::span<const HealthHour> all,
   });
   series.days = Adjusted(usable);
   return series;
+}
+
+HourlyResiduals HourlyResidualsOf(std::span<const HealthHour> all,
+                                  Signal signal) {
+  const HealthLimit limit{Kind::kResidual, signal, 0, 0.0};
+  Cells cells;
+  double scatter = 0.0;
+  double samples = 0.0;
+  for (const HealthHour& hour : Comparable(all, false)) {
+    if (hour.live_ms < kMinLiveMs) {
+      continue;
+    }
+    AddResiduals(hour, limit, hour.hour, cells);
+    for (const std::vector<ResidualSums>& bin : hour.bins) {
+      for (std::size_t c = 0; c < bin.size(); ++c) {
+        if (hour.channels[c].output == signal && bin[c].samples > 0) {
+          const auto n = static_cast<double>(bin[c].samples);
+          const auto r = static_cast<double>(bin[c].residual);
+          const double quantum = hour.channels[c].quantum();
+          scatter += quantum * quantum *
+                     (static_cast<double>(bin[c].square) - r * r / n);
+          samples += n;
+        }
+      }
+    }
+  }
+  return {Adjusted(cells.Usable()),
+          samples > 0.0 ? std::sqrt(std::max(0.0, scatter / samples)) : 0.0};
 }
 
 HealthForecast Forecast(const HealthSeries& series, const HealthLimit& limit) {
@@ -346,10 +378,8 @@ HealthLimit ParseHealthLimit(std::string_view text) {
   const bool percent = number.ends_with('%');
   number.remove_suffix(percent ? 1 : 0);
   HealthLimit limit;
-  const auto [end, error] = std::from_chars(
-      number.data(), number.data() + number.size(), limit.value);
-  if (error != std::errc{} || end != number.data() + number.size() ||
-      !std::isfinite(limit.value) || limit.value == 0.0) {
+  limit.value = ParseWhole<double>(number).value_or(0.0);
+  if (!std::isfinite(limit.value) || limit.value == 0.0) {
     Refuse(text, "'" + std::string(number) + "' is no number other than 0");
   }
   SetName(text, text.substr(0, sign), percent, limit);

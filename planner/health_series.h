@@ -58,6 +58,16 @@ struct HealthSeries {
 HealthSeries SeriesOf(std::span<const HealthHour> hours,
                       const HealthLimit& limit);
 
+/// The mean residuals of one signal hour by hour, likewise comparable.
+struct HourlyResiduals {
+  std::vector<DailyValue> hours;  ///< `day` counts hours since 1970-01-01.
+  double deviation{0.0};  ///< Of the single residual within hour and bin.
+};
+
+/// An hour needs a quarter of it LIVE.
+HourlyResiduals HourlyResidualsOf(std::span<const HealthHour> hours,
+                                  Signal signal);
+
 /// When a limit will be reached.
 struct HealthForecast {
   enum class Answer : std::uint8_t {

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "base/error.h"
+#include "base/text.h"
 #include "base/time_text.h"
 #include "base/time_units.h"
 #include "diagnosis/fault_catalogue.h"
@@ -99,6 +100,9 @@ std::vector<WeightedText> TextsOf(const ValveWork& work,
   }
   for (const LimitTrend& trend : work.trends) {
     texts.push_back({WeightOf(trend, options), TrendText(trend)});
+  }
+  for (const ChannelDrift& drift : work.drifts) {
+    texts.push_back({WeightOf(drift, options), DriftText(drift)});
   }
   return texts;
 }
@@ -213,6 +217,7 @@ void AddHealth(const std::vector<HealthHour>& hours, const WorkQuery& query,
   work.host = hours.back().host;
   work.monitor = hours.back().monitor;
   work.trends = TrendsOf(hours, query.limits);
+  work.drifts = DriftsOf(hours);
 }
 
 void RequireDiscipline(const std::string& discipline) {
@@ -286,6 +291,13 @@ std::string RowText(const WorkRow& row) {
   return text;
 }
 
+// U = 2^(−days/half life) since `end_ns`; an end ahead of now_ns counts as now.
+double Fading(std::int64_t end_ns, const WorkOptions& options) {
+  const double days =
+      std::max(0.0, static_cast<double>(options.now_ns - end_ns) / kNsPerDay);
+  return std::exp2(-days / options.half_life_days);
+}
+
 }  // namespace
 
 double SeverityPoints(Severity severity) {
@@ -298,19 +310,16 @@ double ConfidenceOf(const FaultReason& reason) {
 }
 
 double WeightOf(const FaultReason& reason, const WorkOptions& options) {
-  const double days =
-      reason.ended_ns
-          ? std::max(0.0,
-                     static_cast<double>(options.now_ns - *reason.ended_ns) /
-                         kNsPerDay)
-          : 0.0;
-  //     R = min(2, 1 + 0.1 (n − 1)),   U = 2^(−days/half life)
-  //
-  // An end ahead of now_ns counts as now.
+  //     R = min(2, 1 + 0.1 (n − 1))
   const double repetition = std::min(
       kMaxRepetition, 1.0 + kRepetition * std::max(0, reason.episodes - 1));
   return SeverityPoints(reason.words.severity) * ConfidenceOf(reason) *
-         std::exp2(-days / options.half_life_days) * repetition;
+         (reason.ended_ns ? Fading(*reason.ended_ns, options) : 1.0) *
+         repetition;
+}
+
+double WeightOf(const ChannelDrift& drift, const WorkOptions& options) {
+  return SeverityPoints(Severity::kLow) * Fading(drift.last_ns, options);
 }
 
 double WeightOf(const LimitTrend& reason, const WorkOptions& options) {
@@ -357,11 +366,7 @@ std::vector<WorkRow> RankWork(std::vector<ValveWork> valves,
 std::string ReasonText(const ValveWork& work, const WorkOptions& options) {
   std::vector<WeightedText> texts = TextsOf(work, options);
   std::ranges::stable_sort(texts, std::greater{}, &WeightedText::weight);
-  std::string why;
-  for (const auto& [weight, text] : texts) {
-    why += (why.empty() ? "" : "; ") + text;
-  }
-  return why;
+  return JoinText(texts, "; ", &WeightedText::text);
 }
 
 std::vector<WorkRow> ReadWorkList(storage::History& history,
@@ -374,9 +379,10 @@ std::vector<WorkRow> ReadWorkList(storage::History& history,
   const std::vector<Episode> episodes = EpisodesOf(history, query);
   // What is shelved has been put aside by somebody who knows of it.
   const auto shelves = history.Shelves(query.options.now_ns);
-  const auto shelved = [&shelves](const Episode& episode) {
-    return std::ranges::any_of(
-        shelves, [&](const auto& s) { return Covers(s, episode); });
+  const auto shelved = [&shelves, &query](const Episode& episode) {
+    return std::ranges::any_of(shelves, [&](const auto& s) {
+      return IsActive(s, query.options.now_ns) && Covers(s, episode);
+    });
   };
   for (const Episode& episode : episodes) {
     if (episode.label != "false" && !shelved(episode)) {
@@ -404,8 +410,9 @@ std::vector<WorkRow> ReadWorkList(storage::History& history,
         return reason.words.discipline.find(query.discipline) ==
                std::string::npos;
       });
-      // A limit belongs to no discipline.
+      // A limit or a drift belongs to no discipline.
       facts.trends.clear();
+      facts.drifts.clear();
     }
     work.push_back(std::move(facts));
   }

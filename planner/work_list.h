@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "planner/channel_drift.h"
 #include "planner/health_view.h"
 #include "report/fault_texts.h"
 #include "report/report.h"
@@ -37,6 +38,7 @@ struct ValveWork {
   std::string valve_id;
   std::vector<FaultReason> faults;
   std::vector<LimitTrend> trends;
+  std::vector<ChannelDrift> drifts{};
   /// Since the equipment was last replaced or repaired (its epoch).
   double travel_strokes{0.0};
   double service_hours{0.0};
@@ -71,8 +73,9 @@ struct WorkOptions {
 /// the fault, else peak factor times the trust earned by labels on this
 /// diagnosis. U urgency: 1 while the episode lasts or the limit is reached; it
 /// halves every half_life_days after the end; a limit in t days has 1 −
-/// t/horizon_days. R repetition: 1 + 0.1 per further episode, at most 2. The
-/// score of a valve is its largest weight plus a quarter of the others.
+/// t/horizon_days. R repetition: 1 + 0.1 per further episode, at most 2. A
+/// drift is low and halves like the end of an episode from its newest hour on.
+/// The score of a valve is its largest weight plus a quarter of the others.
 std::vector<WorkRow> RankWork(std::vector<ValveWork> valves,
                               const WorkOptions& options);
 
@@ -84,6 +87,7 @@ double ConfidenceOf(const FaultReason& reason);
 /// S · C · U · R
 double WeightOf(const FaultReason& reason, const WorkOptions& options);
 double WeightOf(const LimitTrend& trend, const WorkOptions& options);
+double WeightOf(const ChannelDrift& drift, const WorkOptions& options);
 
 /// The reasons in words, in order of decreasing weight.
 std::string ReasonText(const ValveWork& work, const WorkOptions& options);

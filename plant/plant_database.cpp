@@ -102,7 +102,8 @@ std::vector<std::byte> PlantRows::Bytes(int row, int column) const {
 }
 
 // ---- Waiting. libpq's own calls wait for as long as the server pleases: one
-// that is stopped still answers to TCP. So nothing here blocks but poll().
+// that is stopped still answers to TCP. So nothing here blocks but poll(), and
+// the look-up of a host's name, which has the limits of resolv.conf.
 
 struct PlantDatabase::Wait {
   const char* what;  // "an answer"

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cctype>
-#include <charconv>
 #include <cmath>
 #include <cstdlib>
 #include <functional>
@@ -15,6 +14,7 @@
 
 #include "base/printable.h"
 #include "base/stamps.h"
+#include "base/text.h"
 #include "base/time_units.h"
 #include "diagnosis/fault_catalogue.h"
 #include "diagnosis/records/valve_glob.h"
@@ -59,15 +59,12 @@ void Parse(const std::optional<std::string>& text, T& field) {
     }
     field = static_cast<T>(i);
   } else {
-    std::int64_t value = 0;  // Hashes use all bits, and the sign for the first.
-    if (text) {
-      const char* const end = text->data() + text->size();
-      const auto [stop, error] = std::from_chars(text->data(), end, value);
-      if (stop != end || error != std::errc{}) {
-        RefuseValue(*text, "no whole number of 64 bits");
-      }
+    // Hashes use all bits, and the sign for the first.
+    const auto value = ParseWhole<std::int64_t>(text.value_or("0"));
+    if (!value) {
+      RefuseValue(*text, "no whole number of 64 bits");
     }
-    field = static_cast<T>(value);
+    field = static_cast<T>(*value);
   }
 }
 template <typename T>
@@ -479,9 +476,9 @@ std::vector<Alarm> PlantReader::AlarmList(std::int64_t now_ns,
 }
 
 std::vector<Shelf> PlantReader::Shelves(
-    std::optional<std::int64_t> in_force_at_ns) {
-  const auto at = in_force_at_ns
-                      ? std::optional(std::to_string(*in_force_at_ns))
+    std::optional<std::int64_t> not_over_at_ns) {
+  const auto at = not_over_at_ns
+                      ? std::optional(std::to_string(*not_over_at_ns))
                       : std::nullopt;
   return Judged<Shelf>(
       "shelf",
@@ -522,23 +519,33 @@ std::vector<std::string> PlantReader::HealthValves(const std::string& glob) {
 
 std::vector<CommonCause> PlantReader::OpenCauses() {
   const PlantRows rows = plant_.Read(sql::plant_open_causes);
-  std::vector<CommonCause> causes;
-  std::string last;  // Monitor and cause.
-  for (int r = 0; r < rows.size(); ++r) {
-    const std::string cause_id = rows.Text(r, 1).value_or("");
-    const std::string key = rows.Text(r, 0).value_or("") + ' ' + cause_id;
-    if (std::exchange(last, key) != key) {
-      CommonCause& cause = causes.emplace_back();
-      cause.cause_id = cause_id;
-      cause.group = rows.Text(r, 2).value_or("");
-      cause.opened_ns = rows.Int64(r, 3);
-    }
-    CauseMember& member = causes.back().members.emplace_back();
+  struct Row {
+    std::string monitor;
+    CommonCause cause;  // Of one member.
+  };
+  const auto read = [&rows](int r) {
+    Row row;
+    row.monitor = rows.Text(r, 0).value_or("");
+    row.cause.cause_id = rows.Text(r, 1).value_or("");
+    row.cause.group = rows.Text(r, 2).value_or("");
+    ParseColumn("opened_ns", rows.Text(r, 3), row.cause.opened_ns);
+    CauseMember& member = row.cause.members.emplace_back();
     member.episode_id = rows.Text(r, 4).value_or("");
     member.valve_id = rows.Text(r, 5).value_or("");
     member.fault = rows.Text(r, 6).value_or("");
-    member.isolated_ns = rows.Int64(r, 7);
-    Parse(rows.Text(r, 8), member.ended_ns);
+    ParseColumn("isolated_ns", rows.Text(r, 7), member.isolated_ns);
+    ParseColumn("ended_ns", rows.Text(r, 8), member.ended_ns);
+    return row;
+  };
+  std::vector<CommonCause> causes;
+  std::string last;  // Monitor and cause.
+  for (Row& row : Judged<Row>("common cause", rows, read)) {
+    const std::string key = row.monitor + ' ' + row.cause.cause_id;
+    if (std::exchange(last, key) == key) {
+      causes.back().members.push_back(std::move(row.cause.members.front()));
+    } else {
+      causes.push_back(std::move(row.cause));
+    }
   }
   return causes;
 }

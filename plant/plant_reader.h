@@ -44,7 +44,7 @@ class PlantReader : public ForeignHistory {
   AlarmStatistics AlarmFigures(const EpisodeFilter& filter,
                                std::int64_t now_ns) override;
   std::vector<Shelf> Shelves(
-      std::optional<std::int64_t> in_force_at_ns) override;
+      std::optional<std::int64_t> not_over_at_ns) override;
   std::vector<HealthHour> Health(const HealthFilter& filter) override;
   std::vector<std::string> HealthValves(const std::string& glob) override;
   std::vector<CommonCause> OpenCauses() override;

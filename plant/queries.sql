@@ -114,7 +114,7 @@ FROM batch c CROSS JOIN data_gap g ON g.gap_id = c.part
 WHERE c.item = 'gap'
 -- name: shelf
 SELECT s.shelf_id, s.valve_id, s.from_ns, s.fault, s.until_ns, s.who,
-  s.comment, s.origin, s.ended_ns, s.ended_by, s.ended_origin
+  s.comment, s.origin, s.ended_ns, s.ended_by, s.ended_origin, s.planned_ns
 FROM batch c CROSS JOIN shelf s ON s.shelf_id = c.part
 WHERE c.item = 'shelf'
 -- name: monitor_session
@@ -187,10 +187,16 @@ SELECT c.relname, string_agg(
 FROM pg_constraint k JOIN pg_class c ON c.oid = k.conrelid
 WHERE k.contype = 'c' AND k.connamespace = 'fdi'::regnamespace
 GROUP BY c.relname
--- What is open in a plant, of which a restored history may know nothing.
+-- What is open or not acknowledged in a plant, of which a restored history may know nothing.
 -- name: open_episodes
 SELECT episode_id FROM fdi.episode
-WHERE monitor_id = $1 AND end_reason IS NULL
+WHERE monitor_id = $1 AND (end_reason IS NULL OR acked_by IS NULL)
+-- name: open_causes
+SELECT cause_id FROM fdi.common_cause
+WHERE monitor_id = $1 AND ended_ns IS NULL
+-- name: end_lost_cause
+UPDATE fdi.common_cause SET ended_ns = greatest($2, opened_ns)
+WHERE monitor_id = $1 AND cause_id = $3
 -- name: open_shelves
 SELECT shelf_id, valve_id, from_ns FROM fdi.shelf
 WHERE monitor_id = $1 AND ended_ns IS NULL AND until_ns > $2
@@ -199,9 +205,12 @@ UPDATE fdi.shelf SET ended_ns = greatest($2, from_ns),
   ended_by = 'fdi-store ship', ended_origin = 'history.db was restored'
 WHERE monitor_id = $1 AND shelf_id = $3 AND valve_id = $4 AND from_ns = $5
 -- name: end_lost_episode
-UPDATE fdi.episode SET ended_ns = greatest($2, detected_ns),
-  end_reason = 'unknown', fault = coalesce(fault, 'unknown'),
-  unconfirmed_ns = NULL
+UPDATE fdi.episode SET
+  ended_ns = coalesce(ended_ns, greatest($2, detected_ns)),
+  end_reason = coalesce(end_reason, 'unknown'),
+  fault = coalesce(fault, 'unknown'), unconfirmed_ns = NULL,
+  acked_ns = coalesce(acked_ns, $2),
+  acked_by = coalesce(acked_by, 'fdi-store ship')
 WHERE monitor_id = $1 AND episode_id = $3
 -- name: lock_monitor
 SELECT shipped_ns FROM fdi.monitor WHERE monitor_id = $1 FOR UPDATE
@@ -222,23 +231,28 @@ WHERE ended_ns IS NULL OR acked_by IS NULL OR label IS NOT NULL
   OR unconfirmed_ns IS NOT NULL
 -- name: newest_in_plant
 SELECT coalesce(max(alive_ns), 0) FROM fdi.monitor_session
--- What arrived later than $1 is not old, whatever its publisher's clock said.
+-- What arrived later than $1 is not old, whatever its publisher's clock said;
+-- what is stamped two days after it arrived is as old as its arrival.
 -- name: old_in_plant
 SELECT count(*), min(detected_ns), max(detected_ns) FROM fdi.episode e
-WHERE ended_ns < $1 AND acked_by IS NOT NULL AND label IS NULL
-  AND unconfirmed_ns IS NULL AND NOT EXISTS (
-    SELECT FROM fdi.episode_event v
-    WHERE (v.episode_id, v.monitor_id) = (e.episode_id, e.monitor_id)
-      AND v.recorded_ns >= $1)
+WHERE ended_ns IS NOT NULL AND acked_by IS NOT NULL AND label IS NULL
+  AND unconfirmed_ns IS NULL AND (
+    SELECT CASE WHEN e.ended_ns > max(v.recorded_ns) + 172800000000000::numeric
+      THEN max(v.recorded_ns) ELSE greatest(e.ended_ns, max(v.recorded_ns)) END
+    FROM fdi.episode_event v
+    WHERE (v.episode_id, v.monitor_id) = (e.episode_id, e.monitor_id)) < $1
 -- name: prune_plant
 WITH gone AS (
   DELETE FROM fdi.episode WHERE (episode_id, monitor_id) IN (
     SELECT episode_id, monitor_id FROM fdi.episode e
-    WHERE ended_ns < $1 AND acked_by IS NOT NULL AND label IS NULL
-      AND unconfirmed_ns IS NULL AND fdi.utc(detected_ns) <= fdi.utc($1)
-      AND NOT EXISTS (SELECT FROM fdi.episode_event v
-        WHERE (v.episode_id, v.monitor_id) = (e.episode_id, e.monitor_id)
-          AND v.recorded_ns >= $1)
+    WHERE ended_ns IS NOT NULL AND acked_by IS NOT NULL AND label IS NULL
+      AND unconfirmed_ns IS NULL AND (
+        SELECT CASE
+          WHEN e.ended_ns > max(v.recorded_ns) + 172800000000000::numeric
+          THEN max(v.recorded_ns)
+          ELSE greatest(e.ended_ns, max(v.recorded_ns)) END
+        FROM fdi.episode_event v
+        WHERE (v.episode_id, v.monitor_id) = (e.episode_id, e.monitor_id)) < $1
     ORDER BY fdi.utc(detected_ns) LIMIT 5000)
   RETURNING episode_id AS e, monitor_id AS m),
 f AS (DELETE FROM fdi.episode_fault USING gone
@@ -383,7 +397,8 @@ WHERE c.ended_ns IS NULL
 ORDER BY c.opened_ns, c.monitor_id, c.cause_id, m.isolated_ns, m.valve_id
 -- The last hour of each valve since hour $1.
 -- name: plant_seen
-SELECT valve_id, max(hour) FROM health_hour WHERE hour >= $1 GROUP BY valve_id
+SELECT valve_id, max(hour) FROM health_hour
+WHERE hour BETWEEN $1 AND 1577855 GROUP BY valve_id
 -- Skips from valve to valve along the key.
 -- name: plant_health_valves
 WITH RECURSIVE valve(id) AS (

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "base/printable.h"
+#include "base/text.h"
 #include "plant/sql.h"
 #include "storage/history/history_database.h"
 #include "storage/models/models.h"
@@ -113,11 +114,7 @@ void PutRow(const Statement& row, std::string& out) {
 // "a, b, c", each with `prefix`.
 std::string Listed(const std::vector<std::string>& names,
                    const std::string& prefix = "") {
-  std::string list;
-  for (const std::string& name : names) {
-    list += (list.empty() ? "" : ", ") + prefix + name;
-  }
-  return list;
+  return JoinText(names, ", ", [&](const auto& name) { return prefix + name; });
 }
 
 }  // namespace
@@ -366,7 +363,7 @@ bool Shipper::ShipBatch(Shipped& shipped) {
 
 // The plant has got more than this history knows of: it was restored from a
 // backup, or only the note here is missing. What is open there and not here
-// nobody would ever end.
+// nobody would ever end or acknowledge.
 void Shipper::EndLost() {
   const std::string now = std::to_string(UtcNow());
   const PlantRows episodes = plant_.Run(sql::open_episodes, {monitor_id_});
@@ -378,6 +375,16 @@ void Shipper::EndLost() {
       plant_.Run(sql::end_lost_episode, {monitor_id_, now, id});
     }
     episode.Reset();
+  }
+  const PlantRows causes = plant_.Run(sql::open_causes, {monitor_id_});
+  Statement cause =
+      history_.Prepare("SELECT 1 FROM common_cause WHERE cause_id = ?");
+  for (int r = 0; r < causes.size(); ++r) {
+    const std::string id = causes.Text(r, 0).value_or("");
+    if (!cause.Bind(id).Step()) {
+      plant_.Run(sql::end_lost_cause, {monitor_id_, now, id});
+    }
+    cause.Reset();
   }
   const PlantRows shelves = plant_.Run(sql::open_shelves, {monitor_id_, now});
   Statement shelf = history_.Prepare(

@@ -83,8 +83,7 @@ class Shipper {
   bool behind_{false};             // The plant got more than was noted here.
   std::int64_t last_there_ns_{0};  // The time that this object set there.
   std::map<std::string, std::string> checks_;  // By table.
-  std::set<std::string>
-      staged_;  // Tables that have a stage in this transaction.
+  std::set<std::string> staged_;  // Tables staged in this transaction.
 };
 
 }  // namespace fdi::storage

@@ -1,13 +1,13 @@
 #include "report/fault_texts.h"
 
 #include <algorithm>
-#include <cmath>
 #include <optional>
 #include <span>
 #include <utility>
 
 #include "base/error.h"
 #include "base/suggestion.h"
+#include "base/text.h"
 #include "base/toml_reader.h"
 #include "report/shared_files.h"
 
@@ -33,24 +33,12 @@ std::optional<int> FaultOf(std::string_view key) {
   return key == kUnknown ? 0 : ParseFinding(key);
 }
 
-void AppendTo(std::string& list, std::string_view separator,
-              std::string_view item) {
-  if (!list.empty()) {
-    list += separator;
-  }
-  list += item;
-}
-
 template <typename E>
 E Choice(const TomlReader& table, std::string_view key, const std::string& word,
          std::span<const std::string_view> words) {
   const auto place = std::ranges::find(words, word);
   if (place == words.end()) {
-    std::string accepted;
-    for (const std::string_view candidate : words) {
-      AppendTo(accepted, ", ", candidate);
-    }
-    table.Refuse(key, "'" + word + "' is none of " + accepted);
+    table.Refuse(key, "'" + word + "' is none of " + JoinText(words));
   }
   return static_cast<E>(place - words.begin());
 }
@@ -203,7 +191,7 @@ FaultWords FaultTexts::Words(std::string_view answer, double strength,
     if (words.name.empty()) {
       words.check = text.check;
     }
-    AppendTo(words.name, " or ", text.name);
+    words.name += (words.name.empty() ? "" : " or ") + text.name;
     if (std::ranges::find(disciplines, text.discipline) == disciplines.end()) {
       disciplines.push_back(text.discipline);
     }
@@ -217,9 +205,7 @@ FaultWords FaultTexts::Words(std::string_view answer, double strength,
   if (priority) {
     words.severity = SeverityOf(*priority).value_or(words.severity);
   }
-  for (const Discipline discipline : disciplines) {
-    AppendTo(words.discipline, "|", DisciplineName(discipline));
-  }
+  words.discipline = JoinText(disciplines, "|", DisciplineName);
   return words;
 }
 

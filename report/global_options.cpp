@@ -4,7 +4,6 @@
 #include <charconv>
 #include <map>
 #include <memory>
-#include <optional>
 #include <sstream>
 #include <vector>
 

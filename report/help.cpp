@@ -12,6 +12,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "base/text.h"
 #include "report/text_table.h"
 
 namespace fdi::report {
@@ -68,7 +69,7 @@ class HelpFormatter : public CLI::Formatter {
     for (const std::string& name : option->get_lnames()) {
       names.push_back("--" + name);
     }
-    std::string heading = positional ? option->get_name(true) : Joined(names);
+    std::string heading = positional ? option->get_name(true) : JoinText(names);
     const std::string value = option->get_type_name();
     if (!value.empty() && !(positional && value == "TEXT")) {
       heading += value.front() == '[' ? value : ' ' + value;
@@ -103,7 +104,7 @@ std::string NamesOf(const std::set<CLI::Option*>& options) {
     names.push_back(option->get_name());
   }
   std::sort(names.begin(), names.end());
-  return Joined(names);
+  return JoinText(names);
 }
 
 bool NamesAFile(const std::string& description) {
@@ -213,7 +214,7 @@ void Describe(CLI::Option& option) {
   option.description((open
                           ? description.substr(0, description.size() - 1) + "; "
                           : description + " (") +
-                     Joined(remarks, "; ") + ")");
+                     JoinText(remarks, "; ") + ")");
 }
 
 // Calls `act` for the program, its groups and its verbs.
@@ -226,16 +227,6 @@ void ForEachApp(CLI::App& app, const F& act) {
 }
 
 }  // namespace
-
-std::string Joined(const std::vector<std::string>& words,
-                   const char* separator) {
-  std::string text;
-  for (const std::string& word : words) {
-    text += text.empty() ? "" : separator;
-    text += word;
-  }
-  return text;
-}
 
 void PrepareHelp(CLI::App& root) {
   const auto formatter = std::make_shared<HelpFormatter>();

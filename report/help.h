@@ -19,10 +19,6 @@ namespace fdi::report {
 /// once, after the last option was added.
 void PrepareHelp(CLI::App& root);
 
-/// "a, b, c".
-std::string Joined(const std::vector<std::string>& words,
-                   const char* separator = ", ");
-
 /// Drops the requirement that files and folders named by options exist.
 void AllowMissingFiles(CLI::App& root);
 

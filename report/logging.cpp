@@ -1,7 +1,6 @@
 #include "report/logging.h"
 
 #include <algorithm>
-#include <climits>
 #include <cstdint>
 #include <memory>
 #include <mutex>

@@ -21,6 +21,7 @@
 #include "base/passing_error.h"
 #include "base/printable.h"
 #include "base/suggestion.h"
+#include "base/text.h"
 #include "report/help.h"
 #include "report/logging.h"
 
@@ -94,7 +95,7 @@ std::string Unexpected(const CLI::App& app, const std::string& word) {
   if (meant) {
     return message + ": did you mean '" + *meant + "'?";
   }
-  return is_option ? message : message + "; there are " + Joined(names);
+  return is_option ? message : message + "; there are " + JoinText(names);
 }
 
 // One line for an error of CLI11. Unparsed words are more informative than its
@@ -110,7 +111,7 @@ std::string Explain(const CLI::App& root, const CLI::ParseError& error) {
   }
   if (dynamic_cast<const CLI::RequiredError*>(&error) != nullptr &&
       verb_missing) {
-    return "a verb is needed: " + Joined(VerbNames(app));
+    return "a verb is needed: " + JoinText(VerbNames(app));
   }
   return error.what();
 }

@@ -60,13 +60,9 @@ std::string LeftOut(const std::string& name, const std::string& option);
 ///     }
 ///     void AddRunsVerbs(Program& program) {
 ///       CLI::App& runs = program.AddGroup("runs", "Stored runs");
-///       auto options = std::make_shared<ListOptions>();
-///       CLI::App& list = program.AddVerb(
-///           runs, "list", "List the runs",
-///           [options](const Context& context) -> Report {
-///             return List(*options, context);
-///           });
-///       list.add_option("--valve", options->valve, "Glob over valve ids");
+///       auto [list, options] =
+///           AddVerb(program, runs, "list", "List the runs", List);
+///       list.add_option("--valve", options.valve, "Glob over valve ids");
 ///       program.AllowCsv(list, "One line per run as CSV");
 ///     }
 class Program {
@@ -150,5 +146,35 @@ class Program {
   std::vector<std::function<std::optional<int>(const std::exception&)>>
       mappers_;
 };
+
+/// Adds a verb of a group, or of the program. The action receives the Options
+/// that the caller binds to command-line options:
+///
+///     auto [verb, options] = AddVerb(program, group, "list", "...", List);
+///     verb.add_option("--valve", options.valve, "Glob over valve ids");
+///
+/// CLI11 fills them when it parses, after the caller has returned: the action
+/// owns them. It returns a Report, or prints and returns the exit code.
+template <typename Options, typename Result>
+std::pair<CLI::App&, Options&> AddVerb(Program& program, CLI::App& group,
+                                       const std::string& name,
+                                       const std::string& description,
+                                       Result (*action)(const Options&,
+                                                        const Context&)) {
+  auto options = std::make_shared<Options>();
+  CLI::App& verb =
+      program.AddVerb(group, name, description,
+                      std::function<Result(const Context&)>(
+                          [options, action](const Context& context) {
+                            return action(*options, context);
+                          }));
+  return {verb, *options};
+}
+template <typename Options, typename Result>
+std::pair<CLI::App&, Options&> AddVerb(
+    Program& program, const std::string& name, const std::string& description,
+    Result (*action)(const Options&, const Context&)) {
+  return AddVerb(program, program.root(), name, description, action);
+}
 
 }  // namespace fdi::report

@@ -9,6 +9,7 @@
 
 #include "base/csv_cells.h"
 #include "base/printable.h"
+#include "base/text.h"
 #include "base/time_text.h"
 #include "base/time_units.h"
 
@@ -47,17 +48,6 @@ const Json& RowsAt(const Json& document, const std::string& path, Json& named) {
   return named;
 }
 
-std::string Bare(const Json& value);
-
-std::string Joined(const Json& list) {
-  std::string text;
-  for (const Json& item : list) {
-    text += text.empty() ? "" : ",";
-    text += Bare(item);
-  }
-  return text;
-}
-
 // A value in CSV form: null is an empty cell.
 std::string Bare(const Json& value) {
   if (value.is_null() ||
@@ -67,7 +57,7 @@ std::string Bare(const Json& value) {
   if (value.is_string()) {
     return value.get<std::string>();
   }
-  return value.is_array() ? Joined(value) : value.dump();
+  return value.is_array() ? JoinText(value, ",", Bare) : value.dump();
 }
 
 std::string RawText(const Json& row, const Column& column, bool utc) {

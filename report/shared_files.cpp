@@ -1,7 +1,5 @@
 #include "report/shared_files.h"
 
-#include <string>
-
 #include "base/error.h"
 
 namespace fdi::report {

@@ -3,6 +3,7 @@
 #include <sstream>
 
 #include "base/error.h"
+#include "base/text.h"
 
 namespace fdi::report {
 
@@ -43,12 +44,7 @@ Json SignalsJson(SignalMask signals) {
 }
 
 std::string SignalsText(SignalMask signals) {
-  std::string text;
-  for (const Json& name : SignalsJson(signals)) {
-    text += text.empty() ? "" : ",";
-    text += name.get<std::string>();
-  }
-  return text;
+  return JoinText(SignalsJson(signals).get<std::vector<std::string>>(), ",");
 }
 
 }  // namespace fdi::report

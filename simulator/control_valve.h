@@ -73,8 +73,7 @@ class ValveDynamics final : public OdeSystem {
 
   /// Backlash width / stroke.
   double PlayWidth() const;
-  /// Ends of the actuator's travel; those of the rod
-  /// may be narrower.
+  /// Ends of the actuator's travel; those of the rod may be narrower.
   double LowStop() const { return parameters_.actuator.lowest_travel; }
   double HighStop() const { return parameters_.actuator.highest_travel; }
   /// Rod position behind the play for an actuator position z, along the

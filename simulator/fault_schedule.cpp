@@ -4,6 +4,7 @@
 
 #include "base/csv_cells.h"
 #include "base/error.h"
+#include "base/text.h"
 #include "diagnosis/fault_catalogue.h"
 #include "simulator/require_range.h"
 
@@ -17,15 +18,12 @@ namespace {
 
 double ReadNumber(std::string_view text, std::string_view part,
                   const char* name) {
-  double value = 0.0;
-  const auto [end, error] =
-      std::from_chars(part.data(), part.data() + part.size(), value);
-  if (error != std::errc{} || end != part.data() + part.size() ||
-      !std::isfinite(value)) {
+  const auto value = ParseWhole<double>(part);
+  if (!value || !std::isfinite(*value)) {
     Refuse(text,
            std::string(name) + " '" + std::string(part) + "' is not a number");
   }
-  return value;
+  return *value;
 }
 
 // Splits `rest` at the next `separator`; returns the part before it.

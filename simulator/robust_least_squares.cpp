@@ -7,6 +7,7 @@
 #include <Eigen/LU>
 
 #include "base/error.h"
+#include "base/median.h"
 
 namespace fdi::simulator {
 namespace {
@@ -14,13 +15,6 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-
-double Median(std::vector<double> values) {
-  const auto middle =
-      values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 // Standard deviation of a normal distribution with the same median absolute
 // deviation, which is 1 / 1.4826 of it. Residuals of 0 are skipped: they mark

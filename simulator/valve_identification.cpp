@@ -582,6 +582,17 @@ Hypothesis Identification::Start(const ValveParameters& variant,
   }
   Hypothesis h{
       {variant, drive}, Unknowns(variant, /*stated=*/false), {}, {}, {}};
+  // Kv is that of the open valve, to which a record is extrapolated: of two
+  // valves that pass the same where the record is, the one with the smaller
+  // slope has the smaller Kv. Its search reaches as far about that value.
+  for (ValveUnknown& u : h.unknowns) {
+    if (u.name == "trim.kv_m3_h") {
+      const double slope =
+          start.trim.kv_m3_h / (u.nominal * SizeOf(records_, nominal_));
+      u.lower *= std::min(1.0, slope);
+      u.upper *= std::max(1.0, slope);
+    }
+  }
   if (friction) {
     h.unknowns.push_back(FrictionUnknown(variant));
   }

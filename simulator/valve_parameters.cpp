@@ -6,6 +6,7 @@
 
 #include "base/csv_cells.h"
 #include "base/error.h"
+#include "base/text.h"
 #include "simulator/parameter_fields.h"
 #include "simulator/require_range.h"
 
@@ -194,15 +195,13 @@ std::string Describe(const ValveParameters& valve) {
 }
 
 ValveParameters ParameterSet(std::string_view name) {
-  std::string names;
   for (const ValveParameters& set : ShippedSets()) {
     if (set.name == name) {
       return set;
     }
-    names += (names.empty() ? "" : ", ") + set.name;
   }
   throw ConfigError("unknown parameter set '" + std::string(name) +
-                    "': expected one of " + names);
+                    "': expected one of " + JoinText(ParameterSetNames()));
 }
 
 void Validate(const ValveParameters& parameters) {

@@ -33,4 +33,6 @@ forbid '^(diagnosis|idl|import|simulator|storage|trainer|monitor|planner|plant|p
   'TOML belongs to base and to the options'
 forbid '^((base|diagnosis|idl|import|report|simulator|trainer|storage|plant|programs)/|planner/[^/]+$)' 'httplib\.h' \
   'HTTP belongs to the monitor and to what planner/live adds to its page'
+forbid '^(diagnosis|idl|import|simulator|storage|trainer|monitor|planner|plant|programs|bench)/' '(shared_)?mutex>' \
+  'mutexes are those of base/mutex.h, which clang checks'
 exit "$failed"

@@ -1,11 +1,13 @@
 #!/usr/bin/env bash
-# Runs the commands of docs/tutorial.md as they stand there, in an empty
-# directory: blocks `sh` one after the other, a block `sh service` in the
-# background until the end, `sh long` with FDI_TUTORIAL_LONG=1, not `sh admin`.
-# Every command has to succeed, and the story has to come out as told.
-# Usage: tutorial.sh BIN_DIRECTORY
+# Runs the commands of docs/tutorial.md, or of another page, as they stand
+# there, in an empty directory: blocks `sh` one after the other, a block
+# `sh service` in the background until the end, `sh long` with
+# FDI_TUTORIAL_LONG=1, not `sh admin`. Every command has to succeed, and the
+# story has to come out as told.
+# Usage: tutorial.sh BIN_DIRECTORY [tutorial|plant]
 set -euo pipefail
 bin=$(cd "$1" && pwd)
+page=${2:-tutorial}
 tree=$(cd "$(dirname "$0")/.." && pwd)
 source "$tree/tests/domain.sh"
 out=$(mktemp -d)
@@ -15,7 +17,7 @@ finish() {
 }
 trap finish EXIT
 fail() {
-  echo "tutorial: $*" >&2
+  echo "$page: $*" >&2
   tail -n 5 "$out"/*.log >&2
   exit 1
 }
@@ -30,7 +32,7 @@ adapt() {
 # A file for each block, in order: 01.sh, 02.service, 03.admin, ...
 awk -v out="$out" '/^```sh/ {kind = $2 == "" ? "sh" : $2; ++n; next}
   /^```/ {kind = ""} kind != "" {print > sprintf("%s/%02d.%s", out, n, kind)}' \
-  "$tree/docs/tutorial.md"
+  "$tree/docs/$page.md"
 
 unset FDI_DATA
 export PATH=$bin:$PATH
@@ -61,7 +63,7 @@ for block in "$out"/[0-9][0-9].*; do
   esac
 done
 
-# The page of step 5 answers.
+# The page of the service answers.
 port=$(sed -n 's/.*console_listening address=127.0.0.1:\([0-9]*\).*/\1/p' \
   "$out/service.log")
 exec 3<>"/dev/tcp/127.0.0.1/${port:?}"
@@ -71,10 +73,23 @@ head -n 1 <&3 | grep -q ' 200 ' || fail "the page does not answer"
 kill -TERM "$service"
 wait "$service" || fail "the monitor ended with $?"
 service=
-found=$(fdi-store history list --json)
-grep -q '"fault": "f19"' <<<"$found" || fail "no f19 in the history: $found"
-grep -q '"label": "f19"' <<<"$found" || fail "no label in the history: $found"
-[ "$(grep -c '"episode_id"' <<<"$found")" -eq 1 ] || fail "not one episode: $found"
-[ -s episode.png ] || fail "no picture"
-fdi-store models list | grep -q '^paper@2 *yes' || fail "paper@2 is not active"
-echo "tutorial: $(ls "$out"/*.sh | wc -l) blocks in $SECONDS s"
+# What the tutorial and docs/plant.md tell.
+check_tutorial() {
+  found=$(fdi-store history list --json)
+  grep -q '"fault": "f19"' <<<"$found" || fail "no f19 in the history: $found"
+  grep -q '"label": "f19"' <<<"$found" || fail "no label in the history: $found"
+  [ "$(grep -c '"episode_id"' <<<"$found")" -eq 1 ] || fail "not one episode: $found"
+  [ -s episode.png ] || fail "no picture"
+  fdi-store models list | grep -q '^paper@2 *yes' || fail "paper@2 is not active"
+}
+check_plant() {
+  local list report
+  list=$(fdi-store valves list)
+  grep -q 'FIC103 .*saturated' <<<"$list" || fail "FIC103 is not at an end: $list"
+  grep -q 'FIC101 .*undetermined' <<<"$list" || fail "FIC101: $list"
+  report=$(fdi-store report --csv | sed -n 2p)
+  grep -q 'FIC103.*saturated' <<<"$report" || fail "not the worst: $report"
+  [ -s FIC103.png ] && [ -s report.html ] || fail "no picture or no report"
+}
+"check_$page"
+echo "$page: $(ls "$out"/*.sh | wc -l) blocks in $SECONDS s"

@@ -440,8 +440,7 @@ ModelSet TrainDifferenceSet(const std::vector<TrainingRun>& healthy,
   Reporter reporter(progress);
   reporter.Report(0.0, "fitting the normal observer");
   // Every step needs what earlier ones have set: FitFaults() the deviations of
-  // the normal observer, FindGroups() limits and interpolation errors,
-  // FitDriftLimits() the limits of the windows.
+  // the normal observer, FindGroups() limits and interpolation errors.
   const Healthy fitted = FitHealthy(healthy, flow_limit, options);
   ModelSet models = Describe(healthy, fitted.normal, faults, options);
   const NormalResiduals held_out =
@@ -451,8 +450,8 @@ ModelSet TrainDifferenceSet(const std::vector<TrainingRun>& healthy,
   reporter.Report(kNormalShare + kObserverShare, "comparing faults");
   FitLimits(fitted, held_out, options, models);
   FitInterpolationErrors(compared, models);
+  FitFitLimits(compared, options.threads, models);
   FindGroups(compared, options.threads, models);
-  FitDriftLimits(compared, models);
   Validate(models);
   reporter.Report(1.0, "done");
   return models;
@@ -566,18 +565,6 @@ ChannelObserver Transfer(ChannelObserver fault, const ChannelObserver& of_type,
   return fault;
 }
 
-// In proportion to the limits that they move.
-DriftLimits Transfer(DriftLimits drift, const ChannelSpec& of_type,
-                     const ChannelSpec& channel) {
-  if (!channel.windows.empty() && !of_type.windows.empty()) {
-    const WindowLimits& limits = channel.windows.back();
-    const WindowLimits& before = of_type.windows.back();
-    drift.lower_mean *= limits.lower_mean / before.lower_mean;
-    drift.upper_mean *= limits.upper_mean / before.upper_mean;
-  }
-  return drift;
-}
-
 }  // namespace
 
 bool IsTransferable(const ModelSet& of_type,
@@ -621,10 +608,6 @@ ModelSet TransferDifferenceSet(const ModelSet& of_type,
           Transfer(of_type.observers[i].channels[c],
                    of_type.observers.front().channels[c], normal.channels[c]);
     }
-  }
-  for (std::size_t c = 0; c < models.channels.size(); ++c) {
-    models.channels[c].drift = Transfer(
-        of_type.channels[c].drift, of_type.channels[c], models.channels[c]);
   }
   models.groups = of_type.groups;
   models.undetectable = of_type.undetectable;

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "diagnosis/fault_catalogue.h"
+#include "diagnosis/fit_window.h"
 #include "diagnosis/valve_engine.h"
 
 namespace fdi::trainer {
@@ -113,6 +114,15 @@ std::vector<int> FaultsIn(const ModelSet& models, FaultSet set) {
   return faults;
 }
 
+bool IsWithdrawn(const ModelSet& models, const Verdict& verdict) {
+  if (!verdict.detected || !FaultsIn(models, verdict.isolated).empty()) {
+    return false;
+  }
+  const bool by_floor = verdict.isolated != 0;
+  return (by_floor || verdict.unknown == Unknown::kOutsideKnown) &&
+         JudgesFit(models);
+}
+
 RunIndices ComputeIndices(const std::vector<Indication>& all,
                           double horizon_s) {
   RunIndices result;
@@ -190,6 +200,7 @@ std::vector<Indication> ScoreRun(const std::shared_ptr<const ModelSet>& models,
     indication.settled = settled;
     indication.detected = verdict.detected;
     indication.isolated = FaultsIn(*models, verdict.isolated);
+    indication.withdrawn = IsWithdrawn(*models, verdict);
     all.push_back(std::move(indication));
     // A detection takes several abnormal samples and carries the stamp of the
     // first. The samples since then are already stored, hence the way back.

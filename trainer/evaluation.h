@@ -18,7 +18,7 @@ struct Indication {
   bool settled{false};        ///< Diagnosis was LIVE at or before it.
   bool detected{false};       ///< DD: an episode is open.
   std::vector<int> isolated;  ///< Faults indicated.
-  bool withdrawn{false};      ///< A second look took the name back: unknown.
+  bool withdrawn{false};      ///< An earlier name was taken back: unknown.
 };
 
 /// The indices of the DAMADICS benchmark for one run, times in s from the start
@@ -54,6 +54,11 @@ struct RunIndices {
 /// @param horizon_s t_hor from the start of the run [s]; 0 = the last instant.
 RunIndices ComputeIndices(const std::vector<Indication>& indications,
                           double horizon_s = 0.0);
+
+/// Whether the engine says that no known fault explains the episode, or has
+/// nothing but findings of the floor: a name that it gave before counts no
+/// more. Never of older sets, which take no name back.
+bool IsWithdrawn(const ModelSet& models, const Verdict& verdict);
 
 /// The numbers of the faults in `set`, ascending. Findings of the floor are not
 /// scored, but for a loss of flow that stands beside a fault as another answer.

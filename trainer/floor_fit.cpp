@@ -268,9 +268,13 @@ void FitFlow(const std::vector<Stretch>& stretches, FloorLimits& floor) {
       const double flow =
           sample[Signal::kF] - floor.flow_margin * floor.flow_high;
       ratios.push_back(least > 0.0 ? flow / least : 0.0);
-      shortfalls.push_back(LeastFlowAt(floor, least_open, DpOf(sample, floor)) /
-                           (std::max(sample[Signal::kF], 0.0) +
-                            floor.flow_margin * floor.flow_high));
+      // Of a shut valve, Floor does not test for too little flow.
+      shortfalls.push_back(
+          IsShut(x, sample[Signal::kCv])
+              ? 0.0
+              : LeastFlowAt(floor, least_open, DpOf(sample, floor)) /
+                    (std::max(sample[Signal::kF], 0.0) +
+                     floor.flow_margin * floor.flow_high));
     }
     too_little = std::max(
         too_little, kFlowMargin * Sustained(shortfalls, floor.flow_samples));

@@ -3,15 +3,20 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <memory>
 #include <numeric>
+#include <utility>
 
 #include "diagnosis/fault_bank.h"
+#include "diagnosis/fit_window.h"
 #include "diagnosis/observer_bank.h"
 #include "diagnosis/residual_windows.h"
+#include "diagnosis/student.h"
 #include "trainer/parallel_for.h"
 #include "trainer/regression.h"
+#include "trainer/statistics.h"
 
 namespace fdi::trainer {
 namespace {
@@ -373,128 +378,148 @@ void FitInterpolationErrors(const std::vector<Condition>& conditions,
 
 namespace {
 
-constexpr double kMaxDriftFactor = 3.0;
+constexpr double kMisfitShare = 0.001;  // of the windows of a fault that acts
+constexpr double kMinFitMean = 0.5;     // deviations
+constexpr double kMinFitSquare = 2.0;   // likewise, squared
+constexpr std::size_t kMinFitBlocks = 4;
 
-// What the longest window of a channel shows of a condition, on average.
-struct WindowAverage {
-  double samples{0.0};
-  double mean{0.0};
-  double excess{0.0};  // of the log-deviation over its limit
+// z of every channel over blocks of t_k samples, none of them twice.
+struct FitBlocks {
+  std::vector<double> means;
+  std::vector<double> logs;  // of the mean squares
 };
 
-// `plan` needs the normal observer alone.
-std::vector<WindowAverage> AverageWindows(
+// `plan` has the normal observer and the one in question.
+std::vector<FitBlocks> BlocksOf(
     const Condition& condition,
     const std::shared_ptr<const ObserverPlan>& plan) {
   const ModelSet& models = plan->models();
-  std::vector<WindowAverage> averages(models.channels.size());
-  // Faults that were put onto healthy data have a validation part alone.
-  for (const Stretch& stretch : condition.training.empty()
-                                    ? condition.validation
-                                    : WholeStretches(condition)) {
+  const std::size_t channels = models.channels.size();
+  const Observer& observer = models.observers.back();
+  std::vector<FitBlocks> blocks(channels);
+  std::vector<double> z(channels);
+  for (const Stretch& stretch : condition.validation) {
     if (stretch.samples.empty()) {
       continue;
     }
     ObserverBank bank(plan);
-    ResidualWindows windows(models);
+    fdi::FitWindow window(models.decision.isolation_samples, channels);
     bank.Initialise(stretch.samples.front());
     for (std::size_t k = 0; k < stretch.samples.size(); ++k) {
       bank.Step(stretch.samples[k]);
       if (static_cast<int>(k) < models.decision.settling_samples) {
         continue;
       }
-      std::array<double, kMaxChannels> residuals{};
-      for (std::size_t c = 0; c < averages.size(); ++c) {
-        residuals[c] = bank.residual(0, static_cast<int>(c));
+      for (std::size_t c = 0; c < channels; ++c) {
+        const int channel = static_cast<int>(c);
+        const double sd = observer.channels[c].residual_sd;
+        const double s =
+            std::min(std::hypot(sd, kExtrapolationError *
+                                        bank.extrapolation(1, channel)),
+                     std::sqrt(kMaxFitVariance) * sd);
+        z[c] = bank.active(channel) ? bank.residual(1, channel) / s
+                                    : std::numeric_limits<double>::quiet_NaN();
       }
-      windows.Push({residuals.data(), averages.size()},
-                   stretch.samples[k][Signal::kCv]);
-      for (std::size_t c = 0; c < averages.size(); ++c) {
-        const std::size_t count = models.channels[c].windows.size();
-        if (count == 0) {
-          continue;
-        }
-        const WindowLimits& limits = models.channels[c].windows[count - 1];
-        const ResidualWindow& window = windows.window(c, count - 1);
-        const ResidualWindow& command = windows.command(c, count - 1);
-        if (Applies(limits, window, command)) {
-          WindowAverage& average = averages[c];
-          average.samples += 1.0;
-          average.mean += (window.mean() - average.mean) / average.samples;
-          average.excess += (window.log_rms() - UpperLogRms(limits, command) -
-                             average.excess) /
-                            average.samples;
+      window.Push(z);
+      if (!window.full()) {
+        continue;
+      }
+      for (std::size_t c = 0; c < channels; ++c) {
+        if (!std::isnan(window.mean(c))) {
+          blocks[c].means.push_back(window.mean(c));
+          blocks[c].logs.push_back(std::log(std::max(window.square(c), 1e-6)));
         }
       }
+      window.Restart();
     }
   }
-  return averages;
+  return blocks;
 }
 
-// The limit that a fault passes by most, and how far it may move then.
-// `ratio` compares all three kinds of limit: m/L for the mean m, and the ratio
-// of deviations for the energy. `bound` points into ModelSet::channels.
-struct Witness {
-  double ratio{1.0};
-  double* bound{nullptr};
-  double at_most{0.0};
+// What one more block is beyond with probability `share`.
+double BlockReach(const std::vector<double>& values, double share) {
+  const auto n = static_cast<double>(values.size());
+  return StudentQuantile(1.0 - share, n - 1.0) *
+         std::sqrt(Variance(values) * n / (n - 1.0) * (1.0 + 1.0 / n));
+}
 
-  void Update(const Witness& other) {
-    *this = other.ratio > ratio ? other : *this;
+// Where blocks with and without an effect alternate, as at a stop that the rod
+// meets now and then, their scatter says nothing: no more than twice the
+// largest that was seen.
+double UpperSquare(const std::vector<double>& logs, double share) {
+  return std::exp(std::min(Mean(logs) + BlockReach(logs, share),
+                           *std::ranges::max_element(logs) + std::log(2.0)));
+}
+
+// Limits that none is closer than. The validation data are of the same hours as
+// the models: what another day may add is in the limits on the shortest windows
+// of the normal residual, which are about as long.
+FitBounds AnotherDay(const ModelSet& models, std::size_t c) {
+  FitBounds room{-kMinFitMean, kMinFitMean, kMinFitSquare};
+  if (!models.channels[c].windows.empty()) {
+    const WindowLimits& window = models.channels[c].windows.front();
+    const double sd = models.observers.front().channels[c].residual_sd;
+    room.lower_mean = std::min(room.lower_mean, window.lower_mean / sd);
+    room.upper_mean = std::max(room.upper_mean, window.upper_mean / sd);
+    room.upper_square = std::max(
+        room.upper_square, std::exp(2.0 * window.upper_log_rms) / sd / sd);
   }
-};
+  return room;
+}
 
-// A mean m beyond its limit L is still found after the limits have followed by
-// b as long as m − b is beyond L. b = (m − L)/2 keeps half of the excess for
-// the detection; the same holds for the energy, in logarithms.
-void UpdateWitness(const std::vector<WindowAverage>& averages, ModelSet& models,
-                   Witness& witness) {
-  for (std::size_t c = 0; c < averages.size(); ++c) {
-    if (averages[c].samples == 0.0) {
-      continue;
+// The inputs that are outside normal operation in all data of a condition but
+// what noise brings back.
+SignalMask MovedIn(const Condition& condition, const ModelSet& models) {
+  constexpr double kAlways = 0.95;
+  const std::array<std::pair<Signal, SignalRange>, 3> inputs{
+      {{Signal::kP1, models.validity.p1},
+       {Signal::kP2, models.validity.p2},
+       {Signal::kT1, models.validity.t1}}};
+  SignalMask moved = 0;
+  for (const auto& [signal, range] : inputs) {
+    int outside = 0;
+    int all = 0;
+    for (const Stretch& stretch : condition.validation) {
+      for (const Sample& sample : stretch.samples) {
+        const bool has = sample.Has(signal);
+        all += has ? 1 : 0;
+        outside += has && !range.Contains(sample[signal]) ? 1 : 0;
+      }
     }
-    const WindowLimits& limits = models.channels[c].windows.back();
-    DriftLimits& drift = models.channels[c].drift;
-    const double mean = averages[c].mean;
-    const double excess = averages[c].excess;
-    witness.Update({mean / limits.lower_mean, &drift.lower_mean,
-                    0.5 * (mean - limits.lower_mean)});
-    witness.Update({mean / limits.upper_mean, &drift.upper_mean,
-                    0.5 * (mean - limits.upper_mean)});
-    witness.Update({std::exp(excess), &drift.log_scale, 0.5 * excess});
+    if (all > 0 && outside >= kAlways * all) {
+      moved |= MaskOf(signal);
+    }
   }
+  return moved;
 }
 
 }  // namespace
 
-void FitDriftLimits(const std::vector<Condition>& conditions,
-                    ModelSet& models) {
-  for (ChannelSpec& channel : models.channels) {
-    if (!channel.windows.empty()) {
-      const WindowLimits& limits = channel.windows.back();
-      channel.drift = {kMaxDriftFactor * limits.lower_mean,
-                       kMaxDriftFactor * limits.upper_mean,
-                       std::log(kMaxDriftFactor)};
-    }
-  }
-  const ModelSet healthy = WithObservers(models, {0});
-  const auto normal = std::make_shared<const ObserverPlan>(healthy);
-  for (const int fault : models.faults) {
-    for (const bool negative : {false, true}) {
-      // One limit that still finds the fault is enough: only the one that it
-      // exceeds by most is bounded, and the others may follow further.
-      Witness witness;
-      for (const int i : Chain(models, fault, negative)) {
-        if (i > 0) {
-          UpdateWitness(
-              AverageWindows(conditions[static_cast<std::size_t>(i)], normal),
-              models, witness);
-        }
+void FitFitLimits(const std::vector<Condition>& conditions, int threads,
+                  ModelSet& models) {
+  const double share =
+      kMisfitShare / (3.0 * static_cast<double>(models.channels.size()));
+  std::vector<std::vector<FitBlocks>> blocks(models.observers.size());
+  ParallelFor(static_cast<int>(blocks.size()) - 1, threads, [&](int i) {
+    const ModelSet two = WithObservers(models, {0, i + 1});
+    const auto o = static_cast<std::size_t>(i) + 1;
+    blocks[o] =
+        BlocksOf(conditions[o], std::make_shared<const ObserverPlan>(two));
+  });
+  for (std::size_t o = 1; o < models.observers.size(); ++o) {
+    models.observers[o].moved = MovedIn(conditions[o], models);
+    for (std::size_t c = 0; c < models.channels.size(); ++c) {
+      const FitBlocks& seen = blocks[o][c];
+      if (seen.means.size() < kMinFitBlocks) {
+        continue;
       }
-      if (witness.bound != nullptr &&
-          std::abs(witness.at_most) < std::abs(*witness.bound)) {
-        *witness.bound = witness.at_most;
-      }
+      const double mean = Mean(seen.means);
+      const double reach = BlockReach(seen.means, share);
+      const FitBounds room = AnotherDay(models, c);
+      models.observers[o].channels[c].fit = {
+          std::min(mean - reach, room.lower_mean),
+          std::max(mean + reach, room.upper_mean),
+          std::max(UpperSquare(seen.logs, share), room.upper_square)};
     }
   }
 }

@@ -66,14 +66,16 @@ NormalResiduals CrossValidate(const Condition& normal, const Observer& chosen,
 void FitInterpolationErrors(const std::vector<Condition>& conditions,
                             ModelSet& models);
 
-/// Sets ChannelSpec::drift of every channel with windows: at most three times
-/// the limit on a mean and a factor of 3, and so little that no fault that the
-/// set knows is learnt. Of every fault and direction, at the strength that
-/// shows best, the limit on the longest windows that it passes by most moves at
-/// most by half of what it passes it by.
+/// Sets ChannelObserver::fit of every fault observer from the validation
+/// stretches of its condition: bounds that the mean and the logarithm of the
+/// mean square of one more block of t_k samples exceed with a probability of
+/// 0.001 over all channels (Student's t), none of them closer than half a
+/// deviation, a mean square of 2, or the limits of the channel's shortest
+/// window.
 ///
 /// @param conditions parallel to models.observers.
-void FitDriftLimits(const std::vector<Condition>& conditions, ModelSet& models);
+void FitFitLimits(const std::vector<Condition>& conditions, int threads,
+                  ModelSet& models);
 
 /// Fills ModelSet::groups and ModelSet::undetectable by scoring the validation
 /// stretches of every fault condition: a fault is undetectable if under 5 % of

@@ -3,9 +3,10 @@
 #include <algorithm>
 #include <atomic>
 #include <exception>
-#include <mutex>
 #include <thread>
 #include <vector>
+
+#include "base/mutex.h"
 
 namespace fdi::trainer {
 
@@ -14,13 +15,13 @@ void ParallelFor(int count, int threads, const std::function<void(int)>& task) {
   const int wanted = threads > 0 ? threads : std::max(1, available);
   std::atomic<int> next{0};
   std::exception_ptr failure;
-  std::mutex failure_mutex;
+  Mutex failure_mutex;
   const auto work = [&] {
     for (int i = next++; i < count; i = next++) {
       try {
         task(i);
       } catch (...) {
-        const std::scoped_lock lock(failure_mutex);
+        const MutexLock lock(failure_mutex);
         if (!failure) {
           failure = std::current_exception();
         }

@@ -2,11 +2,11 @@
 
 #include <cstdint>
 #include <functional>
-#include <mutex>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "base/mutex.h"
 #include "diagnosis/model_set.h"
 #include "trainer/channel_training.h"
 #include "trainer/dataset.h"
@@ -55,7 +55,7 @@ class Reporter {
   explicit Reporter(const Progress& progress) : progress_(progress) {}
 
   void Report(double share, std::string_view stage) {
-    const std::scoped_lock lock(mutex_);
+    const MutexLock lock(mutex_);
     if (progress_) {
       progress_(share, stage);
     }
@@ -63,7 +63,7 @@ class Reporter {
 
  private:
   const Progress& progress_;
-  std::mutex mutex_;
+  Mutex mutex_;
 };
 
 }  // namespace fdi::trainer

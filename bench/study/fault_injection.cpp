@@ -15,11 +15,11 @@ namespace {
 using simulator::FaultEffects;
 using simulator::ValveParameters;
 
-constexpr SignalMask kT1 = MaskOf(Signal::kT1);
-constexpr SignalMask kP1 = MaskOf(Signal::kP1);
-constexpr SignalMask kP2 = MaskOf(Signal::kP2);
-constexpr SignalMask kF = MaskOf(Signal::kF);
-constexpr SignalMask kFlowEquation = kP1 | kP2 | kF | MaskOf(Signal::kX);
+constexpr SignalMask kOfT1 = MaskOf(Signal::kT1);
+constexpr SignalMask kOfP1 = MaskOf(Signal::kP1);
+constexpr SignalMask kOfP2 = MaskOf(Signal::kP2);
+constexpr SignalMask kOfF = MaskOf(Signal::kF);
+constexpr SignalMask kFlowEquation = kOfP1 | kOfP2 | kOfF | MaskOf(Signal::kX);
 
 constexpr double kColdWaterC = 20.0;
 constexpr double kMaxGain = 2.0;
@@ -31,14 +31,14 @@ struct Injectable {
 };
 
 constexpr std::array<Injectable, 8> kInjectable{{
-    {5, kF, kF},
-    {6, kFlowEquation, kF},
-    {7, kT1, kT1},
-    {18, kFlowEquation, kF},
-    {19, kF, kF},
-    {kTemperatureTransmitterFault, kT1, kT1},
-    {kInletPressureTransmitterFault, kP1, kP1},
-    {kOutletPressureTransmitterFault, kP2, kP2},
+    {5, kOfF, kOfF},
+    {6, kFlowEquation, kOfF},
+    {7, kOfT1, kOfT1},
+    {18, kFlowEquation, kOfF},
+    {19, kOfF, kOfF},
+    {kTemperatureTransmitterFault, kOfT1, kOfT1},
+    {kInletPressureTransmitterFault, kOfP1, kOfP1},
+    {kOutletPressureTransmitterFault, kOfP2, kOfP2},
 }};
 
 const Injectable& RequireInjectable(int fault) {
@@ -114,7 +114,7 @@ bool AllFinite(const Sample& sample, SignalMask signals) {
 // What of the faults is not in the result, for people.
 std::vector<std::string> LeftOut(const FaultInjection& injection) {
   std::vector<std::string> left_out;
-  if ((ChangedSignals(injection) & kF) != 0) {
+  if ((ChangedSignals(injection) & kOfF) != 0) {
     left_out.emplace_back(
         "the reaction of the loop: command, position and pressures stay as "
         "recorded");
@@ -188,7 +188,7 @@ void FaultInjector::ChangeReadings(const FaultEffects& effects,
   }
   const double factor =
       (1.0 - effects.external_loss) * effects.flow_reading_factor;
-  if ((ChangedSignals(injection_) & kF) != 0 && effects != FaultEffects{}) {
+  if ((ChangedSignals(injection_) & kOfF) != 0 && effects != FaultEffects{}) {
     sample.Set(Signal::kF, std::clamp(factor * sample[Signal::kF],
                                       range.flow.low, range.flow.high));
   }
@@ -235,7 +235,7 @@ InjectedRun InjectInto(storage::StoredRun run, const FaultInjection& injection,
     }
   }
   const simulator::Transmitter& flow = injection.valve.instruments.flow;
-  const bool changes_flow = (ChangedSignals(injection) & kF) != 0;
+  const bool changes_flow = (ChangedSignals(injection) & kOfF) != 0;
   FaultInjector injector(injection);
   result.run = std::move(run);
   for (storage::StoredSample& stored : result.run.samples) {

@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 
 #include "base/error.h"
+#include "base/text.h"
 #include "base/time_text.h"
 #include "base/time_units.h"
 #include "bench/study/fault_injection.h"
@@ -89,8 +90,7 @@ std::string Store(const InjectedRun& injected, const InjectOptions& options,
       row.start_ns != 0 ? 0 : NowNs() / kNsPerSecond * kNsPerSecond;
   row.start_ns = injected.run.samples.front().sample.stamp_ns + shift;
   row.origin = storage::RunOrigin::kImported;
-  row.scenario =
-      injected.source + " with " + report::Joined(injected.faults, ", ");
+  row.scenario = injected.source + " with " + JoinText(injected.faults);
   row.software = context.software;
   storage::EnsureExists(directory);
   storage::RunRecorder recorder(directory.runs());
@@ -131,7 +131,7 @@ report::Report ReportOf(const InjectedRun& injected, const std::string& id,
       {"samples_at_flow_limit", injected.at_limit},
       {"left_out", injected.left_out}};
   report.Line((id.empty() ? file : "run " + id) + ": " +
-              report::Joined(injected.faults, ", ") + " on " +
+              JoinText(injected.faults) + " on " +
               std::to_string(injected.faulty) + " of " +
               std::to_string(injected.run.samples.size()) + " samples of " +
               injected.source);

@@ -1,10 +1,10 @@
 #include "bench/study/studies.h"
 
 #include <algorithm>
-#include <mutex>
 #include <sstream>
 
 #include "base/error.h"
+#include "base/mutex.h"
 #include "bench/study/study_detectors.h"
 #include "diagnosis/fault_catalogue.h"
 #include "report/progress.h"
@@ -247,7 +247,7 @@ SeedStudy RepeatWithSeeds(const Detector& detector,
       scenarios.size(), std::vector<EvaluatedRun>(count));
   const report::StopSignals signals;
   report::Progress progress("simulate");
-  std::mutex mutex;  // Of the progress.
+  Mutex mutex;  // Of the progress.
   int done = 0;
   const int total = static_cast<int>(scenarios.size() * count);
   ParallelFor(total, 0, [&](int i) {
@@ -270,7 +270,7 @@ SeedStudy RepeatWithSeeds(const Detector& detector,
     results[s][r] =
         Evaluate(detector, {std::move(simulated), RunLabel(run), run.horizon_s,
                             static_cast<std::size_t>(i)});
-    const std::scoped_lock lock(mutex);
+    const MutexLock lock(mutex);
     progress.Update(static_cast<double>(++done) / total, RunLabel(run));
   });
   progress.Finish();

@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numeric>
-#include <set>
 #include <span>
 #include <utility>
 
@@ -32,15 +30,13 @@ constexpr double kAntiphase = -0.5;
 constexpr double kPoorFit = 0.1;  // r² of a disturbance's.
 // A good valve with positioner has a dead band of 0.25 to 0.5 %.
 constexpr double kGoodBand = 0.25;
-constexpr double kHalf = 0.5;   // G of a play between OP and X.
-constexpr double kMoves = 1.0;  // Of OP, which calls for an answer [%].
+constexpr double kHalf = 0.5;     // G of a play between OP and X.
+constexpr double kMoves = 1.0;    // Of OP, which calls for an answer [%].
+constexpr double kWindsUp = 5.0;  // The same, whatever the noise of it [%].
+constexpr double kOftenAtLimit = 0.05;
+constexpr double kUnrelated = 0.05;  // r² of X over OP: it is all noise.
 constexpr std::size_t kFrozenSamples = 300;
 constexpr double kBlock_s = 30.0;  // Of the second witness.
-
-double Mean(std::span<const double> values) {
-  return std::accumulate(values.begin(), values.end(), 0.0) /
-         static_cast<double>(values.size());
-}
 
 std::vector<double> BlockMeans(std::span<const double> values,
                                std::size_t block) {
@@ -49,15 +45,6 @@ std::vector<double> BlockMeans(std::span<const double> values,
     means.push_back(Mean(values.subspan(k, block)));
   }
   return means;
-}
-
-Window Thinned(const Window& window, std::size_t block) {
-  Window thin = window;
-  thin.period_s *= static_cast<double>(block);
-  for (auto series : {&Window::op, &Window::pv, &Window::sp, &Window::x}) {
-    thin.*series = BlockMeans(window.*series, block);
-  }
-  return thin;
 }
 
 std::vector<double> Errors(const Window& window) {
@@ -238,19 +225,21 @@ std::string_view VerdictName(Verdict verdict) {
 
 namespace {
 
-struct Finding {
-  Verdict verdict{Verdict::kUndetermined};
-  bool sure{false};
-  std::string_view reason;
-};
+Finding AtLimit() {
+  return {Verdict::kSaturated, true, "OP is at an end of its range"};
+}
 
 // With X: it is read off X, whose only input is OP.
 Finding JudgePosition(const Evidence& e) {
-  if (e.distinct_answer == 1 && e.op_range >= kMoves) {
+  if ((e.distinct_answer == 1 && e.op_range >= kMoves) ||
+      (e.unrelated && e.op_range >= kWindsUp)) {
     return {Verdict::kNoResponse, true, "OP moves and the position stands"};
   }
   if (e.fit && e.fit->band >= kGoodBand && e.fit->explained() > kHalf) {
     return {Verdict::kStiction, true, "the position follows OP through a play"};
+  }
+  if (e.at_limit > kOftenAtLimit) {
+    return AtLimit();
   }
   return {Verdict::kUndetermined, false,
           "the position follows OP without a play"};
@@ -310,7 +299,7 @@ Finding Judge(const Window& window, const Evidence& e) {
   if (e.distinct_answer == 1 && e.op_range < kMoves) {
     return {Verdict::kUndetermined, false, "PV stands and OP hardly moves"};
   }
-  if (e.distinct_answer == 1 || e.unanswered >= 5.0) {
+  if (e.distinct_answer == 1 || e.unanswered >= kWindsUp) {
     return {Verdict::kNoResponse, true,
             "OP moves and PV does not answer: stuck, shut, isolated, or a dead "
             "transmitter"};
@@ -318,8 +307,8 @@ Finding Judge(const Window& window, const Evidence& e) {
   if (e.longest_repeat > kFrozenSamples) {
     return {Verdict::kFrozen, true, "PV repeats one reading while OP moves"};
   }
-  if (e.at_limit > 0.05) {
-    return {Verdict::kSaturated, true, "OP is at an end of its range"};
+  if (e.at_limit > kOftenAtLimit) {
+    return AtLimit();
   }
   if (e.distinct_answer < 20) {
     return {Verdict::kQuantised, true, "PV has too few values"};
@@ -350,9 +339,7 @@ Finding Judge(const Window& window, const Evidence& e) {
   return {Verdict::kUndetermined, false, "nothing stands out"};
 }
 
-}  // namespace
-
-Audit AuditWindow(const Window& window) {
+void Check(const Window& window) {
   const std::size_t n = window.op.size();
   Require(window.period_s > 0.0, "the period of a window is positive");
   Require(window.pv.size() == n, "a window has as many PV as OP");
@@ -363,50 +350,110 @@ Audit AuditWindow(const Window& window) {
         std::ranges::all_of(*series, [](double v) { return std::isfinite(v); }),
         "the values of a window are finite");
   }
-  Audit audit;
-  Evidence& e = audit.evidence;
-  e.samples = n;
-  if (n >= kMinSamples) {
-    e.op_range = RangeOf(window.op);
-    e.at_limit = ShareAtLimit(window.op);
-    e.sp_moves = MovingShare(window.sp);
-    const auto& answer = window.x.empty() ? window.pv : window.x;
-    e.distinct_answer = std::set<double>(answer.begin(), answer.end()).size();
-    e.longest_repeat = LongestRepeat(window);
-    e.unanswered = window.sp.empty() ? 0.0 : UnansweredRun(window);
-    e.oscillation = FindOscillation(window.op);
-    const ControllerFit controller = FitController(window);
-    e.controller = controller.r2;
-    e.exchanged = IsExchanged(window, controller.r2);
-    e.gain_sign = window.gain_sign != 0 ? window.gain_sign : controller.sign;
-    std::size_t block = 1;
-    if (e.oscillation && e.oscillation->period > 90.0 && n > 1500) {
-      block = std::max<std::size_t>(1, static_cast<std::size_t>(std::min(
-                                           e.oscillation->period / 40.0,
-                                           static_cast<double>(n) / 750.0)));
-    }
-    const Window thin = Thinned(window, block);
-    const bool by_x = !thin.x.empty();
-    e.fit = FitPlay(thin.op, by_x ? thin.x : thin.pv, by_x ? 1 : e.gain_sign);
-    // Of the second witness.
-    const auto more = static_cast<std::size_t>(
-        std::max(1.0, std::round(kBlock_s / window.period_s)));
-    e.prediction_gain = PlayPredictionGain(BlockMeans(window.op, more),
-                                           BlockMeans(window.pv, more));
-    e.increments = FitIncrements(thin.op, thin.pv, e.gain_sign);
-    e.integrates = window.integrating.value_or(
-        e.fit && e.increments > kIntegral && e.increments > e.fit->linear);
-    CorrelationSums sums;
-    for (std::size_t k = 0; k < n; ++k) {
-      sums.Add(window.op[k] - window.op[0], window.pv[k] - window.pv[0]);
-    }
-    e.correlation = e.gain_sign * sums.Correlation();
+}
+
+// The part of the evidence in which X, where it is measured, takes PV's place.
+void AddAnswer(const Window& window, Evidence& e) {
+  const std::size_t n = window.op.size();
+  std::vector<double> answer = window.x.empty() ? window.pv : window.x;
+  std::size_t block = 1;
+  if (e.oscillation && e.oscillation->period > 90.0 && n > 1500) {
+    block = std::max<std::size_t>(
+        1, static_cast<std::size_t>(std::min(e.oscillation->period / 40.0,
+                                             static_cast<double>(n) / 750.0)));
   }
-  const Finding finding = Judge(window, e);
-  audit.verdict = finding.verdict;
-  audit.sure = finding.sure;
-  audit.reason = finding.reason;
+  const std::vector<double> op = BlockMeans(window.op, block);
+  const std::vector<double> means = BlockMeans(answer, block);
+  const auto explains = [](const std::optional<PlayFit>& fit) {
+    return fit ? std::max(fit->linear, fit->play) : 1.0;
+  };
+  e.fit = FitPlay(op, means, window.x.empty() ? e.gain_sign : 1);
+  // Nor does it follow the other way round, as with a wrong sense.
+  e.unrelated = explains(e.fit) < kUnrelated && !window.x.empty() &&
+                explains(FitPlay(op, means, -1)) < kUnrelated;
+  e.increments = FitIncrements(op, BlockMeans(window.pv, block), e.gain_sign);
+  e.integrates = window.integrating.value_or(
+      e.fit && e.increments > kIntegral && e.increments > e.fit->linear);
+  std::ranges::sort(answer);
+  answer.erase(std::unique(answer.begin(), answer.end()), answer.end());
+  e.distinct_answer = answer.size();
+}
+
+// The second witness.
+double PredictionGain(const Window& window) {
+  const auto block = static_cast<std::size_t>(
+      std::max(1.0, std::round(kBlock_s / window.period_s)));
+  return PlayPredictionGain(BlockMeans(window.op, block),
+                            BlockMeans(window.pv, block));
+}
+
+// All but the second witness.
+Evidence EvidenceOf(const Window& window) {
+  const std::size_t n = window.op.size();
+  Evidence e;
+  e.samples = n;
+  if (n < kMinSamples) {
+    return e;
+  }
+  e.op_range = RangeOf(window.op);
+  e.at_limit = ShareAtLimit(window.op);
+  e.sp_moves = MovingShare(window.sp);
+  e.longest_repeat = LongestRepeat(window);
+  e.unanswered = window.sp.empty() ? 0.0 : UnansweredRun(window);
+  e.oscillation = FindOscillation(window.op);
+  const ControllerFit controller = FitController(window);
+  e.controller = controller.r2;
+  e.exchanged = IsExchanged(window, controller.r2);
+  e.gain_sign = window.gain_sign != 0 ? window.gain_sign : controller.sign;
+  CorrelationSums sums;
+  for (std::size_t k = 0; k < n; ++k) {
+    sums.Add(window.op[k] - window.op[0], window.pv[k] - window.pv[0]);
+  }
+  e.correlation = e.gain_sign * sums.Correlation();
+  AddAnswer(window, e);
+  return e;
+}
+
+}  // namespace
+
+Audit AuditWindow(const Window& window) {
+  Check(window);
+  Audit audit;
+  audit.evidence = EvidenceOf(window);
+  if (window.op.size() >= kMinSamples) {
+    audit.evidence.prediction_gain = PredictionGain(window);
+  }
+  static_cast<Finding&>(audit) = Judge(window, audit.evidence);
   return audit;
+}
+
+Audit AuditValve(Window window) {
+  Check(window);
+  Audit by_x;
+  by_x.evidence = EvidenceOf(window);
+  const auto judge = [&window](Audit& audit) {
+    Evidence& e = audit.evidence;
+    // The second witness is heard where the first has something to say.
+    if (window.x.empty() && e.fit && e.fit->explained() > kExplained) {
+      e.prediction_gain = PredictionGain(window);
+    }
+    static_cast<Finding&>(audit) = Judge(window, e);
+  };
+  judge(by_x);
+  if (window.x.empty() || by_x.verdict != Verdict::kUndetermined ||
+      window.pv == window.x || window.op.size() < kMinSamples) {
+    return by_x;
+  }
+  window.x.clear();
+  Audit by_flow = by_x;
+  AddAnswer(window, by_flow.evidence);
+  judge(by_flow);
+  // A play that X does not show is none of the valve.
+  return by_flow.verdict == Verdict::kStiction ||
+                 by_flow.verdict == Verdict::kUndetermined ||
+                 by_flow.verdict == Verdict::kQuantised
+             ? by_x
+             : by_flow;
 }
 
 }  // namespace fdi::loop

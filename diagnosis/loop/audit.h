@@ -60,6 +60,7 @@ struct Evidence {
   double unanswered{0.0};  ///< Longest one-way run of OP without answer [%].
   std::optional<Oscillation> oscillation;  ///< Of OP; period in samples.
   std::optional<PlayFit> fit;              ///< PV, or X, over OP.
+  bool unrelated{false};                   ///< X is noise, whatever OP does.
   double prediction_gain{0.0};             ///< LLR, the second witness.
   double increments{0.0};                  ///< r² of PV as the integral of OP.
   double correlation{0.0};  ///< Of OP and PV, times the sign of the gain.
@@ -69,10 +70,14 @@ struct Evidence {
   bool exchanged{false};
 };
 
-struct Audit {
+/// What a window says.
+struct Finding {
   Verdict verdict{Verdict::kUndetermined};
-  bool sure{false};         ///< Of stiction: two witnesses, or X, agree.
-  std::string_view reason;  ///< One sentence.
+  bool sure{false};           ///< Of stiction: two witnesses, or X, agree.
+  std::string_view reason{};  ///< One sentence.
+};
+
+struct Audit : Finding {
   Evidence evidence;
 };
 
@@ -94,5 +99,11 @@ bool IsPercent(std::span<const double> op);
 /// @throws std::invalid_argument if the series differ in length, a value is not
 ///   finite, or the period is not positive.
 Audit AuditWindow(const Window& window);
+
+/// The same verdict at less cost, for a service that audits all the time: the
+/// prediction gain is left out where it decides nothing. Where X is measured,
+/// the verdict is read off X; if that says nothing, it is what PV tells, but
+/// for stiction. Throws as AuditWindow().
+Audit AuditValve(Window window);
 
 }  // namespace fdi::loop

@@ -7,6 +7,9 @@
 #include <numeric>
 #include <vector>
 
+#include <Eigen/Dense>
+#include <unsupported/Eigen/FFT>
+
 namespace fdi::loop {
 namespace {
 
@@ -32,14 +35,13 @@ std::vector<double> WithoutTrend(std::span<const double> signal) {
 
 // Lags at which the autocorrelation crosses zero, interpolated.
 std::vector<double> Crossings(const std::vector<double>& signal) {
+  const auto n = static_cast<Eigen::Index>(signal.size());
+  const Eigen::Map<const Eigen::VectorXd> all(signal.data(), n);
   std::vector<double> crossings;
-  double before =
-      std::inner_product(signal.begin(), signal.end(), signal.begin(), 0.0);
-  for (std::size_t lag = 1;
-       lag <= signal.size() / 2 && crossings.size() < kMaxCrossings; ++lag) {
-    const double now =
-        std::inner_product(signal.begin() + static_cast<std::ptrdiff_t>(lag),
-                           signal.end(), signal.begin(), 0.0);
+  double before = all.squaredNorm();
+  for (Eigen::Index lag = 1; lag <= n / 2 && crossings.size() < kMaxCrossings;
+       ++lag) {
+    const double now = all.tail(n - lag).dot(all.head(n - lag));
     if ((before > 0.0) != (now > 0.0)) {
       crossings.push_back(static_cast<double>(lag) - now / (now - before));
     }
@@ -48,47 +50,66 @@ std::vector<double> Crossings(const std::vector<double>& signal) {
   return crossings;
 }
 
-// Σ c_j e^(iωjk) over the frequencies ωj = 2πj/N up to the 7th harmonic of 1/T.
+// Without its mean and without what is above the 7th harmonic of 1/T.
 std::vector<double> LowPassed(const std::vector<double>& signal,
                               double period) {
   const std::size_t n = signal.size();
-  const auto last = std::min(
-      n / 2,
-      static_cast<std::size_t>(kHarmonics * static_cast<double>(n) / period));
-  std::vector<double> smooth(n, 0.0);
-  for (std::size_t j = 1; j <= last; ++j) {
-    const double step = 2.0 * std::numbers::pi * static_cast<double>(j) /
-                        static_cast<double>(n);
-    // e^(iωjk) by rotation: sines and cosines would be most of an audit's time.
-    const std::complex<double> turn = std::polar(1.0, step);
-    std::complex<double> sum;
-    std::complex<double> e{1.0, 0.0};
-    for (std::size_t k = 0; k < n; ++k, e *= turn) {
-      sum += signal[k] * std::conj(e);
-    }
-    sum *= (2 * j == n ? 1.0 : 2.0) / static_cast<double>(n);
-    e = {1.0, 0.0};
-    for (std::size_t k = 0; k < n; ++k, e *= turn) {
-      smooth[k] += (sum * e).real();
+  const auto last =
+      static_cast<std::size_t>(kHarmonics * static_cast<double>(n) / period);
+  Eigen::FFT<double> transform;
+  std::vector<std::complex<double>> spectrum;
+  transform.fwd(spectrum, signal);
+  spectrum[0] = 0.0;
+  for (std::size_t j = 1; j < n; ++j) {
+    if (std::min(j, n - j) > last) {
+      spectrum[j] = 0.0;
     }
   }
+  std::vector<double> smooth;
+  transform.inv(smooth, spectrum);
   return smooth;
 }
 
-// The least Σ (y - A f)² over A for a form f.
-template <typename Form>
-double SquaredError(std::span<const double> y, Form form) {
+// The least Σ (y - A f)² over A for half a sine, and for a triangle of any
+// apex; the samples are at the middles of equal parts.
+struct ShapeErrors {
+  double sine{0.0};
+  double triangle{0.0};
+};
+ShapeErrors FitShapes(std::span<const double> y) {
+  const std::size_t n = y.size();
+  const auto at = [n](std::size_t k) {
+    return (static_cast<double>(k) + 0.5) / static_cast<double>(n);
+  };
   double yy = 0.0;
-  double yf = 0.0;
-  double ff = 0.0;
-  for (std::size_t k = 0; k < y.size(); ++k) {
-    const double f =
-        form((static_cast<double>(k) + 0.5) / static_cast<double>(y.size()));
+  double sine_y = 0.0;
+  double sines = 0.0;
+  // Of the falling side, here all of it: Σ y (1 - x), Σ (1 - x)².
+  double fall_y = 0.0;
+  double falls = 0.0;
+  for (std::size_t k = 0; k < n; ++k) {
+    const double sine = std::sin(std::numbers::pi * at(k));
     yy += y[k] * y[k];
-    yf += y[k] * f;
-    ff += f * f;
+    sine_y += y[k] * sine;
+    sines += sine * sine;
+    fall_y += y[k] * (1.0 - at(k));
+    falls += (1.0 - at(k)) * (1.0 - at(k));
   }
-  return yy - yf * yf / ff;
+  double rise_y = 0.0;  // Σ y x, Σ x².
+  double rises = 0.0;
+  double largest = 0.0;  // (Σ y f)² / Σ f²
+  for (std::size_t k = 0; k < n; ++k) {
+    const double apex = at(k);  // The first sample of the falling side.
+    const double yf = rise_y / apex + fall_y / (1.0 - apex);
+    const double ff =
+        rises / (apex * apex) + falls / ((1.0 - apex) * (1.0 - apex));
+    largest = std::max(largest, yf * yf / ff);
+    rise_y += y[k] * apex;
+    rises += apex * apex;
+    fall_y -= y[k] * (1.0 - apex);
+    falls -= (1.0 - apex) * (1.0 - apex);
+  }
+  return {yy - sine_y * sine_y / sines, yy - largest};
 }
 
 double ShapeOf(const std::vector<double>& signal) {
@@ -100,18 +121,10 @@ double ShapeOf(const std::vector<double>& signal) {
       continue;
     }
     if (begin < k && k - begin >= 3) {
-      const std::span y = std::span(signal).subspan(begin, k - begin);
-      sine += SquaredError(
-          y, [](double x) { return std::sin(std::numbers::pi * x); });
-      double best = INFINITY;
-      for (std::size_t i = 0; i < y.size(); ++i) {
-        const double apex =
-            (static_cast<double>(i) + 0.5) / static_cast<double>(y.size());
-        best = std::min(best, SquaredError(y, [apex](double x) {
-                          return x < apex ? x / apex : (1.0 - x) / (1.0 - apex);
-                        }));
-      }
-      triangle += best;
+      const ShapeErrors errors =
+          FitShapes(std::span(signal).subspan(begin, k - begin));
+      sine += errors.sine;
+      triangle += errors.triangle;
     }
     begin = k;
   }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <numeric>
 #include <span>
 #include <vector>
 
@@ -11,6 +12,12 @@ namespace fdi::loop {
 inline double RangeOf(std::span<const double> values) {
   const auto [low, high] = std::ranges::minmax_element(values);
   return *high - *low;
+}
+
+/// @param values not empty.
+inline double Mean(std::span<const double> values) {
+  return std::accumulate(values.begin(), values.end(), 0.0) /
+         static_cast<double>(values.size());
 }
 
 /// The output of a play (backlash) of width w for the input u:

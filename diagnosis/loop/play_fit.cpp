@@ -16,65 +16,103 @@ namespace {
 constexpr int kWidths = 24;
 constexpr double kNarrowest = 0.04;  // Of the range of OP.
 constexpr double kWidest = 0.90;
+constexpr std::array kSides{-0.5, 0.0, 0.5};  // Of the width: where a play is.
 constexpr std::size_t kFewestSamples = 20;
 
-// Calls visit(w, start, p) for OP itself, w = 0, and for each play of it.
+double WidthShare(int i) {
+  return kNarrowest + (kWidest - kNarrowest) * i / (kWidths - 1);
+}
+
+// Calls visit(w, p) for OP itself, w = 0, and for each play of it.
 template <typename Visit>
 void ForEachPlay(std::span<const double> op, const Visit& visit) {
-  visit(0.0, op.front(), std::vector<double>(op.begin(), op.end()));
+  visit(0.0, std::vector<double>(op.begin(), op.end()));
   const double range = RangeOf(op);
   for (int i = 0; i < kWidths; ++i) {
-    const double width =
-        range * (kNarrowest + (kWidest - kNarrowest) * i / (kWidths - 1));
-    for (const double side : {-0.5, 0.0, 0.5}) {
-      const double start = op.front() + side * width;
-      visit(width, start, PlayOf(op, width, start));
+    const double width = range * WidthShare(i);
+    for (const double side : kSides) {
+      visit(width, PlayOf(op, width, op.front() + side * width));
     }
   }
 }
 
-// The regression of y on x over pairs x(k - delay), y(k).
-struct Line {
-  double r2{0.0};
-  double offset{0.0};
-  double slope{0.0};
+// r² of the regression of y(k + delay) on x(k); 0 if its slope has another
+// sign.
+double FitLine(std::span<const double> x, std::span<const double> y,
+               std::size_t delay, int sign) {
+  using Values = Eigen::Map<const Eigen::ArrayXd>;
+  const auto n = static_cast<Eigen::Index>(y.size() - delay);
+  const Values xs(x.data(), n);
+  const Values ys(y.data() + delay, n);
+  const Eigen::ArrayXd dx = xs - xs.mean();
+  const Eigen::ArrayXd dy = ys - ys.mean();
+  const double xx = dx.matrix().squaredNorm();
+  const double yy = dy.matrix().squaredNorm();
+  const double xy = dx.matrix().dot(dy.matrix());
+  return xx <= 0.0 || yy <= 0.0 || xy * sign <= 0.0 ? 0.0 : xy * xy / (xx * yy);
+}
+
+constexpr std::array kLags{0, 2, 6};  // Of the filter, in samples.
+constexpr std::size_t kDelays = 3;    // 0, 1 and 2 samples.
+
+// A lane for each of kSides; the fourth fills up the registers.
+using Lanes = Eigen::Array4d;
+
+// Sums over z(k), OP through a play and a filter, and PV(k + delay).
+struct Sums {
+  Lanes z{Lanes::Zero()};
+  Lanes zz{Lanes::Zero()};
+  std::array<Lanes, kDelays> zy{Lanes::Zero(), Lanes::Zero(), Lanes::Zero()};
 };
-Line FitLine(std::span<const double> x, std::span<const double> y,
-             std::size_t delay, int sign) {
-  const std::size_t n = y.size() - delay;
-  double mean_x = 0.0;
-  double mean_y = 0.0;
-  for (std::size_t k = 0; k < n; ++k) {
-    mean_x += x[k];
-    mean_y += y[k + delay];
-  }
-  mean_x /= static_cast<double>(n);
-  mean_y /= static_cast<double>(n);
-  double xx = 0.0;
-  double yy = 0.0;
-  double xy = 0.0;
-  for (std::size_t k = 0; k < n; ++k) {
-    const double dx = x[k] - mean_x;
-    const double dy = y[k + delay] - mean_y;
-    xx += dx * dx;
-    yy += dy * dy;
-    xy += dx * dy;
-  }
-  if (xx <= 0.0 || yy <= 0.0 || xy * sign <= 0.0) {
-    return {};
-  }
-  return {xy * xy / (xx * yy), mean_y - mean_x * xy / xx, xy / xx};
-}
 
-// y_k = y_{k-1} + (1 - e^(-1/lag)) (x_k - y_{k-1}), y_{-1} = x_0.
-std::vector<double> Lagged(std::vector<double> x, int lag) {
-  if (lag > 0) {
-    const double share = 1.0 - std::exp(-1.0 / lag);
-    for (std::size_t k = 1; k < x.size(); ++k) {
-      x[k] = x[k - 1] + share * (x[k] - x[k - 1]);
+// y_k = y_{k-1} + (1 - e^(-1/lag)) (x_k - y_{k-1}), y_{-1} = x_0, for each lag.
+std::array<Sums, kLags.size()> SumsOf(std::span<const double> op,
+                                      std::span<const double> pv,
+                                      double width) {
+  std::array<double, kLags.size()> shares{};
+  std::ranges::transform(kLags, shares.begin(), [](int lag) {
+    return lag > 0 ? 1.0 - std::exp(-1.0 / lag) : 1.0;
+  });
+  const double half = 0.5 * width;
+  Lanes play = op.front() + width * Lanes(kSides[0], kSides[1], kSides[2], 0.0);
+  play = play.max(op.front() - half).min(op.front() + half);
+  std::array<Lanes, kLags.size()> filters{play, play, play};
+  std::array<Sums, kLags.size()> sums;
+  for (std::size_t k = 0; k + kDelays <= op.size(); ++k) {
+    play = play.max(op[k] - half).min(op[k] + half);
+    for (std::size_t i = 0; i < kLags.size(); ++i) {
+      Lanes& z = filters[i];
+      z += shares[i] * (play - z);
+      sums[i].z += z;
+      sums[i].zz += z * z;
+      for (std::size_t d = 0; d < kDelays; ++d) {
+        sums[i].zy[d] += z * pv[k + d];
+      }
     }
   }
-  return x;
+  return sums;
+}
+
+// PV(k + delay) over as many pairs: its mean, and Σ (y - mean)².
+struct Delayed {
+  double mean{0.0};
+  double square{0.0};
+};
+std::array<Delayed, kDelays> DelaysOf(std::span<const double> pv) {
+  const auto pairs = static_cast<Eigen::Index>(pv.size() + 1 - kDelays);
+  std::array<Delayed, kDelays> delays;
+  for (std::size_t d = 0; d < kDelays; ++d) {
+    const Eigen::Map<const Eigen::ArrayXd> y(pv.data() + d, pairs);
+    delays[d].mean = y.mean();
+    delays[d].square = (y - delays[d].mean).square().sum();
+  }
+  return delays;
+}
+
+std::vector<double> Without(double level, std::span<const double> values) {
+  std::vector<double> result(values.begin(), values.end());
+  std::ranges::for_each(result, [level](double& v) { v -= level; });
+  return result;
 }
 
 bool Moves(std::span<const double> values) {
@@ -90,21 +128,39 @@ std::optional<PlayFit> FitPlay(std::span<const double> op,
   }
   PlayFit fit;
   std::vector<std::pair<double, double>> errors;  // Of each width, 1 - r².
-  ForEachPlay(op, [&](double width, double start, std::vector<double> play) {
+  // About their means, so that the sums of squares lose nothing.
+  const double op_level = Mean(op);
+  const double pv_level = Mean(pv);
+  const std::vector<double> input = Without(op_level, op);
+  const std::vector<double> answer = Without(pv_level, pv);
+  const std::array<Delayed, kDelays> delays = DelaysOf(answer);
+  const auto n = static_cast<double>(op.size() + 1 - kDelays);
+  const double range = RangeOf(op);
+  for (int w = -1; w < kWidths; ++w) {
+    const double width = w < 0 ? 0.0 : range * WidthShare(w);
     double best = 0.0;
-    for (const int lag : {0, 2, 6}) {
-      const std::vector<double> z = Lagged(play, lag);
-      for (const int delay : {0, 1, 2}) {
-        const Line line = FitLine(z, pv, static_cast<std::size_t>(delay), sign);
-        best = std::max(best, line.r2);
-        if (width > 0.0 && line.r2 > fit.play) {
-          fit.play = line.r2;
+    const auto sums = SumsOf(input, answer, width);
+    for (std::size_t i = 0; i < kLags.size() * kDelays; ++i) {
+      const Sums& z = sums[i / kDelays];
+      const Delayed& y = delays[i % kDelays];
+      const Lanes xx = z.zz - z.z.square() / n;
+      const Lanes xy = z.zy[i % kDelays] - z.z * y.mean;
+      for (std::size_t side = 0; side < kSides.size(); ++side) {
+        const auto lane = static_cast<Eigen::Index>(side);
+        if (xx(lane) <= 0.0 || y.square <= 0.0 || xy(lane) * sign <= 0.0) {
+          continue;
+        }
+        const double r2 = xy(lane) * xy(lane) / (xx(lane) * y.square);
+        best = std::max(best, r2);
+        if (width > 0.0 && r2 > fit.play) {
+          fit.play = r2;
           fit.band = width;
-          fit.start = start;
-          fit.lag = lag;
-          fit.delay = delay;
-          fit.offset = line.offset;
-          fit.slope = line.slope;
+          fit.start = op.front() + kSides[side] * width;
+          fit.lag = kLags[i / kDelays];
+          fit.delay = static_cast<int>(i % kDelays);
+          fit.slope = xy(lane) / xx(lane);
+          fit.offset =
+              pv_level + y.mean - (op_level + z.z(lane) / n) * fit.slope;
         }
       }
     }
@@ -113,7 +169,7 @@ std::optional<PlayFit> FitPlay(std::span<const double> op,
     } else {
       fit.linear = best;
     }
-  });
+  }
   fit.band_low = fit.band;
   fit.band_high = fit.band;
   for (const auto& [width, error] : errors) {
@@ -127,43 +183,54 @@ std::optional<PlayFit> FitPlay(std::span<const double> op,
 
 double PlayPredictionGain(std::span<const double> op,
                           std::span<const double> pv) {
-  constexpr Eigen::Index kOrder = 4;
+  constexpr int kOrder = 4;
   const auto rows = static_cast<Eigen::Index>(pv.size()) - kOrder;
-  if (rows < 4 * kOrder || RangeOf(op) <= 0.0 || RangeOf(pv) <= 0.0) {
+  if (rows < Eigen::Index{4} * kOrder || RangeOf(op) <= 0.0 ||
+      RangeOf(pv) <= 0.0) {
     return 0.0;
   }
-  double mean = 0.0;
-  for (const double y : pv) {
-    mean += y / static_cast<double>(pv.size());
+  // Columns: PV(k-1..k-4), 1, u(k-1..k-4). What OP adds to the normal equations
+  // is new for each play.
+  using Table = Eigen::Matrix<double, Eigen::Dynamic, 2 * kOrder + 1>;
+  const auto lagged = [rows](const Eigen::VectorXd& series, int i) {
+    return series.segment(kOrder - i, rows);
+  };
+  const double mean = Mean(pv);
+  const Eigen::VectorXd readings =
+      Eigen::Map<const Eigen::VectorXd>(pv.data(), rows + kOrder).array() -
+      mean;
+  const Eigen::VectorXd output = lagged(readings, 0);
+  Table table(rows, 2 * kOrder + 1);
+  for (int i = 1; i <= kOrder; ++i) {
+    table.col(i - 1) = lagged(readings, i);
   }
-  // Columns: PV(k-1..k-4), 1, u(k-1..k-4), PV(k).
-  Eigen::MatrixXd table(rows, 2 * kOrder + 2);
-  for (Eigen::Index r = 0; r < rows; ++r) {
-    const auto k = static_cast<std::size_t>(r + kOrder);
-    for (std::size_t i = 1; i <= kOrder; ++i) {
-      table(r, static_cast<Eigen::Index>(i) - 1) = pv[k - i] - mean;
-    }
-    table(r, kOrder) = 1.0;
-    table(r, 2 * kOrder + 1) = pv[k] - mean;
-  }
+  table.col(kOrder).setOnes();
+  Eigen::Matrix<double, 2 * kOrder + 1, 2 * kOrder + 1> known;
+  known.setZero();
+  const auto fixed = table.leftCols<kOrder + 1>();
+  known.topLeftCorner<kOrder + 1, kOrder + 1>() = fixed.transpose() * fixed;
   double linear = 0.0;
   double least = std::numeric_limits<double>::infinity();
-  ForEachPlay(op, [&](double width, double, const std::vector<double>& u) {
-    for (Eigen::Index r = 0; r < rows; ++r) {
-      const auto k = static_cast<std::size_t>(r + kOrder);
-      for (std::size_t i = 1; i <= kOrder; ++i) {
-        table(r, kOrder + static_cast<Eigen::Index>(i)) = u[k - i] - op[0];
-      }
+  ForEachPlay(op, [&](double width, const std::vector<double>& play) {
+    const Eigen::VectorXd input =
+        Eigen::Map<const Eigen::VectorXd>(play.data(), rows + kOrder).array() -
+        op[0];
+    for (int i = 1; i <= kOrder; ++i) {
+      table.col(kOrder + i) = lagged(input, i);
     }
-    const auto inputs = table.leftCols(2 * kOrder + 1);
-    const auto output = table.col(2 * kOrder + 1);
+    const auto inputs = table.rightCols<kOrder>();
+    auto normal = known;
+    normal.bottomLeftCorner<kOrder, kOrder + 1>() =
+        inputs.transpose().lazyProduct(fixed);
+    normal.bottomRightCorner<kOrder, kOrder>() =
+        inputs.transpose().lazyProduct(inputs);
     // A little ridge keeps a play that stands still solvable.
-    Eigen::MatrixXd normal = inputs.transpose() * inputs;
     normal.diagonal() *= 1.0 + 1e-10;
     normal.diagonal().array() += 1e-300;
-    const Eigen::VectorXd solution =
-        normal.ldlt().solve(inputs.transpose() * output);
-    const double error = (output - inputs * solution).squaredNorm();
+    const Eigen::Matrix<double, 2 * kOrder + 1, 1> solution =
+        normal.selfadjointView<Eigen::Lower>().ldlt().solve(table.transpose() *
+                                                            output);
+    const double error = (output - table * solution).squaredNorm();
     if (width > 0.0) {
       least = std::min(least, error);
     } else {
@@ -197,7 +264,7 @@ double FitIncrements(std::span<const double> op, std::span<const double> pv,
       mean[k] = (sums[k + h] - sums[k]) / static_cast<double>(h);
     }
     for (const std::size_t delay : {0U, 1U, 3U, 6U}) {
-      best = std::max(best, FitLine(mean, rise, delay, sign).r2);
+      best = std::max(best, FitLine(mean, rise, delay, sign));
     }
   }
   return best;

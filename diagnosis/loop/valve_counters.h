@@ -93,8 +93,8 @@ std::optional<double> FigureOf(Figure figure, const ValveCounts& counts,
 ///   whatever the sample at which it is told. Turns in which CV moves by more
 ///   than 1 %/s say nothing, because X lags.
 /// - Dynamic error band: the mean of X − CV while CV falls, minus the mean
-/// while
-///   it rises, on ramps of 0.01 to 0.25 %/s, once CV has moved 2 % one way.
+///   while it rises, on ramps of 0.01 to 0.25 %/s, once CV has moved 2 % one
+///   way.
 /// - Steps: CV, which stood for 10 s (0.1 %), moves by 2 % or more from one
 ///   sample to the next and stays there (a tenth of the step) for 10 to 60 s.
 ///   x_∞ is the mean of the last quarter of that, x_∞ − x_0 the realised step,

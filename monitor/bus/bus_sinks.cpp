@@ -5,6 +5,7 @@
 
 #include "base/log.h"
 #include "diagnosis/fault_catalogue.h"
+#include "diagnosis/records/certainty.h"
 #include "storage/models/models.h"
 
 namespace fdi::monitor {
@@ -24,12 +25,7 @@ std::size_t BytesOf(const idl::DecisionMessage& message) {
 }
 
 std::string IsolatedNames(const FaultEvent& message) {
-  std::string names;
-  for (const FaultCandidate& candidate : message.candidates) {
-    if (candidate.isolated) {
-      names.append(names.empty() ? "" : "|").append(FaultName(candidate.fault));
-    }
-  }
+  const std::string names = IsolatedFaults(message);
   return names.empty() ? "unknown" : names;
 }
 

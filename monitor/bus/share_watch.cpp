@@ -105,7 +105,7 @@ void ShareWatch::Tick(const std::function<std::vector<std::string>()>& valves) {
         },
         LogLevel::kError);
   }
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   contested_ = found;
 }
 

@@ -3,10 +3,10 @@
 #include <chrono>
 #include <functional>
 #include <map>
-#include <mutex>
 #include <string>
 #include <vector>
 
+#include "base/mutex.h"
 #include "diagnosis/records/monitor_share.h"
 #include "idl/endpoint.h"
 #include "monitor/throttled_log.h"
@@ -41,7 +41,7 @@ class ShareWatch {
   void Tick(const std::function<std::vector<std::string>()>& valves);
   /// As of the last Tick(). Thread safe.
   ContestedValves contested() const {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     return contested_;
   }
 
@@ -57,8 +57,8 @@ class ShareWatch {
   idl::Publisher<MonitorShare> out_;
   idl::Subscriber<MonitorShare> in_;
   std::map<std::string, PeerShare> peers_;  // By monitor.
-  mutable std::mutex mutex_;
-  ContestedValves contested_;  // Guarded by mutex_.
+  mutable Mutex mutex_;
+  ContestedValves contested_ GUARDED_BY(mutex_);
 };
 
 }  // namespace fdi::monitor

@@ -110,7 +110,7 @@ Permission TokenGuard::Check(std::string_view token, const std::string& origin,
   if (SameSecret(token, token_)) {
     return Permission::kGranted;
   }
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   if (!failures_.Allows(origin, now)) {
     ++counts_.unread;
     return Permission::kTooMany;
@@ -125,7 +125,7 @@ Permission TokenGuard::Check(std::string_view token, const std::string& origin,
 }
 
 TokenGuard::Counts TokenGuard::counts() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return counts_;
 }
 

@@ -4,12 +4,12 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
-#include <mutex>
 #include <string>
 #include <string_view>
 #include <utility>
 
 #include "base/log.h"
+#include "base/mutex.h"
 
 namespace fdi::console {
 
@@ -64,7 +64,8 @@ class FailureLimit {
 
 /// Decides who may change something. The right token is granted always: many
 /// may share an address, as behind a proxy, and one of them must not lock the
-/// others out. Wrong ones are counted, logged with their origin, and slowed.
+/// others out. Wrong ones are counted and logged with their origin, beyond
+/// FailureLimit only counted. Its length protects the token.
 /// Thread safe.
 class TokenGuard {
  public:
@@ -88,9 +89,9 @@ class TokenGuard {
  private:
   const std::string token_;
   const LogSink log_;
-  mutable std::mutex mutex_;
-  FailureLimit failures_{FailureLimit::WhenFull::kShare};
-  Counts counts_;
+  mutable Mutex mutex_;
+  FailureLimit failures_ GUARDED_BY(mutex_){FailureLimit::WhenFull::kShare};
+  Counts counts_ GUARDED_BY(mutex_);
 };
 
 }  // namespace fdi::console

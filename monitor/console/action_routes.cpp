@@ -2,6 +2,7 @@
 #include <httplib.h>
 
 #include "base/error.h"
+#include "base/stamps.h"
 #include "base/time_units.h"
 #include "monitor/console/api.h"
 #include "storage/history/alarm.h"
@@ -62,6 +63,15 @@ Json Shelve(const Api& api, const httplib::Request& request, const Json& body) {
     throw ConfigError("minutes: expected a number above 0, at most " +
                       std::to_string(kMaxMinutes));
   }
+  const auto from = body.find("from_ms");
+  std::optional<std::int64_t> from_ns;
+  if (from != body.end() && !from->is_null()) {
+    if (!from->is_number_integer() || from->get<std::int64_t>() < 0 ||
+        from->get<std::int64_t>() > kLastStampNs / kNsPerMs) {
+      throw ConfigError("from_ms: expected ms since 1970, or null for now");
+    }
+    from_ns = from->get<std::int64_t>() * kNsPerMs;
+  }
   const std::string fault = TextOf(body, "fault");
   const storage::OperatorNote note = NoteOf(body, request, api);
   const auto time_ns = static_cast<std::int64_t>(
@@ -70,7 +80,7 @@ Json Shelve(const Api& api, const httplib::Request& request, const Json& body) {
       storage::HistoryEditor(api.sources.history)
           .Shelve(TextOf(body, "valve"),
                   fault.empty() ? std::nullopt : std::optional(fault),
-                  note.now_ns + time_ns, note));
+                  from_ns.value_or(note.now_ns) + time_ns, note, from_ns));
 }
 
 Json EndShelf(const Api& api, const httplib::Request& request,

@@ -294,14 +294,14 @@ void Admission::LogAction(const httplib::Request& request, const char* action,
       .append(" from=")
       .append(request.remote_addr);
   log_(LogLevel::kInfo, line);
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   ++counts_.actions[action];
 }
 
 void Admission::LogRefusal(const httplib::Request& request,
                            std::string_view reason, const std::string& user) {
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     ++counts_.refused[reason];
   }
   // The limit is for lines only: every refusal has been counted.
@@ -344,7 +344,7 @@ const char* Admission::mode() const {
 AdmissionCounts Admission::counts() const {
   AdmissionCounts counts;
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     counts = counts_;
   }
   counts.tokens = token_.counts();

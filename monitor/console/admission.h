@@ -4,12 +4,12 @@
 #include <filesystem>
 #include <functional>
 #include <map>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <string_view>
 
 #include "base/log.h"
+#include "base/mutex.h"
 #include "monitor/console/access.h"
 #include "monitor/console/logins.h"
 #include "monitor/throttled_log.h"
@@ -104,8 +104,8 @@ class Admission {
   std::string cookie_;
   bool https_{false};
   monitor::LogLimit refusals_{{10, std::chrono::milliseconds(10'000)}};
-  mutable std::mutex mutex_;
-  AdmissionCounts counts_;
+  mutable Mutex mutex_;
+  AdmissionCounts counts_ GUARDED_BY(mutex_);
 };
 
 }  // namespace fdi::console

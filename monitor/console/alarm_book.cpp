@@ -21,6 +21,8 @@ void AddTo(ValveAlarm& valve, const Alarm& alarm,
   valve.unacked |= alarm.state == AlarmState::kUnacked ||
                    alarm.state == AlarmState::kReturnedUnacked;
   // What is open takes the place of what its data left unconfirmed.
+  valve.active |=
+      alarm.state == AlarmState::kUnacked || alarm.state == AlarmState::kAcked;
   if (!e.ended_ns || (e.unconfirmed_ns && valve.episode.empty())) {
     valve.since_ns = e.detected_ns;
     valve.episode = e.episode_id;
@@ -30,21 +32,28 @@ void AddTo(ValveAlarm& valve, const Alarm& alarm,
     valve.strength = IsNamed(e) ? std::optional(e.strength) : std::nullopt;
     valve.unconfirmed_ns = e.unconfirmed_ns;
     valve.fault = e.fault.value_or("");
+    valve.by_audit = !e.ended_ns && e.layer == LayerName(Layer::kAudit);
     valve.certainty = storage::CertaintyOf(e);
   }
 }
 
 AlarmBook::ByValveMap ByValveOf(const std::vector<Alarm>& alarms,
                                 const std::vector<storage::Shelf>& shelves,
+                                std::int64_t now_ns,
                                 const report::FaultTexts& texts) {
   AlarmBook::ByValveMap by_valve;
   for (const Alarm& alarm : alarms) {
     AddTo(by_valve[alarm.episode.valve_id], alarm, texts);
   }
   for (const storage::Shelf& shelf : shelves) {
-    std::optional<std::int64_t>& until =
-        by_valve[shelf.valve_id].shelved_until_ns;
-    until = std::max(until.value_or(0), shelf.until_ns);
+    ValveAlarm& valve = by_valve[shelf.valve_id];
+    if (IsActive(shelf, now_ns)) {
+      valve.shelved_until_ns =
+          std::max(valve.shelved_until_ns.value_or(0), shelf.until_ns);
+    } else {
+      valve.shelf_planned_ns = std::min(
+          valve.shelf_planned_ns.value_or(shelf.from_ns), shelf.from_ns);
+    }
   }
   return by_valve;
 }
@@ -64,12 +73,12 @@ std::vector<Json> AlarmBook::Refresh(std::int64_t now_ns) {
       version_.reset();
     }
     std::vector<Json> changed = Read(*history_, now_ns);
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     away_.reset();
     return changed;
   } catch (const std::exception& error) {
     history_.reset();
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     away_ = {away_ ? away_->since_ns : now_ns, error.what()};
     throw;
   }
@@ -77,25 +86,30 @@ std::vector<Json> AlarmBook::Refresh(std::int64_t now_ns) {
 
 std::vector<Json> AlarmBook::Read(storage::History& history,
                                   std::int64_t now_ns) {
-  // Shelves expire without a commit, so the version alone is not enough.
+  // Shelves begin and end without a commit, so the version alone is not enough.
   const std::string version = history.Version();
-  if (version_ == version && now_ns < earliest_shelf_end_ns_) {
+  if (version_ == version && now_ns < next_shelf_change_ns_) {
     return {};
   }
   const std::vector<Alarm> alarms = history.AlarmList(now_ns, kMaxAlarms);
   const auto shelves = history.Shelves(now_ns);
+  std::map<std::string, std::string> last;
+  {
+    const MutexLock lock(mutex_);
+    last = rows_;
+  }
   std::map<std::string, std::string> rows;
   std::vector<Json> changed;
   for (const Alarm& alarm : alarms) {
     const std::string& id = alarm.episode.episode_id;
     Json row = AlarmJson(alarm, texts_);
     rows[id] = JsonText(row);
-    const auto known = rows_.find(id);
-    if (known == rows_.end() || known->second != rows[id]) {
+    const auto known = last.find(id);
+    if (known == last.end() || known->second != rows[id]) {
       changed.push_back(std::move(row));
     }
   }
-  for (const auto& [id, text] : rows_) {
+  for (const auto& [id, text] : last) {
     if (rows.contains(id)) {
       continue;
     }
@@ -112,15 +126,17 @@ std::vector<Json> AlarmBook::Read(storage::History& history,
     changed.clear();
   }
   version_ = version;
-  earliest_shelf_end_ns_ = std::numeric_limits<std::int64_t>::max();
+  next_shelf_change_ns_ = std::numeric_limits<std::int64_t>::max();
   for (const storage::Shelf& shelf : shelves) {
-    earliest_shelf_end_ns_ = std::min(earliest_shelf_end_ns_, shelf.until_ns);
+    next_shelf_change_ns_ =
+        std::min(next_shelf_change_ns_,
+                 IsActive(shelf, now_ns) ? shelf.until_ns : shelf.from_ns);
   }
-  ByValveMap stored = ByValveOf(alarms, shelves, texts_);
-  const std::lock_guard lock(mutex_);
+  ByValveMap stored = ByValveOf(alarms, shelves, now_ns, texts_);
+  const MutexLock lock(mutex_);
   rows_ = std::move(rows);
   stored_ = std::move(stored);
-  std::erase_if(unstored_, [this](const auto& item) {
+  std::erase_if(unstored_, [this](const auto& item) REQUIRES(mutex_) {
     return rows_.contains(item.first);
   });
   Combine();
@@ -137,14 +153,14 @@ void AlarmBook::Combine() {
 }
 
 std::shared_ptr<const AlarmBook::ByValveMap> AlarmBook::ByValve() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return by_valve_;
 }
 
 bool AlarmBook::OnEvent(const FaultEvent& event) {
   const Alarm alarm = AlarmOf(event);
   const std::string& id = alarm.episode.episode_id;
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   if (rows_.contains(id)) {
     return false;
   }
@@ -159,7 +175,7 @@ bool AlarmBook::OnEvent(const FaultEvent& event) {
 
 std::vector<Alarm> AlarmBook::UnstoredAlarms() const {
   std::vector<Alarm> alarms;
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   for (const auto& [id, alarm] : unstored_) {
     alarms.push_back(alarm);
   }
@@ -167,7 +183,7 @@ std::vector<Alarm> AlarmBook::UnstoredAlarms() const {
 }
 
 std::optional<HistoryAway> AlarmBook::away() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return away_;
 }
 

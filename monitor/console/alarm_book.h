@@ -4,11 +4,11 @@
 #include <functional>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "base/mutex.h"
 #include "monitor/console/json.h"
 #include "storage/history/history.h"
 
@@ -53,21 +53,24 @@ class AlarmBook {
 
  private:
   std::vector<Json> Read(storage::History& history, std::int64_t now_ns);
-  void Combine();
+  void Combine() REQUIRES(mutex_);
 
   OpenHistory open_;
   const report::FaultTexts& texts_;
   std::unique_ptr<storage::History> history_;
   std::optional<std::string> version_;
-  std::int64_t earliest_shelf_end_ns_{0};
+  std::int64_t next_shelf_change_ns_{0};
   bool read_{false};
 
-  mutable std::mutex mutex_;  // Guards the members below.
-  std::optional<HistoryAway> away_;
-  std::map<std::string, std::string> rows_;  // By episode, as last returned.
-  std::map<std::string, storage::Alarm> unstored_;  // By episode.
-  ByValveMap stored_;  // As by_valve_, without unstored_.
-  std::shared_ptr<const ByValveMap> by_valve_{std::make_shared<ByValveMap>()};
+  mutable Mutex mutex_;
+  std::optional<HistoryAway> away_ GUARDED_BY(mutex_);
+  std::map<std::string, std::string> rows_
+      GUARDED_BY(mutex_);  // By episode, as last returned.
+  std::map<std::string, storage::Alarm> unstored_
+      GUARDED_BY(mutex_);                 // By episode.
+  ByValveMap stored_ GUARDED_BY(mutex_);  // As by_valve_, without unstored_.
+  std::shared_ptr<const ByValveMap> by_valve_ GUARDED_BY(mutex_){
+      std::make_shared<ByValveMap>()};
 };
 
 /// The entry of a valve in `alarms`; a default one if there is none.

@@ -1,13 +1,13 @@
 #include "monitor/console/api.h"
 
 #include <cctype>
-#include <charconv>
 #include <chrono>
 #include <exception>
 
 #include <httplib.h>
 
 #include "base/error.h"
+#include "base/text.h"
 #include "storage/history/foreign_history.h"
 #include "storage/history/history_reader.h"
 
@@ -152,16 +152,13 @@ std::int64_t IntegerParameter(const httplib::Request& request, const char* name,
   if (!text) {
     return otherwise;
   }
-  std::int64_t value = 0;
-  const char* const end = text->data() + text->size();
-  const auto [stop, error] = std::from_chars(text->data(), end, value);
-  if (error != std::errc{} || stop != end || value < minimum ||
-      value > maximum) {
+  const auto value = ParseWhole<std::int64_t>(*text);
+  if (!value || *value < minimum || *value > maximum) {
     throw ConfigError(std::string(name) + "=" + *text +
                       ": expected a whole number of " +
                       std::to_string(minimum) + ".." + std::to_string(maximum));
   }
-  return value;
+  return *value;
 }
 
 std::int64_t TimeParameter(const httplib::Request& request, const char* name,

@@ -61,7 +61,7 @@ bool NeedsHistory(std::string_view path) {
   for (const std::string_view of :
        {"/api/v1/alarms", "/api/v1/history", "/api/v1/statistics",
         "/api/v1/shelf", "/api/v1/causes", "/api/v1/episodes/",
-        "/api/v1/worklist"}) {
+        "/api/v1/worklist", "/api/v1/report"}) {
     if (path.starts_with(of)) {
       return true;
     }
@@ -80,7 +80,8 @@ std::vector<monitor::HttpLane> Lanes() {
           {1, 2,
            [](std::string_view path) {
              return path.starts_with("/api/v1/episodes/") &&
-                    (path.ends_with(".svg") || path.ends_with(".png"));
+                    (path.ends_with(".svg") || path.ends_with(".png") ||
+                     path.ends_with(".html"));
            }},
           {4, 32, NeedsHistory},
           {2}};

@@ -172,7 +172,8 @@ Json Causes(const Api& api, const httplib::Request& /*request*/) {
                     {"opened_ms", Ms(cause.opened_ns)},
                     {"members", std::move(members)}});
   }
-  return {{"causes", std::move(list)}};
+  return {{"causes", std::move(list)},
+          {"note", TextOrNull(storage::TakeNote(*history))}};
 }
 
 // Operator actions have a value and who; transitions have what was decided.

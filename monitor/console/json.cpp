@@ -1,10 +1,10 @@
 #include "monitor/console/json.h"
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <string_view>
 
+#include "base/text.h"
 #include "diagnosis/fault_catalogue.h"
 #include "storage/database/database.h"
 #include "storage/history/certainty.h"
@@ -14,14 +14,6 @@ namespace {
 
 constexpr int kReadingDecimals = 4;
 constexpr int kFactorDecimals = 3;
-
-std::string KeyOf(Signal signal) {
-  std::string key(SignalName(signal));
-  std::transform(key.begin(), key.end(), key.begin(), [](unsigned char c) {
-    return static_cast<char>(std::tolower(c));
-  });
-  return key;
-}
 
 Json Reading(const TracePoint& point, Signal signal) {
   return point.sample.Has(signal)
@@ -78,7 +70,8 @@ Json RefusedJson(const ValveState& valve) {
 // That of its alarm; of a name that its alarm does not have yet, by itself.
 Json CertaintyJson(const ValveState& valve, const std::string& fault,
                    const ValveAlarm& alarm) {
-  if (valve.state == State::kNormal && !alarm.unconfirmed_ns) {
+  if (valve.state == State::kNormal && !alarm.unconfirmed_ns &&
+      !alarm.by_audit) {
     return {};
   }
   return CertaintyName(
@@ -162,21 +155,24 @@ Json TextOrNull(const std::optional<std::string>& text) {
 Json TileJson(const ValveState& valve, const ValveAlarm& alarm,
               bool newest_only) {
   const bool named = valve.isolated != 0;
-  const std::vector<std::string> faults = FaultsOf(valve);
+  const bool audited = alarm.by_audit && valve.state == State::kNormal;
+  const std::vector<std::string> faults =
+      audited ? std::vector{alarm.fault} : FaultsOf(valve);
   Json tile = {
       {"id", valve.id},
       {"state",
-       ShownState(valve.state,
+       ShownState(audited ? State::kIsolated : valve.state,
                   valve.silence == monitor::Silence::kNone ? valve.quality
                                                            : Quality::kStale,
-                  !valve.unjudged.empty())},
+                  valve.blind || !valve.unjudged.empty())},
       {"quality", QualityOf(valve)},
       {"reasons", CoverageReasonsName(valve.reasons)},
       {"missing", SignalsJson(valve.missing)},
       {"unjudged", valve.unjudged},
+      {"blind", valve.blind},
       {"refused", RefusedJson(valve)},
       {"faults", faults},
-      {"certainty", CertaintyJson(valve, storage::JoinNames(faults), alarm)},
+      {"certainty", CertaintyJson(valve, JoinText(faults, "|"), alarm)},
       {"factor", named ? Rounded(valve.factor, kFactorDecimals) : Json()},
       // As the alarm has it, if there is one.
       {"strength", alarm.strength ? Rounded(*alarm.strength, kFactorDecimals)
@@ -187,12 +183,13 @@ Json TileJson(const ValveState& valve, const ValveAlarm& alarm,
       {"unconfirmed_ms", Ms(alarm.unconfirmed_ns)},
       {"fault", TextOrNull(alarm.fault)},
       {"d0", Rounded(valve.d0, kFactorDecimals)},
-      {"drift_used", Rounded(valve.drift_used, kFactorDecimals)},
       {"stamp_ms", MsOrNull(valve.stamp_ns)},
       {"since_ms", Ms(alarm.since_ns)},
       {"episode", TextOrNull(alarm.episode)},
       {"model_set", valve.models ? Json(valve.models->model_set) : Json()},
       {"shelved_until_ms", Ms(alarm.shelved_until_ns)},
+      {"shelf_planned_ms", Ms(alarm.shelf_planned_ns)},
+      {"active", alarm.active},
       {"unacked", alarm.unacked}};
   if (!valve.monitor.empty()) {
     tile["monitor"] = valve.monitor;
@@ -215,6 +212,7 @@ Json ModelFactsJson(const ModelFacts& models) {
           {"hash", storage::EpisodeIdText(models.hash)},
           {"channels", ChannelsJson(models)},
           {"faults", models.faults},
+          {"undetectable", models.undetectable},
           {"T", models.isolation_threshold},
           {"t_k", models.isolation_samples},
           {"n_d", models.detection_samples},
@@ -226,7 +224,7 @@ Json SampleJson(const std::string& valve_id, const TracePoint& point) {
   for (std::size_t s = 0; s < kSignalCount; ++s) {
     const auto signal = static_cast<Signal>(s);
     if (point.sample.Has(signal)) {
-      sample[KeyOf(signal)] = Reading(point, signal);
+      sample[Lower(SignalName(signal))] = Reading(point, signal);
     }
   }
   sample["residuals"] = RoundedList(point.residuals, kReadingDecimals);
@@ -267,7 +265,7 @@ Json TrendJson(const ModelFacts* models, const std::string& valve_id,
     const auto signal = static_cast<Signal>(s);
     for (std::size_t i = 0;
          (present & MaskOf(signal)) != 0 && i < points.size(); ++i) {
-      trend[KeyOf(signal)].push_back(Reading(points[i], signal));
+      trend[Lower(SignalName(signal))].push_back(Reading(points[i], signal));
     }
   }
   trend["flow_unit"] = FlowUnitName(
@@ -282,28 +280,6 @@ Json GapJson(const DataGap& gap) {
           {"reason", gap.reason}};
 }
 
-Json DriftJson(const ModelFacts* models,
-               const std::vector<FollowedDrift>& drift) {
-  Json list = Json::array();
-  for (std::size_t c = 0;
-       models != nullptr && c < std::min(models->channels.size(), drift.size());
-       ++c) {
-    const FollowedDrift& d = drift[c];
-    list.push_back(
-        {{"channel", models->channels[c].name},
-         {"unit", models->channels[c].unit},
-         {"mean", Rounded(d.mean, kReadingDecimals)},
-         {"mean_bound", Rounded(d.mean_bound, kReadingDecimals)},
-         {"mean_used", Rounded(d.mean_used(), kFactorDecimals)},
-         {"mean_full_since_ms", MsOrNull(d.mean_full_ns)},
-         {"scale", Rounded(std::exp(d.log_scale), kFactorDecimals)},
-         {"scale_bound", Rounded(std::exp(d.log_scale_bound), kFactorDecimals)},
-         {"scale_used", Rounded(d.scale_used(), kFactorDecimals)},
-         {"scale_full_since_ms", MsOrNull(d.scale_full_ns)}});
-  }
-  return list;
-}
-
 Json ShelfJson(const storage::Shelf& shelf) {
   return {{"shelf_id", shelf.shelf_id},
           {"valve", shelf.valve_id},
@@ -314,7 +290,8 @@ Json ShelfJson(const storage::Shelf& shelf) {
           {"comment", shelf.comment},
           {"origin", shelf.origin},
           {"ended_ms", Ms(shelf.ended_ns)},
-          {"ended_by", TextOrNull(shelf.ended_by)}};
+          {"ended_by", TextOrNull(shelf.ended_by)},
+          {"planned_ms", Ms(shelf.planned_ns)}};
 }
 
 Json AlarmJson(const storage::Alarm& alarm, const report::FaultTexts& texts) {

@@ -31,13 +31,18 @@ Json TextOrNull(const std::optional<std::string>& text);
 struct ValveAlarm {
   std::optional<std::int64_t> since_ns;
   std::string episode;  ///< Empty: none is open.
+  bool active{false};   ///< The fault is there as far as anybody knows.
   bool unacked{false};
   std::optional<std::int64_t> shelved_until_ns;
+  std::optional<std::int64_t> shelf_planned_ns;  ///< Begin of the next one.
   // Of the active alarm.
   std::optional<Severity> severity;
   std::optional<double> strength;  ///< Nothing: it has no name.
   std::optional<std::int64_t> unconfirmed_ns;
   std::string fault;  ///< Empty: it has no name.
+  /// It is open, and of the audit: decision vectors of a model set do not show
+  /// it.
+  bool by_audit{false};
   Certainty certainty{Certainty::kNotYet};
 
   bool operator==(const ValveAlarm&) const = default;
@@ -57,9 +62,6 @@ Json SampleJson(const std::string& valve_id, const TracePoint& point);
 Json TrendJson(const ModelFacts* models, const std::string& valve_id,
                const std::vector<TracePoint>& points);
 Json GapJson(const DataGap& gap);
-/// Of the channels of `models`; empty without.
-Json DriftJson(const ModelFacts* models,
-               const std::vector<FollowedDrift>& drift);
 
 Json AlarmJson(const storage::Alarm& alarm, const report::FaultTexts& texts);
 Json AlarmsJson(const std::vector<storage::Alarm>& alarms,

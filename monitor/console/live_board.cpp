@@ -6,6 +6,7 @@
 #include <limits>
 #include <utility>
 
+#include "base/mutex.h"
 #include "base/time_units.h"
 #include "diagnosis/records/certainty.h"
 #include "monitor/trace.h"
@@ -75,26 +76,29 @@ monitor::Trace EmptyTrace() {
 struct LiveBoard::Slot {
   const ModelSet* models{nullptr};  // The diagnosis thread alone uses it.
 
-  mutable std::mutex mutex;  // Guards all that follows.
-  ValveState now;
-  bool expected{false};
-  std::uint64_t pushed{0};  // Instants so far.
-  std::deque<console::Mark> marks;
-  std::deque<DataGap> gaps;
-  std::vector<FollowedDrift> drift;
-  std::array<float, kSparkPoints> spark{};
-  std::size_t spark_count{0};
-  std::int64_t spark_stamp_ns{0};
-  std::deque<monitor::Trace> pieces;
+  mutable Mutex mutex;
+  ValveState now GUARDED_BY(mutex);
+  bool expected GUARDED_BY(mutex){false};
+  std::uint64_t pushed GUARDED_BY(mutex){0};  // Instants so far.
+  std::deque<console::Mark> marks GUARDED_BY(mutex);
+  std::deque<DataGap> gaps GUARDED_BY(mutex);
+  std::array<float, kSparkPoints> spark GUARDED_BY(mutex){};
+  std::size_t spark_count GUARDED_BY(mutex){0};
+  std::int64_t spark_stamp_ns GUARDED_BY(mutex){0};
+  std::deque<monitor::Trace> pieces GUARDED_BY(mutex);
 
-  Slot() { pieces.push_back(EmptyTrace()); }
+  explicit Slot(const std::string& id) {
+    now.id = id;
+    pieces.push_back(EmptyTrace());
+  }
 
-  void Describe(const Verdict& verdict) {
+  void Describe(const Verdict& verdict) REQUIRES(mutex) {
     now.state = verdict.state;
     now.quality = verdict.quality;
     now.silence = monitor::Silence::kNone;
     now.reasons = verdict.uncovered;
     now.intake = verdict.intake;
+    now.blind = now.quality == Quality::kLive && verdict.confidence <= 0.0;
     now.unjudged.clear();
     for (std::size_t c = 0; now.models && now.quality == Quality::kLive &&
                             c < now.models->channels.size();
@@ -118,7 +122,7 @@ struct LiveBoard::Slot {
   }
 
   // Of the valve nothing is known but when it was heard last.
-  void ShowAbsent() {
+  void ShowAbsent() REQUIRES(mutex) {
     models = nullptr;
     ValveState absent;
     absent.id = now.id;
@@ -126,22 +130,11 @@ struct LiveBoard::Slot {
     absent.silence = monitor::Silence::kStale;
     absent.version = now.version + 1;
     now = std::move(absent);
-    ShowDrift({});
     ClearTrend();
     spark_count = 0;
   }
 
-  void ShowDrift(std::span<const FollowedDrift> channels) {
-    drift.assign(channels.begin(), channels.end());
-    now.drift_used = std::numeric_limits<double>::quiet_NaN();
-    for (const FollowedDrift& channel : drift) {
-      // std::fmax() returns the other argument if one is NaN, as before the
-      // first.
-      now.drift_used = std::fmax(now.drift_used, channel.used());
-    }
-  }
-
-  void AddSpark(const Verdict& verdict) {
+  void AddSpark(const Verdict& verdict) REQUIRES(mutex) {
     // A clock that was set back begins a new line.
     if (verdict.stamp_ns < spark_stamp_ns) {
       spark_count = 0;
@@ -156,7 +149,7 @@ struct LiveBoard::Slot {
         static_cast<float>(1.0 - verdict.normal_factor);
   }
 
-  ValveState Now(std::size_t spark_points) const {
+  ValveState Now(std::size_t spark_points) const REQUIRES(mutex) {
     ValveState state = now;
     const std::size_t count =
         std::min({spark_points, spark_count, kSparkPoints});
@@ -167,7 +160,7 @@ struct LiveBoard::Slot {
   }
 
   void Push(const Sample& sample, const Verdict& verdict, int channels,
-            int faults) {
+            int faults) REQUIRES(mutex) {
     // A trace restarts where Continues() is false and would lose its instants,
     // so the new one begins in a piece of its own.
     if (pieces.back().size() > 0 &&
@@ -184,12 +177,12 @@ struct LiveBoard::Slot {
     ++pushed;
   }
 
-  void ClearTrend() {
+  void ClearTrend() REQUIRES(mutex) {
     pieces.clear();
     pieces.push_back(EmptyTrace());
   }
 
-  std::size_t instants() const {
+  std::size_t instants() const REQUIRES(mutex) {
     std::size_t count = 0;
     for (const monitor::Trace& piece : pieces) {
       count += piece.size();
@@ -198,7 +191,7 @@ struct LiveBoard::Slot {
   }
 
   /// The newest `count` instants, oldest first.
-  std::vector<TracePoint> Points(std::size_t count) const {
+  std::vector<TracePoint> Points(std::size_t count) const REQUIRES(mutex) {
     std::vector<TracePoint> points;
     std::size_t behind = instants();
     for (const monitor::Trace& piece : pieces) {
@@ -219,7 +212,7 @@ LiveBoard::~LiveBoard() = default;
 
 std::shared_ptr<LiveBoard::Slot> LiveBoard::Find(
     std::string_view valve_id) const {
-  const std::shared_lock lock(slots_mutex_);
+  const ReaderLock lock(slots_mutex_);
   const auto found = slots_.find(valve_id);
   return found == slots_.end() ? nullptr : found->second;
 }
@@ -231,9 +224,8 @@ LiveBoard::Slot& LiveBoard::At(const std::string& valve_id) {
   if (const auto slot = Find(valve_id)) {
     return *slot;
   }
-  auto slot = std::make_unique<Slot>();
-  slot->now.id = valve_id;
-  const std::unique_lock lock(slots_mutex_);
+  auto slot = std::make_unique<Slot>(valve_id);
+  const WriterLock lock(slots_mutex_);
   return *slots_.emplace(valve_id, std::move(slot)).first->second;
 }
 
@@ -248,7 +240,8 @@ std::shared_ptr<const ModelFacts> LiveBoard::Facts(const ModelSet& models) {
   return facts;
 }
 
-void LiveBoard::RecordGap(Slot& slot, const Sample& sample) {
+void LiveBoard::RecordGap(Slot& slot, const Sample& sample)
+    REQUIRES(slot.mutex) {
   const double period_s = slot.now.models ? slot.now.models->period_s : 0.0;
   const std::int64_t from_ns = slot.now.stamp_ns;
   const std::int64_t limit_ns =
@@ -259,8 +252,30 @@ void LiveBoard::RecordGap(Slot& slot, const Sample& sample) {
   }
   const DataGap gap{slot.now.id, from_ns, sample.stamp_ns, "stream"};
   PushBounded(slot.gaps, gap, kGapsOfValve);
-  const std::lock_guard lock(gaps_mutex_);
+  const MutexLock lock(gaps_mutex_);
   PushBounded(gaps_, gap, kGapsWaiting);
+}
+
+void LiveBoard::ShowLocked(Slot& slot, const Sample& sample,
+                           const Verdict& verdict,
+                           std::shared_ptr<const ModelFacts> models)
+    REQUIRES(slot.mutex) {
+  if (models != slot.now.models) {
+    slot.now.models = std::move(models);
+    slot.ClearTrend();  // Residuals and factors mean other things.
+  }
+  // Before Describe(), which overwrites the stamp of the previous sample.
+  if (sample.stamp_ns < slot.now.stamp_ns) {
+    slot.ClearTrend();  // A new source with another clock: time must ascend.
+  }
+  RecordGap(slot, sample);
+  slot.Describe(verdict);
+  slot.AddSpark(verdict);
+  const ModelFacts* const facts = slot.now.models.get();
+  slot.Push(sample, verdict,
+            facts != nullptr ? static_cast<int>(facts->channels.size()) : 0,
+            facts != nullptr ? static_cast<int>(facts->faults.size()) : 0);
+  ++slot.now.version;
 }
 
 void LiveBoard::OnVerdict(const std::string& valve_id, const Sample& sample,
@@ -270,7 +285,7 @@ void LiveBoard::OnVerdict(const std::string& valve_id, const Sample& sample,
   }
   const ModelSet* const models = outcome.models;
   Slot& slot = At(valve_id);
-  const std::lock_guard lock(slot.mutex);
+  const MutexLock lock(slot.mutex);
   auto facts = slot.now.models;
   // The pointer alone does not tell: a new set may be at the address of one
   // that was freed.
@@ -292,66 +307,36 @@ void LiveBoard::ShowRemote(const std::string& valve_id, const Verdict& verdict,
   sample.seq = verdict.seq;
   sample.stamp_ns = verdict.stamp_ns;
   Slot& slot = At(valve_id);
-  const std::lock_guard lock(slot.mutex);
+  const MutexLock lock(slot.mutex);
   slot.now.monitor = monitor;
   ShowLocked(slot, sample, verdict, std::move(models));
-}
-
-void LiveBoard::ShowLocked(Slot& slot, const Sample& sample,
-                           const Verdict& verdict,
-                           std::shared_ptr<const ModelFacts> models) {
-  if (models != slot.now.models) {
-    slot.now.models = std::move(models);
-    slot.ClearTrend();  // Residuals and factors mean other things.
-    slot.ShowDrift({});
-  }
-  // Before Describe(), which overwrites the stamp of the previous sample.
-  if (sample.stamp_ns < slot.now.stamp_ns) {
-    slot.ClearTrend();  // A new source with another clock: time must ascend.
-  }
-  RecordGap(slot, sample);
-  slot.Describe(verdict);
-  slot.AddSpark(verdict);
-  const ModelFacts* const facts = slot.now.models.get();
-  slot.Push(sample, verdict,
-            facts != nullptr ? static_cast<int>(facts->channels.size()) : 0,
-            facts != nullptr ? static_cast<int>(facts->faults.size()) : 0);
-  ++slot.now.version;
 }
 
 void LiveBoard::OnSilence(const std::string& valve_id,
                           monitor::Silence silence) {
   Slot& slot = At(valve_id);
-  const std::lock_guard lock(slot.mutex);
+  const MutexLock lock(slot.mutex);
   slot.now.silence = silence;
   ++slot.now.version;
-}
-
-// The next sample tells that something changed.
-void LiveBoard::OnDrift(const std::string& valve_id,
-                        std::span<const FollowedDrift> drift) {
-  Slot& slot = At(valve_id);
-  const std::lock_guard lock(slot.mutex);
-  slot.ShowDrift(drift);
 }
 
 void LiveBoard::ShowMonitorSilence(const std::string& valve_id,
                                    std::int64_t heard_ns) {
   Slot& slot = At(valve_id);
-  const std::lock_guard lock(slot.mutex);
+  const MutexLock lock(slot.mutex);
   slot.now.silence = monitor::Silence::kMonitor;
   slot.now.heard_ns = heard_ns;
   ++slot.now.version;
 }
 
 void LiveBoard::OnRemoved(const std::string& valve_id, Checkpoint& /*last*/) {
-  const std::unique_lock lock(slots_mutex_);
+  const WriterLock lock(slots_mutex_);
   const auto found = slots_.find(valve_id);
   if (found == slots_.end()) {
     return;
   }
   const std::shared_ptr<Slot> slot = found->second;  // Outlives its lock.
-  const std::lock_guard slot_lock(slot->mutex);
+  const MutexLock slot_lock(slot->mutex);
   if (slot->expected) {
     slot->ShowAbsent();
   } else {
@@ -360,17 +345,16 @@ void LiveBoard::OnRemoved(const std::string& valve_id, Checkpoint& /*last*/) {
 }
 
 void LiveBoard::Expect(const std::string& valve_id, std::int64_t last_ns) {
-  const std::unique_lock lock(slots_mutex_);
+  const WriterLock lock(slots_mutex_);
   std::shared_ptr<Slot>& slot = slots_[valve_id];
   const bool is_new = slot == nullptr;
   if (is_new) {
-    slot = std::make_shared<Slot>();
-    slot->now.id = valve_id;
-    slot->now.stamp_ns = last_ns;
+    slot = std::make_shared<Slot>(valve_id);
   }
-  const std::lock_guard slot_lock(slot->mutex);
+  const MutexLock slot_lock(slot->mutex);
   slot->expected = true;
   if (is_new) {
+    slot->now.stamp_ns = last_ns;
     slot->ShowAbsent();
   }
 }
@@ -380,7 +364,7 @@ void LiveBoard::AddMark(const FaultEvent& event) {
   if (slot == nullptr) {
     return;  // An episode of an earlier session, of a valve that is silent.
   }
-  const std::lock_guard lock(slot->mutex);
+  const MutexLock lock(slot->mutex);
   PushBounded(
       slot->marks,
       console::Mark{event.transition.stamp_ns, event.transition.kind,
@@ -398,10 +382,10 @@ void LiveBoard::AddMark(const FaultEvent& event) {
 
 std::vector<ValveState> LiveBoard::Valves(bool spark) const {
   std::vector<ValveState> valves;
-  const std::shared_lock lock(slots_mutex_);
+  const ReaderLock lock(slots_mutex_);
   valves.reserve(slots_.size());
   for (const auto& [id, slot] : slots_) {
-    const std::lock_guard slot_lock(slot->mutex);
+    const MutexLock slot_lock(slot->mutex);
     valves.push_back(slot->Now(spark ? kSparkPoints : 1));
   }
   return valves;
@@ -413,13 +397,12 @@ std::optional<LiveTrend> LiveBoard::Trend(std::string_view valve_id,
   if (slot == nullptr) {
     return std::nullopt;
   }
-  const std::lock_guard lock(slot->mutex);
+  const MutexLock lock(slot->mutex);
   return LiveTrend{slot->Now(kSparkPoints),
                    slot->Points(instants),
                    {slot->marks.begin(), slot->marks.end()},
                    {slot->gaps.begin(), slot->gaps.end()},
-                   slot->pushed,
-                   slot->drift};
+                   slot->pushed};
 }
 
 std::optional<LiveTrend> LiveBoard::Since(std::string_view valve_id,
@@ -428,7 +411,7 @@ std::optional<LiveTrend> LiveBoard::Since(std::string_view valve_id,
   if (slot == nullptr) {
     return std::nullopt;
   }
-  const std::lock_guard lock(slot->mutex);
+  const MutexLock lock(slot->mutex);
   LiveTrend trend;
   trend.next = slot->pushed;
   if (next < slot->pushed) {
@@ -439,7 +422,7 @@ std::optional<LiveTrend> LiveBoard::Since(std::string_view valve_id,
 }
 
 std::vector<DataGap> LiveBoard::TakeGaps() {
-  const std::lock_guard lock(gaps_mutex_);
+  const MutexLock lock(gaps_mutex_);
   std::vector<DataGap> gaps(gaps_.begin(), gaps_.end());
   gaps_.clear();
   return gaps;
@@ -447,9 +430,9 @@ std::vector<DataGap> LiveBoard::TakeGaps() {
 
 std::size_t LiveBoard::bytes() const {
   std::size_t bytes = 0;
-  const std::shared_lock lock(slots_mutex_);
+  const ReaderLock lock(slots_mutex_);
   for (const auto& [id, slot] : slots_) {
-    const std::lock_guard slot_lock(slot->mutex);
+    const MutexLock slot_lock(slot->mutex);
     bytes += sizeof(Slot);
     for (const monitor::Trace& piece : slot->pieces) {
       bytes += piece.bytes();

@@ -2,18 +2,14 @@
 
 #include <cstdint>
 #include <deque>
-#include <limits>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <optional>
-#include <shared_mutex>
-#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "diagnosis/followed_drift.h"
+#include "base/mutex.h"
 #include "monitor/console/model_facts.h"
 #include "monitor/sinks.h"
 
@@ -34,14 +30,12 @@ struct ValveState {
   Intake intake{Intake::kAccepted};     ///< Of the newest sample.
   SignalMask refused{0};                ///< Because of these signals.
   std::vector<std::string> unjudged{};  ///< Channels that abstain now.
+  bool blind{false};  ///< Every known fault looks normal to the model set.
   FaultSet isolated{0};
   double factor{0.0};    ///< The largest of the isolated set [-].
   double strength{0.0};  ///< Estimated, of that fault; signed [-].
   double d0{0.0};
   std::int64_t stamp_ns{0};
-  /// The largest share of its bounds that a drift has used, which the limits
-  /// followed [-]; NaN if that is not known.
-  double drift_used{std::numeric_limits<double>::quiet_NaN()};
   std::vector<double> spark;  ///< 1 − d_0, each second or slower; last newest.
   std::string monitor;        ///< On the page of a plant: who judges it,
   std::int64_t heard_ns{0};   ///< and, once that is silent, since when.
@@ -60,9 +54,8 @@ struct LiveTrend {
   ValveState now;
   std::vector<TracePoint> points;  ///< Oldest first.
   std::vector<Mark> marks;
-  std::vector<DataGap> gaps;           ///< Of this valve, in its stream.
-  std::uint64_t next{0};               ///< For LiveBoard::Since().
-  std::vector<FollowedDrift> drift{};  ///< By channel; empty: not known.
+  std::vector<DataGap> gaps;  ///< Of this valve, in its stream.
+  std::uint64_t next{0};      ///< For LiveBoard::Since().
 };
 
 /// The last-value cache of the console: the state of each valve and its last
@@ -85,8 +78,6 @@ class LiveBoard : public monitor::ValveListener {
                  const monitor::ValveOutcome& outcome) override;
   void OnSilence(const std::string& valve_id,
                  monitor::Silence silence) override;
-  void OnDrift(const std::string& valve_id,
-               std::span<const FollowedDrift> drift) override;
   void OnRemoved(const std::string& valve_id, Checkpoint& last) override;
 
   /// A valve that ought to be there: it is listed as silent until it sends, and
@@ -128,13 +119,14 @@ class LiveBoard : public monitor::ValveListener {
                   std::shared_ptr<const ModelFacts> models);
   void RecordGap(Slot& slot, const Sample& sample);
 
-  mutable std::shared_mutex slots_mutex_;
-  std::map<std::string, std::shared_ptr<Slot>, std::less<>> slots_;
+  mutable SharedMutex slots_mutex_;
+  std::map<std::string, std::shared_ptr<Slot>, std::less<>> slots_
+      GUARDED_BY(slots_mutex_);
   // By content hash. The diagnosis thread alone uses it.
   std::map<std::uint64_t, std::weak_ptr<const ModelFacts>> facts_;
 
-  std::mutex gaps_mutex_;
-  std::deque<DataGap> gaps_;
+  Mutex gaps_mutex_;
+  std::deque<DataGap> gaps_ GUARDED_BY(gaps_mutex_);
 };
 
 }  // namespace fdi::console

@@ -118,7 +118,6 @@ Json Trend(const Api& api, const httplib::Request& request) {
                              {"kind", TransitionName(mark.kind)},
                              {"text", mark.text}});
   }
-  json["drift"] = DriftJson(trend->now.models.get(), trend->drift);
   json["words"] =
       api.Words(trend->now.models.get(),
                 trend->points.empty() ? nullptr : &trend->points.back());

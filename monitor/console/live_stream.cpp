@@ -36,7 +36,7 @@ Message StreamEvent(const std::string& name, const std::string& data) {
 std::shared_ptr<LiveStream::Client> LiveStream::Admit(const std::string& valve,
                                                       std::uint64_t next_sample,
                                                       const Message& hello) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   if (closed_ || clients_.size() >= options_.max_clients) {
     ++counts_.refused;
     return nullptr;
@@ -50,11 +50,11 @@ std::shared_ptr<LiveStream::Client> LiveStream::Admit(const std::string& valve,
 }
 
 void LiveStream::Release(const std::shared_ptr<Client>& client) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   std::erase(clients_, client);
 }
 
-// Call with the mutex locked. A single message may exceed max_bytes.
+// A single message may exceed max_bytes.
 void LiveStream::Push(Client& client, const Message& message) {
   if (client.ended) {
     return;
@@ -77,7 +77,7 @@ void LiveStream::Push(Client& client, const Message& message) {
 
 LiveStream::Outcome LiveStream::Next(Client& client, milliseconds timeout,
                                      Message& message) {
-  std::unique_lock lock(mutex_);
+  MutexLock lock(mutex_);
   changed_.wait_for(lock, timeout, [&client] {
     return client.ended || !client.queue.empty();
   });
@@ -94,14 +94,14 @@ LiveStream::Outcome LiveStream::Next(Client& client, milliseconds timeout,
 }
 
 void LiveStream::Broadcast(const Message& message) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   for (const auto& client : clients_) {
     Push(*client, message);
   }
 }
 
 StreamCounts LiveStream::counts() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   StreamCounts counts = counts_;
   counts.clients = clients_.size();
   return counts;
@@ -119,7 +119,7 @@ void LiveStream::Start(FeedParts parts) {
 }
 
 void LiveStream::Close() {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   closed_ = true;
   for (const auto& client : clients_) {
     client->ended = true;
@@ -137,13 +137,13 @@ void LiveStream::Stop() {
 }
 
 void LiveStream::Wake() {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   woken_ = true;
   changed_.notify_all();
 }
 
 void LiveStream::AddUnstored(const FaultEvent& event) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   if (unstored_.size() < kUnstoredLimit) {
     unstored_.push_back(event);
   }
@@ -153,9 +153,10 @@ void LiveStream::AddUnstored(const FaultEvent& event) {
 void LiveStream::Run() {
   while (true) {
     {
-      std::unique_lock lock(mutex_);
-      changed_.wait_for(lock, kTick,
-                        [this] { return closed_ || !unstored_.empty(); });
+      MutexLock lock(mutex_);
+      changed_.wait_for(lock, kTick, [this]() REQUIRES(mutex_) {
+        return closed_ || !unstored_.empty();
+      });
       if (closed_) {
         return;
       }
@@ -177,8 +178,9 @@ void LiveStream::FollowAlarms() {
   std::string reason;
   while (true) {
     {
-      std::unique_lock lock(mutex_);
-      changed_.wait_for(lock, pause, [this] { return closed_ || woken_; });
+      MutexLock lock(mutex_);
+      changed_.wait_for(
+          lock, pause, [this]() REQUIRES(mutex_) { return closed_ || woken_; });
       if (closed_) {
         return;
       }
@@ -227,7 +229,7 @@ void LiveStream::Step(std::chrono::steady_clock::time_point now) {
 void LiveStream::SendUnstored() {
   std::vector<FaultEvent> unstored;
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     unstored.swap(unstored_);
   }
   for (const FaultEvent& event : unstored) {
@@ -241,7 +243,7 @@ void LiveStream::SendSamples() {
   // that leaves meanwhile is kept by its pointer.
   std::vector<std::shared_ptr<Client>> clients;
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     clients = clients_;
   }
   for (const auto& client : clients) {
@@ -256,7 +258,7 @@ void LiveStream::SendSamples() {
     }
     if (!samples.empty()) {
       const Message message = StreamEvent("sample", JsonText(samples));
-      const std::lock_guard lock(mutex_);
+      const MutexLock lock(mutex_);
       Push(*client, message);
     }
   }

@@ -1,19 +1,18 @@
 #pragma once
 
 #include <chrono>
-#include <condition_variable>
 #include <cstdint>
 #include <deque>
 #include <functional>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <thread>
 #include <utility>
 #include <vector>
 
 #include "base/log.h"
+#include "base/mutex.h"
 #include "monitor/console/alarm_book.h"
 #include "monitor/console/live_board.h"
 
@@ -101,7 +100,7 @@ class LiveStream {
   void SendUnstored();
   void SendSamples();
   void SendTiles();
-  void Push(Client& client, const Message& message);
+  void Push(Client& client, const Message& message) REQUIRES(mutex_);
 
   const StreamOptions options_;
   std::unique_ptr<FeedParts> parts_;
@@ -109,13 +108,13 @@ class LiveStream {
   std::map<std::string, std::pair<std::uint64_t, ValveAlarm>> sent_;
   std::chrono::steady_clock::time_point next_tiles_;
 
-  mutable std::mutex mutex_;  // Guards what follows and all Client fields.
-  std::condition_variable changed_;
-  std::vector<std::shared_ptr<Client>> clients_;
-  StreamCounts counts_;
-  std::vector<FaultEvent> unstored_;
-  bool woken_{false};
-  bool closed_{false};
+  mutable Mutex mutex_;  // Also of all Client fields.
+  CondVar changed_;
+  std::vector<std::shared_ptr<Client>> clients_ GUARDED_BY(mutex_);
+  StreamCounts counts_ GUARDED_BY(mutex_);
+  std::vector<FaultEvent> unstored_ GUARDED_BY(mutex_);
+  bool woken_ GUARDED_BY(mutex_){false};
+  bool closed_ GUARDED_BY(mutex_){false};
   std::thread thread_;
   std::thread alarms_thread_;
 };

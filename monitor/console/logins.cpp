@@ -21,7 +21,7 @@ Logins::Outcome Logins::LogIn(const std::string& name,
   std::string hash = dummy_hash_;
   const std::string asked = origin + ' ' + name.substr(0, kMaxName);
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (!failures_.Allows(asked, now)) {
       return Outcome::kTooMany;
     }
@@ -31,7 +31,7 @@ Logins::Outcome Logins::LogIn(const std::string& name,
     }
   }
   const bool fits = PasswordFits(password, hash) && hash != dummy_hash_;
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   const auto user = users_.find(name);  // May have changed during the hash.
   if (!fits || user == users_.end() || user->second.hash != hash) {
     failures_.Add(asked, now);
@@ -48,7 +48,7 @@ Logins::Outcome Logins::LogIn(const std::string& name,
 }
 
 void Logins::LogOut(std::string_view session) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   std::erase_if(sessions_, [session](const Session& each) {
     return SameSecret(session, each.secret);
   });
@@ -56,7 +56,7 @@ void Logins::LogOut(std::string_view session) {
 
 std::optional<Visitor> Logins::OfSession(std::string_view session,
                                          Clock::time_point now) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   std::erase_if(sessions_, [now](const Session& each) {
     return now - each.used >= kIdleLimit;
   });
@@ -70,7 +70,7 @@ std::optional<Visitor> Logins::OfSession(std::string_view session,
 }
 
 std::optional<Visitor> Logins::OfName(std::string_view name) const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   const auto user = users_.find(name);
   return user == users_.end()
              ? std::nullopt
@@ -78,16 +78,16 @@ std::optional<Visitor> Logins::OfName(std::string_view name) const {
 }
 
 void Logins::Take(Users users) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   users_ = std::move(users);
-  std::erase_if(sessions_, [this](const Session& each) {
+  std::erase_if(sessions_, [this](const Session& each) REQUIRES(mutex_) {
     const auto user = users_.find(each.name);
     return user == users_.end() || user->second.hash != each.hash;
   });
 }
 
 std::size_t Logins::sessions() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return sessions_.size();
 }
 

@@ -2,12 +2,12 @@
 
 #include <chrono>
 #include <cstddef>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "base/mutex.h"
 #include "monitor/console/access.h"
 #include "monitor/console/users.h"
 
@@ -57,10 +57,11 @@ class Logins {
   };
 
   const std::string dummy_hash_;  // Dummy hash for unknown names; equally slow.
-  mutable std::mutex mutex_;
-  Users users_;
-  std::vector<Session> sessions_;
-  FailureLimit failures_{FailureLimit::WhenFull::kReplaceOldest};
+  mutable Mutex mutex_;
+  Users users_ GUARDED_BY(mutex_);
+  std::vector<Session> sessions_ GUARDED_BY(mutex_);
+  FailureLimit failures_ GUARDED_BY(mutex_){
+      FailureLimit::WhenFull::kReplaceOldest};
 };
 
 }  // namespace fdi::console

@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "base/error.h"
+#include "base/text.h"
 #include "diagnosis/fault_catalogue.h"
 #include "storage/models/models.h"
 
@@ -79,11 +80,9 @@ std::string Fitting(const ModelFacts& models, const TracePoint& point,
                    [&](std::size_t a, std::size_t b) {
                      return point.factors[a] > point.factors[b];
                    });
-  std::string text;
-  for (const std::size_t f : fitting) {
-    text.append(text.empty() ? "" : ", ").append(name(models.faults[f]));
-  }
-  return text.empty() ? "no known fault fits" : "fits: " + text;
+  const auto name_of = [&](std::size_t f) { return name(models.faults[f]); };
+  return fitting.empty() ? "no known fault fits"
+                         : "fits: " + JoinText(fitting, ", ", name_of);
 }
 
 }  // namespace
@@ -100,6 +99,9 @@ std::shared_ptr<const ModelFacts> FactsOf(const ModelSet& models) {
   for (const int fault : models.faults) {
     facts->faults.push_back(FaultName(fault));
   }
+  for (const int fault : models.undetectable) {
+    facts->undetectable.push_back(FaultName(fault));
+  }
   facts->isolation_threshold = models.decision.isolation_threshold;
   facts->isolation_samples = models.decision.isolation_samples;
   facts->detection_samples = models.decision.detection_samples;
@@ -111,7 +113,7 @@ std::shared_ptr<const ModelFacts> FactsOf(const ModelSet& models) {
 
 std::shared_ptr<const ModelFacts> StoredModels::For(
     const storage::Episode& episode) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   const auto known = known_.find(episode.model_set);
   if (known != known_.end() && known->second->hash == episode.model_hash) {
     return known->second;
@@ -132,7 +134,7 @@ std::shared_ptr<const ModelFacts> StoredModels::For(
 }
 
 void StoredModels::Add(std::shared_ptr<const ModelFacts> facts) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   Cache(std::move(facts));
 }
 

@@ -5,11 +5,11 @@
 #include <functional>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "base/mutex.h"
 #include "diagnosis/model_set.h"
 #include "diagnosis/records/trace_point.h"
 #include "storage/history/episode.h"
@@ -29,9 +29,10 @@ struct ModelFacts {
   std::uint64_t hash{0};
   std::vector<Channel> channels;
   std::vector<std::string> faults;  ///< "f19", ... by bit of a FaultSet.
-  double isolation_threshold{0.7};  ///< T
-  int isolation_samples{20};        ///< t_k
-  int detection_samples{2};         ///< n_d
+  std::vector<std::string> undetectable{};  ///< Those that look normal.
+  double isolation_threshold{0.7};          ///< T
+  int isolation_samples{20};                ///< t_k
+  int detection_samples{2};                 ///< n_d
   double period_s{1.0};
   FlowUnit flow_unit{FlowUnit::kM3PerHour};
   SignalMask required{0};  ///< Signals that the set needs.
@@ -54,11 +55,12 @@ class StoredModels {
   void Add(std::shared_ptr<const ModelFacts> facts);
 
  private:
-  void Cache(std::shared_ptr<const ModelFacts> facts);
+  void Cache(std::shared_ptr<const ModelFacts> facts) REQUIRES(mutex_);
 
   std::filesystem::path path_;
-  std::mutex mutex_;
-  std::map<std::string, std::shared_ptr<const ModelFacts>> known_;
+  Mutex mutex_;
+  std::map<std::string, std::shared_ptr<const ModelFacts>> known_
+      GUARDED_BY(mutex_);
 };
 
 /// "DETECTED", "ISOLATED", or where the engine reports NORMAL: "NOT_JUDGED" for

@@ -6,10 +6,8 @@
 #include <cerrno>
 #include <charconv>
 #include <chrono>
-#include <condition_variable>
 #include <deque>
 #include <list>
-#include <mutex>
 #include <optional>
 #include <stdexcept>
 #include <system_error>
@@ -24,6 +22,7 @@
 #include <unistd.h>
 
 #include "base/error.h"
+#include "base/mutex.h"
 #include "monitor/http/request_head.h"
 
 namespace fdi::monitor {
@@ -288,14 +287,14 @@ class HttpServer::Gate : public httplib::Server {
     // thread between its check and its wait would miss the notification
     // otherwise.
     stop();
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     ended_ = true;
     changed_.notify_all();
     Wake();
   }
 
   Counts counts() const {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     return counts_;
   }
 
@@ -306,7 +305,7 @@ class HttpServer::Gate : public httplib::Server {
     // Read before the lock is taken. Sessions of the old context go on, because
     // each holds a reference to it.
     auto tls = std::make_unique<const TlsContext>(*options_.tls);
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     tls_ = std::move(tls);
     return tls_->days_left();
   }
@@ -320,12 +319,13 @@ class HttpServer::Gate : public httplib::Server {
 
   // Called by the accepting thread.
   bool process_and_close_socket(socket_t socket) override {
-    std::unique_lock lock(mutex_);
+    MutexLock lock(mutex_);
     Client client{Socket(socket, tls_.get()), Clock::now() + kRequestPatience};
     // While the accepting thread waits, further connections stay in the backlog
     // of the kernel instead of being dropped.
-    changed_.wait(lock,
-                  [this] { return ended_ || accepted_.size() < kMaxAccepted; });
+    changed_.wait(lock, [this]() REQUIRES(mutex_) {
+      return ended_ || accepted_.size() < kMaxAccepted;
+    });
     accepted_.push_back(std::move(client));
     Wake();
     return true;
@@ -336,7 +336,7 @@ class HttpServer::Gate : public httplib::Server {
   }
 
   void Count(std::string_view what) {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     ++counts_[what];
   }
 
@@ -367,7 +367,7 @@ class HttpServer::Gate : public httplib::Server {
   }
 
   void TakeAccepted() {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (accepted_.empty()) {
       return;
     }
@@ -445,7 +445,7 @@ class HttpServer::Gate : public httplib::Server {
     client.bytes.resize(head.size + head.body_size);
     for (Lane& lane : lanes_) {
       if (!lane.options.takes || lane.options.takes(head.path)) {
-        const std::lock_guard lock(mutex_);
+        const MutexLock lock(mutex_);
         if (lane.waiting.size() < lane.options.waiting) {
           lane.waiting.push_back(std::move(client));
           changed_.notify_all();
@@ -484,7 +484,7 @@ class HttpServer::Gate : public httplib::Server {
   }
 
   void Answer(Lane& lane) {
-    std::unique_lock lock(mutex_);
+    MutexLock lock(mutex_);
     while (true) {
       changed_.wait(lock, [&] { return ended_ || !lane.waiting.empty(); });
       if (ended_) {
@@ -498,7 +498,7 @@ class HttpServer::Gate : public httplib::Server {
       try {
         Process(stream);
       } catch (const std::exception&) {  // No memory, say; the client sees it.
-        const std::lock_guard again(mutex_);
+        const MutexLock again(mutex_);
         --counts_["answered"];
         ++counts_["failed"];
       }
@@ -529,14 +529,15 @@ class HttpServer::Gate : public httplib::Server {
   std::vector<std::thread> threads_;
   std::atomic<bool> ended_{false};
 
-  mutable std::mutex mutex_;
-  std::unique_ptr<const TlsContext> tls_;  // Null: plain HTTP.
-  std::condition_variable changed_;
-  std::deque<Client> accepted_;
-  Counts counts_{{"answered", 0}, {"malformed", 0}, {"too_large", 0},
-                 {"encoded", 0},  {"host", 0},      {"slow", 0},
-                 {"failed", 0},   {"busy", 0},      {"left", 0},
-                 {"tls", 0}};
+  mutable Mutex mutex_;
+  std::unique_ptr<const TlsContext> tls_
+      GUARDED_BY(mutex_);  // Null: plain HTTP.
+  CondVar changed_;
+  std::deque<Client> accepted_ GUARDED_BY(mutex_);
+  Counts counts_ GUARDED_BY(mutex_){
+      {"answered", 0}, {"malformed", 0}, {"too_large", 0}, {"encoded", 0},
+      {"host", 0},     {"slow", 0},      {"failed", 0},    {"busy", 0},
+      {"left", 0},     {"tls", 0}};
 };
 
 HttpServer::HttpServer(const HttpServerOptions& options)

@@ -9,6 +9,8 @@
 #include <arpa/inet.h>
 #include <unistd.h>
 
+#include "base/text.h"
+
 // What is accepted leaves out the parts of RFC 9112 that the library, or a
 // proxy in front, may read differently than they are read here:
 //
@@ -44,14 +46,6 @@ constexpr Refusal kHeaders{
     431, "Request Header Fields Too Large",
     "expected at most 100 headers and 16384 bytes before the body",
     "too_large"};
-
-std::string Lower(std::string_view text) {
-  std::string lower(text);
-  std::transform(
-      lower.begin(), lower.end(), lower.begin(),
-      [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return lower;
-}
 
 std::string_view Trimmed(std::string_view text) {
   const std::size_t begin = text.find_first_not_of(" \t");

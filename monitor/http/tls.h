@@ -51,7 +51,7 @@ class TlsContext {
  public:
   /// @throws PassingError for a certificate that is not valid yet.
   /// @throws ConfigError naming the option and the file: a certificate that
-  ///   cannot be read, has expired or is not valid yet; a key that others can
+  ///   cannot be read or has expired; a key that others can
   ///   read, that needs a passphrase or that is of another certificate.
   explicit TlsContext(const TlsFiles& files);
 

@@ -25,7 +25,7 @@ std::future<std::optional<loop::Audit>> AuditWorker::Submit(
     loop::Window window) {
   Task task{std::move(window)};
   auto answer = task.answer.get_future();
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   if (stop_.stop_requested()) {
     task.answer.set_value(std::nullopt);
   } else {
@@ -42,7 +42,7 @@ void AuditWorker::Start() {
 void AuditWorker::Stop() {
   stop_.request_stop();
   thread_.Join();
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   for (Task& task : waiting_) {
     task.answer.set_value(std::nullopt);
   }
@@ -54,9 +54,10 @@ void AuditWorker::Work() {
   constexpr int kNice = 10;
   setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), kNice);
   const std::stop_token stop = stop_.get_token();
-  std::unique_lock lock(mutex_);
-  while (arrival_.wait(lock, stop, [this] { return !waiting_.empty(); }) &&
-         !stop.stop_requested()) {
+  MutexLock lock(mutex_);
+  while (arrival_.wait(lock, stop, [this]() REQUIRES(mutex_) {
+    return !waiting_.empty();
+  }) && !stop.stop_requested()) {
     Task task = std::move(waiting_.front());
     waiting_.pop_front();
     working_ = true;

@@ -4,10 +4,10 @@
 #include <cstddef>
 #include <deque>
 #include <future>
-#include <mutex>
 #include <optional>
 #include <stop_token>
 
+#include "base/mutex.h"
 #include "base/worker.h"
 #include "diagnosis/loop/audit.h"
 
@@ -24,15 +24,19 @@ class AuditWorker {
   /// 17 kB each.
   static constexpr std::size_t kCapacity = 256;
 
-  AuditWorker() = default;
+  /// @param beside_models also valves with a model set are to be audited.
+  explicit AuditWorker(bool beside_models = false)
+      : beside_models_(beside_models) {}
   ~AuditWorker() { stop_.request_stop(); }
   AuditWorker(const AuditWorker&) = delete;
   AuditWorker& operator=(const AuditWorker&) = delete;
 
+  bool beside_models() const { return beside_models_; }
+
   /// Whether a window would be taken now; one thread that asks and submits can
   /// rely on it.
   bool has_room() const {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     return waiting_.size() < kCapacity;
   }
   /// An audit that fails, or is given up at a stop, is answered with nothing.
@@ -40,7 +44,7 @@ class AuditWorker {
 
   /// Windows wait, or one is being audited.
   bool busy() const {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     return working_ || !waiting_.empty();
   }
 
@@ -58,11 +62,12 @@ class AuditWorker {
 
   void Work();
 
+  bool beside_models_;
   std::stop_source stop_;
-  mutable std::mutex mutex_;  // Guards what follows.
+  mutable Mutex mutex_;
   std::condition_variable_any arrival_;
-  std::deque<Task> waiting_;
-  bool working_{false};
+  std::deque<Task> waiting_ GUARDED_BY(mutex_);
+  bool working_ GUARDED_BY(mutex_){false};
   Worker thread_;  // Last: it uses what is above.
 };
 

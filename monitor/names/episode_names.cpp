@@ -140,6 +140,7 @@ void EpisodeNames::RequestLook(simulator::LookTask task) {
   key.window.detection = task.window.detection;
   key.detection_stamp_ns = task.detection_stamp_ns;
   key.set_back_ns = task.set_back_ns;
+  key.slowness = task.slowness;
   pending_looks_.push_back(
       {std::move(key), worker_->Submit(valve_id_, physics_, std::move(task))});
 }

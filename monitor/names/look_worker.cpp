@@ -37,7 +37,7 @@ std::future<LookWorker::Answer> LookWorker::Submit(std::string valve_id,
                                                    simulator::LookTask task) {
   Look look{std::move(valve_id), std::move(physics), std::move(task)};
   std::future<Answer> answer = look.answer.get_future();
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   using simulator::LookOccasion;
   const bool naming = look.task.occasion == LookOccasion::kEpisode;
   const bool growth = look.task.occasion == LookOccasion::kGrowth;
@@ -82,8 +82,8 @@ void LookWorker::TakeLooks() {
   constexpr int kNice = 10;
   setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), kNice);
   const std::stop_token stop = stop_.get_token();
-  std::unique_lock lock(mutex_);
-  const auto due = [this] { return !First().empty(); };
+  MutexLock lock(mutex_);
+  const auto due = [this]() REQUIRES(mutex_) { return !First().empty(); };
   // A wait that a stop ends returns due(), which is true while looks are
   // waiting. Without the second condition a stop would take them all first.
   while (arrival_.wait(lock, stop, due) && !stop.stop_requested()) {

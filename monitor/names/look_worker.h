@@ -7,13 +7,13 @@
 #include <functional>
 #include <future>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <stop_token>
 #include <string>
 #include <string_view>
 #include <utility>
 
+#include "base/mutex.h"
 #include "base/worker.h"
 #include "diagnosis/model_set.h"
 #include "simulator/second_look/episode_looks.h"
@@ -61,7 +61,7 @@ class LookWorker {
   void Stop();
   /// Looks at episodes that wait for the thread. Any thread.
   std::size_t waiting() const {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     return waiting_.size();
   }
   /// The thread ended with an exception, which Stop() throws. Any thread.
@@ -75,7 +75,7 @@ class LookWorker {
     std::promise<Answer> answer{};
   };
 
-  std::deque<Look>& First();
+  std::deque<Look>& First() REQUIRES(mutex_);
   void TakeLooks();
   Answer Take(const Look& look) const;
 
@@ -84,11 +84,11 @@ class LookWorker {
   static constexpr std::size_t kMaxRoutineLooks = 2000;
   const std::size_t capacity_;
   std::stop_source stop_;
-  mutable std::mutex mutex_;  // Guards what follows.
+  mutable Mutex mutex_;
   std::condition_variable_any arrival_;
-  std::deque<Look> waiting_;
-  std::deque<Look> routine_;
-  std::deque<Look> growth_;
+  std::deque<Look> waiting_ GUARDED_BY(mutex_);
+  std::deque<Look> routine_ GUARDED_BY(mutex_);
+  std::deque<Look> growth_ GUARDED_BY(mutex_);
   Worker thread_;
 };
 

@@ -11,8 +11,8 @@
 
 namespace fdi::monitor {
 
-/// Judges one valve without a model set by the audit of its loop: a LoopWatch
-/// whose windows an AuditWorker takes.
+/// Judges one valve by the audit of its loop: a LoopWatch whose windows an
+/// AuditWorker takes.
 ///
 /// One thread at a time.
 class LoopJudge {
@@ -22,6 +22,11 @@ class LoopJudge {
             std::shared_ptr<const SeverityCatalogue> severities);
 
   const Verdict& Step(const Sample& sample, double period_s);
+
+  /// Whether a valve is judged that has a model set.
+  bool beside_models() const {
+    return worker_ != nullptr && worker_->beside_models();
+  }
 
   /// See LoopWatch.
   const LoopWatch& watch() const { return watch_; }

@@ -185,9 +185,9 @@ bool Pair::LastValuesDue() {
 
 // Called by the journal's publisher thread.
 bool Pair::Publish(const FaultEvent& event, bool persisted) {
-  std::unique_lock sending(sending_);
+  const MutexLock sending(sending_);
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     FaultEvent own = event;
     own.persisted = persisted;
     if (held_events_.empty() && Leads()) {
@@ -196,19 +196,19 @@ bool Pair::Publish(const FaultEvent& event, bool persisted) {
       HoldLocked(std::move(own));
     }
   }
-  return SendEvents(std::move(sending));
+  return SendEvents();
 }
 
 // A write may wait for a slow subscriber, which holds up neither the diagnosis
 // nor a reader of the status. Whoever finds the other thread writing leaves the
 // rest to it, or to the next Tick().
 // @returns whether the last one was sent.
-bool Pair::SendEvents(std::unique_lock<std::mutex> sending) {
+bool Pair::SendEvents() {
   bool sent = true;
-  while (sending.owns_lock()) {
+  while (true) {
     Outgoing next;
     {
-      const std::lock_guard lock(mutex_);
+      const MutexLock lock(mutex_);
       if (outgoing_.empty()) {
         break;
       }
@@ -234,7 +234,7 @@ void Pair::HoldLocked(FaultEvent event) {
   }
   // The leader does not tell of an episode of ours that gave way to its own.
   if (event.transition.reason == EndReason::kSuperseded) {
-    std::erase_if(held_events_, [&](HeldEvent& held) {
+    std::erase_if(held_events_, [&](HeldEvent& held) REQUIRES(mutex_) {
       const bool same = held.event.episode_id == event.episode_id;
       if (same) {
         AnnounceLocked(std::move(held.event), true);
@@ -295,7 +295,7 @@ void Pair::OnVector(const idl::DecisionMessage& message) {
 
 void Pair::OnEvent(const FaultEvent& event, Pipeline& pipeline) {
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (!MarkPublishedLocked(event)) {
       return;
     }
@@ -354,14 +354,20 @@ void Pair::Tick(std::uint64_t received, Pipeline& pipeline) {
     events_lacked_ = -1;
     RepeatEvents(TimePoint{});
   }
-  SendEvents(std::unique_lock(sending_, std::try_to_lock));
+  if (sending_.try_lock()) {
+    const MutexLock sending(sending_, std::adopt_lock);
+    SendEvents();
+  }
 }
 
 void Pair::StepDown(Pipeline& pipeline) {
   const TimePoint now = Clock::now();
   election_.StepDown(now);
   ApplyElection(now);
-  SendEvents(std::unique_lock(sending_));
+  {
+    const MutexLock sending(sending_);
+    SendEvents();
+  }
   pipeline.StandBy(!led_);
   if (led_) {
     lease_until_ = TimePoint::max();  // Nobody else publishes the rest.
@@ -386,7 +392,7 @@ void Pair::ApplyElection(TimePoint now) {
     lease_until_ = state_sent_ + patience_;
   }
   if (changed && leads) {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     vectors_lacked_ = covered_.empty() ? -1 : decisions_.total_matched();
     events_lacked_ = published_.empty() ? -1 : bus_.total_matched();
   }
@@ -415,7 +421,7 @@ void Pair::ApplyElection(TimePoint now) {
                   " leader=" + (leader_.empty() ? "none" : LogValue(leader_)) +
                   " here=" + (leads ? "true" : "false"));
   }
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   status_.leads = leads;
   status_.leader = leader_;
   status_.others = election_.others();
@@ -430,7 +436,7 @@ void Pair::PublishHeld(TimePoint now) {
   if (in_flight_.empty()) {
     PublishHeldVectors(now);
   }
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   for (HeldEvent& held : std::exchange(held_events_, {})) {
     AnnounceLocked(std::move(held.event), false);
   }
@@ -469,7 +475,7 @@ void Pair::DropCovered(TimePoint now) {
     }
     held_vectors_.pop_front();
   }
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   std::set<std::uint64_t> over;
   for (const HeldEvent& held : held_events_) {
     if (held.event.transition.kind == TransitionKind::kClosed &&
@@ -489,7 +495,7 @@ void Pair::ForgetEnded(TimePoint now) {
     return;
   }
   forgot_ = now;
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   std::erase_if(published_, [&](const auto& each) {
     const HeldEvent& last = each.second.back();
     return last.event.transition.kind == TransitionKind::kClosed &&
@@ -499,7 +505,7 @@ void Pair::ForgetEnded(TimePoint now) {
 
 // Republishes the events heard at `since` or later.
 void Pair::RepeatEvents(TimePoint since) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   for (const auto& [valve_id, events] : published_) {
     for (const HeldEvent& held : events) {
       if (held.since >= since) {
@@ -510,14 +516,15 @@ void Pair::RepeatEvents(TimePoint since) {
 }
 
 Pair::Status Pair::status() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return status_;
 }
 
 bool Pair::AllEventsCovered() const {
   const TimePoint now = Clock::now();
   // What was taken from outgoing_ is on the bus once sending_ is free.
-  const std::scoped_lock lock(sending_, mutex_);
+  const MutexLock sending(sending_);
+  const MutexLock lock(mutex_);
   return outgoing_.empty() &&
          std::ranges::all_of(held_events_, [&](const HeldEvent& held) {
            return now - held.since > kMaxEventAge;

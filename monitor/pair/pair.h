@@ -5,12 +5,12 @@
 #include <cstdint>
 #include <deque>
 #include <map>
-#include <mutex>
 #include <string>
 #include <unordered_map>
 #include <unordered_set>
 #include <vector>
 
+#include "base/mutex.h"
 #include "idl/endpoint.h"
 #include "monitor/bus/bus_sinks.h"
 #include "monitor/pair/pair_election.h"
@@ -113,10 +113,10 @@ class Pair : public DecisionSink, public EventSink {
   void DropCovered(TimePoint now);
   void ForgetEnded(TimePoint now);
   void RepeatEvents(TimePoint since);
-  bool SendEvents(std::unique_lock<std::mutex> sending);
-  void HoldLocked(FaultEvent event);
-  void AnnounceLocked(FaultEvent event, bool repeat);
-  bool MarkPublishedLocked(const FaultEvent& event);
+  bool SendEvents() REQUIRES(sending_) EXCLUDES(mutex_);
+  void HoldLocked(FaultEvent event) REQUIRES(mutex_);
+  void AnnounceLocked(FaultEvent event, bool repeat) REQUIRES(mutex_);
+  bool MarkPublishedLocked(const FaultEvent& event) REQUIRES(mutex_);
 
   const PairOptions options_;
   const Clock::duration patience_;
@@ -154,14 +154,16 @@ class Pair : public DecisionSink, public EventSink {
 
   TimePoint forgot_;
 
-  // Held while events are written; locked before mutex_.
-  mutable std::mutex sending_;
-  mutable std::mutex mutex_;  // Guards the members below; never while writing.
-  Status status_;
+  // Held while events are written.
+  mutable Mutex sending_ ACQUIRED_BEFORE(mutex_);
+  mutable Mutex mutex_;  // Never while writing.
+  Status status_ GUARDED_BY(mutex_);
   // The last events of each valve that are on the bus, by stamp.
-  std::map<std::string, std::deque<HeldEvent>> published_;
-  std::deque<HeldEvent> held_events_;  // Ours, not heard from the leader yet.
-  std::deque<Outgoing> outgoing_;      // In the order of the bus.
+  std::map<std::string, std::deque<HeldEvent>> published_ GUARDED_BY(mutex_);
+  std::deque<HeldEvent> held_events_
+      GUARDED_BY(mutex_);  // Ours, not heard from the leader yet.
+  std::deque<Outgoing> outgoing_
+      GUARDED_BY(mutex_);  // In the order of the bus.
 };
 
 }  // namespace fdi::monitor

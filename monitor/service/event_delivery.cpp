@@ -1,20 +1,15 @@
-// The two ways in which an event leaves the monitor: a user's program, and a
-// POST to a web server.
+// How an event leaves the monitor: to a user's program.
 #include <algorithm>
 #include <cerrno>
 #include <csignal>
-#include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
-#include <mutex>
 #include <sstream>
 #include <string_view>
 #include <system_error>
-#include <thread>
 #include <utility>
 
-#include <httplib.h>
 #include <poll.h>
 #include <spawn.h>
 #include <sys/eventfd.h>
@@ -202,8 +197,6 @@ class ProgramDelivery : public EventDelivery {
   File stop_;
 };
 
-constexpr std::string_view kScheme = "http://";
-
 [[noreturn]] void Refuse(const std::string& target, const std::string& why) {
   throw ConfigError("--on-event '" + target + "': " + why +
                     "; accepted are a command with its arguments and "
@@ -239,7 +232,8 @@ std::vector<std::string> SplitWords(const std::string& text) {
 }
 
 bool CanRun(const std::string& path) {
-  return std::filesystem::is_regular_file(path) &&
+  std::error_code error;  // A folder that may not be read has no program.
+  return std::filesystem::is_regular_file(path, error) &&
          access(path.c_str(), X_OK) == 0;
 }
 
@@ -261,98 +255,6 @@ void RequireProgram(const std::string& target, const std::string& name) {
   }
 }
 
-// A request that is left behind may still use static objects of cpp-httplib. So
-// the process ends without destroying them.
-void KeepStaticObjects() {
-  on_exit(
-      [](int status, void*) {
-        std::fflush(nullptr);
-        _exit(status);
-      },
-      nullptr);
-}
-
-// @returns why the server did not accept the text, or nothing on success.
-std::optional<std::string> Post(const std::string& server,
-                                const std::string& path,
-                                const std::string& json,
-                                std::chrono::milliseconds limit) {
-  httplib::Client client(server);
-  // cpp-httplib applies each limit to one operation, so a server that sends
-  // its answer byte by byte can take longer in all.
-  client.set_connection_timeout(limit);
-  client.set_read_timeout(limit);
-  client.set_write_timeout(limit);
-  const httplib::Result answer = client.Post(path, json, "application/json");
-  if (!answer) {
-    return httplib::to_string(answer.error());
-  }
-  return answer->status / 100 == 2
-             ? std::nullopt
-             : std::optional("HTTP status " + std::to_string(answer->status));
-}
-
-class UrlDelivery : public EventDelivery {
- public:
-  UrlDelivery(std::string server, std::string path,
-              std::chrono::milliseconds limit)
-      : server_(std::move(server)), path_(std::move(path)), limit_(limit) {}
-
-  // The request has a thread of its own, which a stop leaves behind: neither
-  // the lookup of the host's name nor cpp-httplib's connect() can be aborted.
-  // That thread uses nothing of ours but its copies, until the process ends.
-  std::optional<std::string> Deliver(const std::string& json) override {
-    std::unique_lock lock(request_->mutex);
-    if (request_->stopped) {
-      return kStops;
-    }
-    request_->ended = false;
-    std::thread thread([request = request_, server = server_, path = path_,
-                        limit = limit_, json] {
-      std::optional<std::string> failure;
-      try {
-        failure = Post(server, path, json, limit);
-      } catch (const std::exception& error) {
-        failure = error.what();
-      }
-      const std::lock_guard guard(request->mutex);
-      request->failure = std::move(failure);
-      request->ended = true;
-      request->changed.notify_all();
-    });
-    request_->changed.wait(
-        lock, [this] { return request_->ended || request_->stopped; });
-    if (!request_->ended) {
-      KeepStaticObjects();
-      thread.detach();
-      return kStops;
-    }
-    lock.unlock();
-    thread.join();
-    return request_->failure;
-  }
-
-  void Interrupt() override {
-    const std::lock_guard lock(request_->mutex);
-    request_->stopped = true;
-    request_->changed.notify_all();
-  }
-
- private:
-  struct Request {
-    std::mutex mutex;
-    std::condition_variable changed;
-    bool stopped{false};
-    bool ended{false};
-    std::optional<std::string> failure;
-  };
-
-  std::string server_;  // http://HOST[:PORT]
-  std::string path_;
-  std::chrono::milliseconds limit_;
-  std::shared_ptr<Request> request_{std::make_shared<Request>()};
-};
-
 }  // namespace
 
 std::unique_ptr<EventDelivery> DeliverToProgram(
@@ -360,31 +262,15 @@ std::unique_ptr<EventDelivery> DeliverToProgram(
   return std::make_unique<ProgramDelivery>(std::move(words), limit);
 }
 
-std::unique_ptr<EventDelivery> DeliverToUrl(const std::string& url,
-                                            std::chrono::milliseconds limit) {
-  const std::size_t slash = std::min(url.find('/', kScheme.size()), url.size());
-  if (!url.starts_with(kScheme) || slash == kScheme.size()) {
-    Refuse(url, "no host");
-  }
-  const std::string path = url.substr(slash);
-  const std::string server = url.substr(0, slash);
-  if (!httplib::Client(server).is_valid()) {
-    Refuse(url, "no host and port");
-  }
-  return std::make_unique<UrlDelivery>(server, path.empty() ? "/" : path,
-                                       limit);
-}
-
 std::unique_ptr<EventDelivery> MakeEventDelivery(
     const std::string& target, std::chrono::milliseconds limit) {
-  if (target.starts_with(kScheme)) {
-    return DeliverToUrl(target, limit);
-  }
-  // In the first word this is a URL of a scheme that is not spoken. In a later
-  // word it is an argument of the command, such as the address given to curl.
+  // In the first word this is a URL. In a later word it is an argument of the
+  // command, such as the address given to curl.
   if (target.find("://") != std::string::npos &&
       target.find("://") < target.find(' ')) {
-    Refuse(target, "only http is spoken");
+    Refuse(target,
+           "a command posts to it: curl -sSf -H 'Content-Type: "
+           "application/json' --data-binary @- URL");
   }
   std::vector<std::string> words = SplitWords(target);
   if (words.empty()) {

@@ -5,11 +5,11 @@
 #include <utility>
 
 #include "base/log.h"
+#include "base/text.h"
 #include "base/time_text.h"
 #include "diagnosis/fault_catalogue.h"
 #include "diagnosis/records/certainty.h"
 #include "storage/history/episode.h"
-#include "storage/history/history_database.h"
 
 namespace fdi::monitor {
 namespace {
@@ -29,12 +29,7 @@ std::string FaultsOf(const FaultEvent& event) {
     }
   }
   std::ranges::sort(faults);
-  std::string names;
-  for (const int fault : faults) {
-    names += names.empty() ? "" : "|";
-    names += FaultName(fault);
-  }
-  return names;
+  return JoinText(faults, "|", FaultName);
 }
 
 }  // namespace
@@ -99,7 +94,7 @@ void EventHook::Start() {
 }
 
 void EventHook::Notify(report::Json event) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   if (stopping_) {
     return;
   }
@@ -135,10 +130,11 @@ bool EventHook::TakeToken(TimePoint now) {
 }
 
 void EventHook::Run() {
-  std::unique_lock lock(mutex_);
+  MutexLock lock(mutex_);
   while (true) {
-    changed_.wait_for(lock, kTick,
-                      [this] { return stopping_ || !waiting_.empty(); });
+    changed_.wait_for(lock, kTick, [this]() REQUIRES(mutex_) {
+      return stopping_ || !waiting_.empty();
+    });
     if (newest_ && waiting_.size() < options_.max_waiting &&
         TakeToken(options_.now())) {
       Enqueue(*std::exchange(newest_, std::nullopt));
@@ -184,9 +180,10 @@ void EventHook::Stop(std::chrono::milliseconds patience) {
     return;
   }
   {
-    std::unique_lock lock(mutex_);
-    changed_.wait_for(lock, patience,
-                      [this] { return waiting_.empty() && !busy_; });
+    MutexLock lock(mutex_);
+    changed_.wait_for(lock, patience, [this]() REQUIRES(mutex_) {
+      return waiting_.empty() && !busy_;
+    });
     stopping_ = true;
     counts_.left_out += waiting_.size() + (newest_ ? 1 : 0);
     waiting_.clear();
@@ -195,15 +192,16 @@ void EventHook::Stop(std::chrono::milliseconds patience) {
   }
   delivery_->Interrupt();
   worker_.Join();
+  const Counts last = counts();
   log_(LogLevel::kInfo,
        EventLine("event_hook_stopped",
-                 {{"delivered", std::to_string(counts_.delivered)},
-                  {"failed", std::to_string(counts_.failed)},
-                  {"left_out", std::to_string(counts_.left_out)}}));
+                 {{"delivered", std::to_string(last.delivered)},
+                  {"failed", std::to_string(last.failed)},
+                  {"left_out", std::to_string(last.left_out)}}));
 }
 
 EventHook::Counts EventHook::counts() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return counts_;
 }
 

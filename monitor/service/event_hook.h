@@ -1,18 +1,17 @@
 #pragma once
 
 #include <chrono>
-#include <condition_variable>
 #include <cstdint>
 #include <deque>
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "base/log.h"
+#include "base/mutex.h"
 #include "base/worker.h"
 #include "diagnosis/records/fault_event.h"
 #include "report/fault_texts.h"
@@ -40,15 +39,8 @@ class EventDelivery {
 std::unique_ptr<EventDelivery> DeliverToProgram(
     std::vector<std::string> words, std::chrono::milliseconds limit);
 
-/// POSTs the text as application/json; a status of 2xx is success.
-/// @param url http://HOST[:PORT][/PATH]
-/// @throws ConfigError naming `url` and what is accepted.
-std::unique_ptr<EventDelivery> DeliverToUrl(const std::string& url,
-                                            std::chrono::milliseconds limit);
-
-/// Chooses between the two: a target that begins with http:// is a URL, any
-/// other a command whose words are separated by blanks; words that contain
-/// blanks are quoted.
+/// DeliverToProgram() with the words of a command, which are separated by
+/// blanks; words that contain blanks are quoted.
 /// @throws ConfigError naming what is accepted.
 std::unique_ptr<EventDelivery> MakeEventDelivery(
     const std::string& target, std::chrono::milliseconds limit);
@@ -71,7 +63,7 @@ report::Json EventJson(const FaultEvent& event, bool persisted,
                        const report::FaultTexts& texts,
                        const std::vector<storage::Shelf>& shelves = {});
 
-/// Notifies a program or a web server of every fault event that goes to the
+/// Notifies a program of every fault event that goes to the
 /// bus, each at most once and in order, from a thread of its own: neither the
 /// diagnosis nor the bus waits.
 ///
@@ -108,24 +100,25 @@ class EventHook {
   using TimePoint = std::chrono::steady_clock::time_point;
 
   void Run();
-  bool TakeToken(TimePoint now);
-  void Enqueue(report::Json event);
-  void RecordResult(const std::optional<std::string>& failure);
+  bool TakeToken(TimePoint now) REQUIRES(mutex_);
+  void Enqueue(report::Json event) REQUIRES(mutex_);
+  void RecordResult(const std::optional<std::string>& failure) REQUIRES(mutex_);
 
   std::unique_ptr<EventDelivery> delivery_;
   EventHookOptions options_;
   LogSink log_;
 
-  mutable std::mutex mutex_;
-  std::condition_variable changed_;
-  std::deque<report::Json> waiting_;    // Within the rate.
-  std::optional<report::Json> newest_;  // Beyond it.
-  std::uint64_t left_out_{0};           // Since the last one delivered.
-  double tokens_;
-  TimePoint filled_;
-  bool busy_{false};
-  bool stopping_{false};
-  Counts counts_;
+  mutable Mutex mutex_;
+  CondVar changed_;
+  std::deque<report::Json> waiting_ GUARDED_BY(mutex_);    // Within the rate.
+  std::optional<report::Json> newest_ GUARDED_BY(mutex_);  // Beyond it.
+  std::uint64_t left_out_ GUARDED_BY(mutex_){
+      0};  // Since the last one delivered.
+  double tokens_ GUARDED_BY(mutex_);
+  TimePoint filled_ GUARDED_BY(mutex_);
+  bool busy_ GUARDED_BY(mutex_){false};
+  bool stopping_ GUARDED_BY(mutex_){false};
+  Counts counts_ GUARDED_BY(mutex_);
   Worker worker_;
 };
 

@@ -61,7 +61,7 @@ std::shared_ptr<const ModelSet> ModelAssignment::Load(
 
 std::shared_ptr<const ModelSet> ModelAssignment::ModelsFor(
     std::string_view valve_id) const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   const std::optional<storage::ModelReference> assigned =
       store_.AssignedModelSet(valve_id);
   return assigned ? Load(*assigned) : default_;
@@ -72,13 +72,13 @@ std::vector<std::string> ModelAssignment::AssignedValves() const {
 }
 
 bool ModelAssignment::IsolationHeld(std::string_view valve_id) const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   const auto entry = store_.FindValve(valve_id);
   return entry && entry->baseline() == storage::BaselineState::kProvisional;
 }
 
 std::size_t ModelAssignment::loaded() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return loaded_.size();
 }
 

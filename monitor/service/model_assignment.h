@@ -4,10 +4,10 @@
 #include <functional>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
 
+#include "base/mutex.h"
 #include "monitor/sinks.h"
 #include "storage/models/models.h"
 
@@ -52,13 +52,14 @@ class ModelAssignment : public ModelResolver {
 
  private:
   std::shared_ptr<const ModelSet> Load(
-      const storage::ModelReference& reference) const;
-  std::optional<storage::ModelReference> OnlyActive() const;
+      const storage::ModelReference& reference) const REQUIRES(mutex_);
+  std::optional<storage::ModelReference> OnlyActive() const REQUIRES(mutex_);
 
-  mutable std::mutex mutex_;
-  mutable storage::ModelStore store_;
+  mutable Mutex mutex_;
+  mutable storage::ModelStore store_ GUARDED_BY(mutex_);
   Announce announce_;
-  mutable std::map<std::string, std::shared_ptr<const ModelSet>> loaded_;
+  mutable std::map<std::string, std::shared_ptr<const ModelSet>> loaded_
+      GUARDED_BY(mutex_);
   std::shared_ptr<const ModelSet> default_;
   std::size_t assigned_{0};
   std::vector<std::string> assigned_valves_;

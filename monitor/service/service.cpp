@@ -21,6 +21,7 @@
 #include <systemd/sd-daemon.h>
 
 #include "base/printable.h"
+#include "base/text.h"
 #include "base/time_text.h"
 #include "base/time_units.h"
 #include "diagnosis/loop_watch.h"
@@ -85,6 +86,7 @@ PipelineOptions PipelineOptionsOf(const ServiceOptions& options) {
   pipeline.trace.before_s = options.trace_before_s;
   pipeline.second_look = options.second_look;
   pipeline.loop_audit = options.loop_audit;
+  pipeline.audit_all_loops = options.audit_all_loops;
   return pipeline;
 }
 
@@ -275,7 +277,11 @@ std::vector<storage::Shelf> Service::ShelvesInForce() {
       shelf_reader_ = std::make_unique<storage::HistoryReader>(data_.history());
     }
     shelf_reader_->database().Refresh();
-    return shelf_reader_->Shelves(NowNs());
+    const std::int64_t now_ns = NowNs();
+    auto shelves = shelf_reader_->Shelves(now_ns);
+    std::erase_if(shelves,
+                  [now_ns](const auto& s) { return !IsActive(s, now_ns); });
+    return shelves;
   } catch (const std::exception&) {
     shelf_reader_.reset();
     return {};
@@ -678,7 +684,8 @@ void Service::ReportStall() {
   if (!stalled.empty()) {
     log_.Report(
         LogId::kStalled, "threads_stalled",
-        [&stalled] { return "threads=" + Joined(stalled); }, LogLevel::kError);
+        [&stalled] { return "threads=" + JoinText(stalled, ","); },
+        LogLevel::kError);
   }
 }
 

@@ -17,6 +17,7 @@
 #include <unistd.h>
 
 #include "base/printable.h"
+#include "base/text.h"
 
 namespace fdi::monitor {
 namespace {
@@ -265,10 +266,6 @@ std::vector<Measure> MeasuresOf(const StatusFacts& facts) {
       {"valves_contested", "fdi_valves_contested", kGauge,
        "Valves that another monitor takes, too, which is not of our pair", "",
        "", facts.contested.count},
-      {"", "fdi_valves_drift_near_bound", kGauge,
-       "Valves whose limits have followed a drift for 90 % or more of what the "
-       "model set allows",
-       "", "", census.near_bound},
       {"open_episodes", "fdi_open_episodes", kGauge, "Fault episodes now", "",
        "", census.open_episodes},
       {"trace_bytes", "fdi_trace_bytes", kGauge,
@@ -339,7 +336,7 @@ idl::MonitorStatusMessage StatusOf(const StatusFacts& facts) {
   if (!facts.stalled.empty()) {
     status.health = idl::Health::kFailing;
     status.text += (status.text.empty() ? "stalled: " : "; stalled: ") +
-                   Joined(facts.stalled);
+                   JoinText(facts.stalled, ",");
   }
   // The names of other monitors and of valves may be long.
   if (status.text.size() > idl::kMaxTextLength) {
@@ -391,14 +388,6 @@ std::string ManagerLine(const idl::MonitorStatusMessage& status) {
     line += leads->second != 0 ? " leads its pair" : " stands by";
   }
   return status.text.empty() ? line : line + " (" + status.text + ")";
-}
-
-std::string Joined(const std::vector<std::string_view>& words) {
-  std::string text;
-  for (const std::string_view word : words) {
-    text.append(text.empty() ? "" : ",").append(word);
-  }
-  return text;
 }
 
 std::string StatusLine(const idl::MonitorStatusMessage& status) {

@@ -56,9 +56,6 @@ std::string MonitorName();
 /// One line for a service manager, without values that change all the time.
 std::string ManagerLine(const idl::MonitorStatusMessage& status);
 
-/// "a,b"
-std::string Joined(const std::vector<std::string_view>& words);
-
 /// "monitor_status received=1 ...": the values that are not zero.
 std::string StatusLine(const idl::MonitorStatusMessage& status);
 

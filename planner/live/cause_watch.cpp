@@ -32,14 +32,14 @@ void CauseWatch::Start() {
 }
 
 void CauseWatch::Wake() {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   woken_ = true;
   changed_.notify_one();
 }
 
 void CauseWatch::Stop() {
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     stopping_ = true;
     changed_.notify_one();
   }
@@ -50,8 +50,10 @@ void CauseWatch::Run() {
   bool last = false;
   while (!last) {
     {
-      std::unique_lock lock(mutex_);
-      changed_.wait_for(lock, kPeriod, [this] { return woken_ || stopping_; });
+      MutexLock lock(mutex_);
+      changed_.wait_for(lock, kPeriod, [this]() REQUIRES(mutex_) {
+        return woken_ || stopping_;
+      });
       woken_ = false;
       last = stopping_;
     }

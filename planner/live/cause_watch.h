@@ -1,11 +1,10 @@
 #pragma once
 
-#include <condition_variable>
 #include <filesystem>
 #include <functional>
-#include <mutex>
 #include <vector>
 
+#include "base/mutex.h"
 #include "base/worker.h"
 #include "monitor/service/history_follower.h"
 #include "storage/history/common_cause.h"
@@ -46,10 +45,10 @@ class CauseWatch : public monitor::HistoryFollower {
   std::function<void(const storage::CauseChange&)> on_change_;
   Guard guard_;
 
-  std::mutex mutex_;  // Guards what follows.
-  std::condition_variable changed_;
-  bool woken_{true};
-  bool stopping_{false};
+  Mutex mutex_;
+  CondVar changed_;
+  bool woken_ GUARDED_BY(mutex_){true};
+  bool stopping_ GUARDED_BY(mutex_){false};
 
   Worker worker_;
 };

@@ -3,12 +3,12 @@
 
 #include <map>
 #include <memory>
-#include <mutex>
 #include <sstream>
 #include <string>
 
 #include <httplib.h>
 
+#include "base/mutex.h"
 #include "base/time_units.h"
 #include "planner/fleet_report.h"
 #include "planner/work_list.h"
@@ -30,11 +30,11 @@ constexpr std::int64_t kCacheNs = 60'000'000'000;
 
 // The last work list that was requested.
 struct WorkListCache {
-  std::mutex mutex;
-  std::string query;
-  std::int64_t read_ns{0};
-  std::vector<WorkRow> rows;
-  std::string note;  // What was left out.
+  Mutex mutex;
+  std::string query GUARDED_BY(mutex);
+  std::int64_t read_ns GUARDED_BY(mutex){0};
+  std::vector<WorkRow> rows GUARDED_BY(mutex);
+  std::string note GUARDED_BY(mutex);  // What was left out.
 };
 
 std::vector<HealthLimit> LimitsOf(const httplib::Request& request) {
@@ -52,7 +52,7 @@ report::Report ReadReport(WorkListCache& cache, const Api& api,
     query += name + "=" + value + "&";
   }
   const std::int64_t now_ns = api.sources.utc_now_ns();
-  const std::lock_guard lock(cache.mutex);
+  const MutexLock lock(cache.mutex);
   if (query != cache.query || now_ns >= cache.read_ns + kCacheNs ||
       now_ns < cache.read_ns) {
     WorkQuery work;
@@ -145,10 +145,11 @@ Json Health(const Api& api, const httplib::Request& request) {
 
 // The last report that was requested.
 struct FleetCache {
-  std::mutex mutex;
-  std::int64_t since_ns{-1};  // As asked for; 0: the last week.
-  std::int64_t made_ns{0};
-  report::Report report;
+  Mutex mutex;
+  std::int64_t since_ns GUARDED_BY(mutex){
+      -1};  // As asked for; 0: the last week.
+  std::int64_t made_ns GUARDED_BY(mutex){0};
+  report::Report report GUARDED_BY(mutex);
 };
 
 // Without the audit of stored runs, which takes long.
@@ -156,7 +157,7 @@ report::Report ReadFleet(FleetCache& cache, const Api& api,
                          const httplib::Request& request) {
   const std::int64_t since_ns = TimeParameter(request, "since_ms", 0);
   const std::int64_t now_ns = api.sources.utc_now_ns();
-  const std::lock_guard lock(cache.mutex);
+  const MutexLock lock(cache.mutex);
   if (since_ns != cache.since_ns || now_ns >= cache.made_ns + kCacheNs ||
       now_ns < cache.made_ns) {
     FleetQuery query;
@@ -169,6 +170,8 @@ report::Report ReadFleet(FleetCache& cache, const Api& api,
     }
     const auto history = api.History();
     cache.report = FleetReport(history.get(), api.texts, query);
+    cache.report.document["note"] =
+        console::TextOrNull(storage::TakeNote(*history));
     cache.since_ns = since_ns;
     cache.made_ns = now_ns;
   }
@@ -177,10 +180,18 @@ report::Report ReadFleet(FleetCache& cache, const Api& api,
 
 }  // namespace
 
-std::vector<console::Route> ConsoleRoutes() {
+std::vector<console::Route> ConsoleRoutes(
+    const std::vector<storage::CauseGroup>& groups) {
+  Json list = Json::array();
+  for (const storage::CauseGroup& group : groups) {
+    list.push_back({{"name", group.name}, {"valves", group.valve_globs}});
+  }
   const auto fleet = std::make_shared<FleetCache>();
   const auto cache = std::make_shared<WorkListCache>();
   return {
+      {"/api/v1/groups",
+       [answer = Json{{"groups", std::move(list)}}](
+           const Api&, const httplib::Request&) { return answer; }},
       {"/api/v1/worklist",
        [cache](const Api& api, const httplib::Request& request) {
          return ReadReport(*cache, api, request).document;

@@ -56,7 +56,7 @@ void PlantFeed::Add(const idl::DecisionMessage& message,
                     const idl::Reception& reception, Clock::time_point now) {
   std::string monitor;
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     monitor = MarkAlive(reception, now).name;
   }
   const Verdict& verdict = message.verdict;
@@ -82,7 +82,7 @@ void PlantFeed::Add(const idl::DecisionMessage& message,
 
 void PlantFeed::Add(const idl::MonitorStatusMessage& status,
                     const idl::Reception& reception, Clock::time_point now) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   console::MonitorLine& line = MarkAlive(reception, now);
   line.name = status.monitor;
   line.software = status.software;
@@ -92,7 +92,7 @@ void PlantFeed::Add(const idl::MonitorStatusMessage& status,
 }
 
 void PlantFeed::Poll(Clock::time_point now) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   for (auto& [participant, monitor] : monitors_) {
     monitor.line.silent = now - monitor.heard > kMonitorSilence;
     monitor.line.valves = 0;
@@ -133,7 +133,7 @@ void PlantFeed::UpdateSilence(const std::string& valve_id, Valve& valve,
 
 std::vector<console::MonitorLine> PlantFeed::monitors() const {
   std::vector<console::MonitorLine> lines;
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   for (const auto& [participant, monitor] : monitors_) {
     if (!monitor.line.name.empty()) {
       lines.push_back(monitor.line);

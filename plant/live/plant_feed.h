@@ -4,10 +4,10 @@
 #include <cstdint>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <vector>
 
+#include "base/mutex.h"
 #include "idl/endpoint.h"
 #include "monitor/console/api.h"
 
@@ -23,9 +23,9 @@ class PlantFeed {
   using Clock = std::chrono::steady_clock;
   /// A monitor publishes its status each second.
   static constexpr std::chrono::milliseconds kMonitorSilence{1800};
-  /// After which a silent valve leaves the page. Long enough for every shift to
-  /// have seen it; its alarms stay, they are the history's.
-  static constexpr std::chrono::hours kForgetValve{24};
+  /// After which a silent valve leaves the page; its alarms stay, they are the
+  /// history's. A page that starts lists the valves of as long a time.
+  static constexpr std::chrono::hours kForgetValve{30 * 24};
 
   explicit PlantFeed(console::LiveBoard& board) : board_(board) {}
 
@@ -60,15 +60,16 @@ class PlantFeed {
     Silence silence{Silence::kNone};
   };
   console::MonitorLine& MarkAlive(const idl::Reception& reception,
-                                  Clock::time_point now);
+                                  Clock::time_point now) REQUIRES(mutex_);
   void UpdateSilence(const std::string& valve_id, Valve& valve,
                      const Monitor& monitor, Clock::time_point now);
 
   console::LiveBoard& board_;
   std::map<std::uint64_t, std::shared_ptr<const console::ModelFacts>> models_;
   std::map<std::string, Valve> valves_;
-  mutable std::mutex mutex_;                   // Guards the members below.
-  std::map<std::uint64_t, Monitor> monitors_;  // By participant.
+  mutable Mutex mutex_;
+  std::map<std::uint64_t, Monitor> monitors_
+      GUARDED_BY(mutex_);  // By participant.
 };
 
 }  // namespace fdi::monitor

@@ -56,8 +56,7 @@ RETURNS bigint LANGUAGE sql STABLE AS $$
   FROM fdi.shelf s,
     (SELECT (extract(epoch FROM statement_timestamp()) * 1e9)::bigint AS ns) now
   WHERE s.monitor_id = $1 AND s.valve_id = $2
-    AND s.until_ns > now.ns
-    AND (s.ended_ns IS NULL OR s.ended_ns > now.ns)
+    AND s.until_ns > now.ns AND s.ended_ns IS NULL
     AND (s.fault IS NULL OR s.fault = $3)
 $$;
 

@@ -1,8 +1,6 @@
 #include <algorithm>
 #include <chrono>
-#include <condition_variable>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <stop_token>
 #include <string>
@@ -11,6 +9,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "base/retry.h"
 #include "base/time_text.h"
 #include "base/time_units.h"
 #include "diagnosis/records/valve_glob.h"
@@ -55,36 +54,35 @@ storage::PlantLimits Limits(const std::stop_token& stop) {
   return limits;
 }
 
-// Lists the valves of the last month also if they are silent. Tried again until
-// the plant's history answers; that it is away is on the page already.
+// Lists valves also if they are silent. Tried again until the plant's history
+// answers; that it is away is on the page already.
 void ExpectSeenValves(const std::stop_token& stop,
                       const PlantConsoleOptions& options,
                       console::LiveBoard& board) {
-  constexpr std::int64_t kMonthNs = 30 * kNsPerDay;
+  constexpr std::int64_t kAgeNs =
+      std::chrono::nanoseconds(PlantFeed::kForgetValve).count();
   constexpr std::chrono::seconds kRetry{10};
-  std::mutex mutex;
-  std::condition_variable_any stopped;
   while (!stop.stop_requested()) {
     try {
       storage::PlantReader plant(options.from, "", Limits(stop));
-      for (const auto& [valve, last_ns] :
-           plant.SeenValves(NowNs() - kMonthNs)) {
+      for (const auto& [valve, last_ns] : plant.SeenValves(NowNs() - kAgeNs)) {
         if (GlobMatches(options.bus.valves, valve)) {
           board.Expect(valve, last_ns);
         }
       }
       return;
     } catch (const std::exception&) {
-      std::unique_lock lock(mutex);
-      stopped.wait_for(lock, stop, kRetry, [] { return false; });
+      PauseUntil(stop, kRetry);
     }
   }
 }
 
-int RunConsole(PlantConsoleOptions options, const report::Context& context) {
+int RunConsole(const PlantConsoleOptions& given,
+               const report::Context& context) {
+  PlantConsoleOptions options = given;
   options.access.ApplyTo(options.console);
   options.console.address = ParseHttpAddress(options.listen, "--listen");
-  options.console.routes = PlannerRoutes();
+  options.console.routes = PlannerRoutes({}, context);
   const LogSink log = LimitLog(context.log);
   using Signals = report::StopSignals;
   Signals signals(options.access.given() ? Signals::HangUp::kReload
@@ -137,40 +135,37 @@ int RunConsole(PlantConsoleOptions options, const report::Context& context) {
 }  // namespace
 
 void AddConsoleVerb(report::Program& program) {
-  auto options = std::make_shared<PlantConsoleOptions>();
-  CLI::App& console = program.AddVerb(
-      "console",
+  auto [console, options] = AddVerb(
+      program, "console",
       "Serve one live page of all monitors on the bus; their episodes come "
       "from "
       "the plant's history (fdi-store ship). It diagnoses nothing",
-      [options](const report::Context& context) {
-        return RunConsole(*options, context);
-      });
+      RunConsole);
   console
-      .add_option("--from", options->from,
+      .add_option("--from", options.from,
                   "The plant's history: postgresql://user@host/database")
       ->required()
       ->type_name("URL");
   console
-      .add_option("--listen", options->listen,
+      .add_option("--listen", options.listen,
                   "Where to serve it; a PORT alone is on loopback, port 0 any "
                   "free one")
       ->capture_default_str()
       ->type_name("ADDRESS:PORT");
-  AddConsoleAccess(console, options->access, nullptr);
+  AddConsoleAccess(console, options.access, nullptr);
   console
-      .add_option("--console-files", options->console.files,
+      .add_option("--console-files", options.console.files,
                   "Folder of the page instead of the installed one")
       ->type_name("DIR");
   console
-      .add_option("--allow-host", options->console.names,
+      .add_option("--allow-host", options.console.names,
                   "Answer under this name, too, and not only under localhost, "
                   "addresses and the name of the machine")
       ->type_name("NAME");
-  console.add_option("--valves", options->bus.valves,
+  console.add_option("--valves", options.bus.valves,
                      "Only ids that match GLOB");
   console
-      .add_option("--max-valves", options->bus.max_valves,
+      .add_option("--max-valves", options.bus.max_valves,
                   "Maximum number of valves")
       ->check(CLI::Range(1, 100000));
 }

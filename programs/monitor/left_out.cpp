@@ -25,13 +25,16 @@ MakeFollower FollowCauses(const std::filesystem::path& /*groups*/,
   return {};
 }
 
-std::vector<console::Route> PlannerRoutes() {
+std::vector<console::Route> PlannerRoutes(
+    const std::filesystem::path& /*groups*/,
+    const report::Context& /*context*/) {
   const auto refuse = [](const console::Api&,
                          const httplib::Request&) -> console::Json {
     throw NotFoundError(
         report::LeftOut("what the planner adds to the page", "FDI_PLANNER"));
   };
-  return {{"/api/v1/worklist(?:\\.csv)?", refuse},
+  return {{"/api/v1/groups", refuse},
+          {"/api/v1/worklist(?:\\.csv)?", refuse},
           {"/api/v1/report(?:\\.html)?", refuse},
           {"/api/v1/valves/.+/health", refuse}};
 }

@@ -7,6 +7,19 @@
 #include "planner/live/console_routes.h"
 
 namespace fdi::monitor {
+namespace {
+
+// None without a file.
+std::vector<storage::CauseGroup> ReadGroups(const std::filesystem::path& groups,
+                                            const report::Context& context) {
+  const std::filesystem::path usual = context.options.data_dir / "groups.toml";
+  if (groups.empty() && !std::filesystem::exists(usual)) {
+    return {};
+  }
+  return planner::ReadCauseGroups(groups.empty() ? usual : groups);
+}
+
+}  // namespace
 
 void AddGroupsOption(report::Program& /*program*/, CLI::App& run,
                      std::filesystem::path& groups) {
@@ -20,16 +33,14 @@ void AddGroupsOption(report::Program& /*program*/, CLI::App& run,
 
 MakeFollower FollowCauses(const std::filesystem::path& groups,
                           const report::Context& context) {
-  const std::filesystem::path usual = context.options.data_dir / "groups.toml";
-  if (groups.empty() && !std::filesystem::exists(usual)) {
-    return {};
-  }
-  return planner::CauseFollower(
-      planner::ReadCauseGroups(groups.empty() ? usual : groups));
+  std::vector<storage::CauseGroup> read = ReadGroups(groups, context);
+  return read.empty() ? MakeFollower{}
+                      : planner::CauseFollower(std::move(read));
 }
 
-std::vector<console::Route> PlannerRoutes() {
-  return planner::ConsoleRoutes();
+std::vector<console::Route> PlannerRoutes(const std::filesystem::path& groups,
+                                          const report::Context& context) {
+  return planner::ConsoleRoutes(ReadGroups(groups, context));
 }
 
 }  // namespace fdi::monitor

@@ -21,7 +21,8 @@ void AddGroupsOption(report::Program& program, CLI::App& run,
 MakeFollower FollowCauses(const std::filesystem::path& groups,
                           const report::Context& context);
 
-/// Further routes of the console.
-std::vector<console::Route> PlannerRoutes();
+/// Further routes of the console. `groups` as for FollowCauses().
+std::vector<console::Route> PlannerRoutes(const std::filesystem::path& groups,
+                                          const report::Context& context);
 
 }  // namespace fdi::monitor

@@ -1,9 +1,5 @@
-#include <algorithm>
-#include <array>
-#include <cctype>
 #include <filesystem>
 #include <functional>
-#include <memory>
 #include <string>
 
 #include <CLI/CLI.hpp>
@@ -77,7 +73,6 @@ void TakeConsole(const RunArguments& arguments, ServiceOptions& options) {
       options.console.emplace(arguments.console_options);
   console.address = ParseHttpAddress(arguments.console, "--console");
   console.names = options.http_names;
-  console.routes = PlannerRoutes();
   if (writable) {
     console.admission.token_file = arguments.console_token;
   }
@@ -106,9 +101,8 @@ void AddConsoleOptions(CLI::App& run, RunArguments& arguments) {
 void AddOnEventOptions(CLI::App& run, ServiceOptions& service) {
   run.add_option("--on-event", service.on_event,
                  "Notify of every fault event: a command that reads it as JSON "
-                 "from its standard input, or http://HOST[:PORT][/PATH] that "
-                 "it is posted to")
-      ->type_name("CMD|URL");
+                 "from its standard input")
+      ->type_name("CMD");
   run.add_option("--on-event-rate", service.on_event_per_minute,
                  "At most this many a minute; the rest is counted")
       ->check(CLI::Range(1, 6000))
@@ -165,6 +159,9 @@ int Run(const RunArguments& arguments, const report::Context& context) {
     throw ConfigError("--allow-host needs --http or --console");
   }
   options.follower = FollowCauses(arguments.groups, context);
+  if (options.console) {
+    options.console->routes = PlannerRoutes(arguments.groups, context);
+  }
   // Before the service, so that a signal during its start requests an orderly
   // stop.
   report::StopSignals signals(report::StopSignals::HangUp::kReload);
@@ -182,37 +179,35 @@ void AddJudgeOptions(CLI::App& run, ServiceOptions& service) {
   run.add_flag("!--no-loop-audit", service.loop_audit,
                "Leave valves without a model set unjudged, without the audit "
                "of their loops");
+  run.add_flag("--audit-all-loops", service.audit_all_loops,
+               "Audit also the loops of valves with a model set, while that "
+               "finds nothing");
 }
 
 }  // namespace
 
 void AddRunVerb(report::Program& program) {
-  // CLI11 holds references to the variables and fills them when it parses,
-  // after this function has returned; the callback shares their ownership.
-  auto arguments = std::make_shared<RunArguments>();
-  CLI::App& run = program.AddVerb(
-      "run", "Diagnose the valves on the bus until SIGINT or SIGTERM",
-      [arguments](const report::Context& context) {
-        return Run(*arguments, context);
-      });
-  run.add_option("--model-set", arguments->model_set,
+  auto [run, arguments] =
+      AddVerb(program, "run",
+              "Diagnose the valves on the bus until SIGINT or SIGTERM", Run);
+  run.add_option("--model-set", arguments.model_set,
                  "NAME[@VERSION] for valves that none is assigned to; without "
                  "it the only active one, if no valve is assigned any");
-  run.add_option("--shadow", arguments->shadow,
+  run.add_option("--shadow", arguments.shadow,
                  "Run a candidate beside the active sets and record where they "
                  "differ; without VERSION the newest one")
       ->type_name("NAME[@VERSION]");
-  run.add_option("--shadow-valves", arguments->service.shadow_valves,
+  run.add_option("--shadow-valves", arguments.service.shadow_valves,
                  "Compare only on ids that match GLOB")
       ->capture_default_str();
-  run.add_option("--record", arguments->record,
+  run.add_option("--record", arguments.record,
                  "Store the samples as runs; =lossless waits for the disk "
                  "instead of counting what it could not take")
       ->expected(0, 1)
       ->default_str("on")
       ->transform(ParseRecord)
       ->type_name("[=on|lossless|off]");
-  ServiceOptions& service = arguments->service;
+  ServiceOptions& service = arguments.service;
   run.add_option("--valves", service.valves, "Serve only ids that match GLOB")
       ->capture_default_str();
   run.add_option("--max-valves", service.max_valves,
@@ -234,16 +229,16 @@ void AddRunVerb(report::Program& program) {
                  "samples")
       ->check(CLI::Range(0.0, 1800.0))
       ->capture_default_str();
-  AddGroupsOption(program, run, arguments->groups);
+  AddGroupsOption(program, run, arguments.groups);
   AddOnEventOptions(run, service);
-  AddPairOptions(run, arguments->pair);
-  run.add_option("--http", arguments->http,
+  AddPairOptions(run, arguments.pair);
+  run.add_option("--http", arguments.http,
                  "Serve /metrics, /healthz and /readyz; port 0: any free one")
       ->expected(0, 1)
       ->default_str("127.0.0.1:9464")
       ->transform(AddressOr("127.0.0.1:9464"))
       ->type_name("[=[ADDRESS:]PORT]");
-  AddConsoleOptions(run, *arguments);
+  AddConsoleOptions(run, arguments);
   run.add_option("--allow-host", service.http_names,
                  "Answer --http and --console under this name, too, and not "
                  "only under localhost, addresses and the name of the machine")

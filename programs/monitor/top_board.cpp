@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <sstream>
 #include <tuple>
 #include <vector>
 
 #include "base/printable.h"
+#include "base/text.h"
 #include "base/time_text.h"
 #include "base/time_units.h"
 #include "diagnosis/fault_catalogue.h"
@@ -21,13 +21,6 @@ using report::Tone;
 
 constexpr std::chrono::seconds kMonitorSilence{5};
 constexpr std::size_t kShownFactors = 3;
-
-std::string Lower(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) {
-    return static_cast<char>(std::tolower(c));
-  });
-  return text;
-}
 
 bool Contains(const Json& row, const std::string& filter) {
   return std::ranges::any_of(
@@ -95,43 +88,27 @@ std::string PairText(const idl::MonitorStatusMessage& status) {
                    " ";
 }
 
-// Lines other than rows: title, blank, heading, "too narrow", blank, keys.
+// Lines other than rows: title, blank, heading, "too narrow", "more below",
+// and the one that the last newline leads to.
 constexpr std::size_t kOtherLines = 6;
 
 std::string Title(const TopBoard& board, const TopView& view,
-                  const Json& document) {
-  const auto abnormal = std::ranges::count_if(document["valves"], Abnormal);
+                  const Json& document, std::int64_t now_ns) {
+  const Json& rows = document["valves"];
   std::string title =
       "fdi-monitor top  " +
-      FormatTime(view.now_ns / kNsPerSecond * kNsPerSecond, view.utc) + "  " +
-      std::to_string(board.valves()) + " valves, " + std::to_string(abnormal) +
-      " abnormal, " + std::string(TopSortName(view.sort));
+      FormatTime(now_ns / kNsPerSecond * kNsPerSecond, view.utc) + "  " +
+      std::to_string(board.valves()) + " valves, " +
+      std::to_string(std::ranges::count_if(rows, Abnormal)) + " abnormal";
   if (!view.filter.empty()) {
-    title += ", " + std::to_string(view.rows) + " with '" + view.filter + "'";
+    title += ", " + std::to_string(rows.size()) + " with '" + view.filter + "'";
   }
   return title + (document["monitor"].is_null()
                       ? "  NO MONITOR IS HEARD"
                       : "  monitor " + document["monitor"].get<std::string>());
 }
 
-std::string Keys(const TopView& view) {
-  return view.typing
-             ? "filter: " + view.filter + "_   (Enter: keep, Esc: all valves)"
-             : "q quit  s sort  / filter  up, down, PgUp, PgDn, Home, End "
-               "scroll";
-}
-
 }  // namespace
-
-std::string_view TopSortName(TopSort sort) {
-  constexpr std::array<std::string_view, 4> kNames{"worst first", "by valve",
-                                                   "by factor", "newest first"};
-  return kNames.at(static_cast<std::size_t>(sort));
-}
-
-TopSort NextSort(TopSort sort) {
-  return static_cast<TopSort>((static_cast<int>(sort) + 1) % 4);
-}
 
 void TopBoard::Add(const idl::ModelSetInfoMessage& info,
                    Clock::time_point /*now*/) {
@@ -283,64 +260,21 @@ report::Report TopBoard::Valves(TopSort sort, const std::string& filter,
   return report;
 }
 
-std::string TopScreen(const TopBoard& board, TopView& view,
+std::string TopScreen(const TopBoard& board, const TopView& view,
                       const report::TextStyle& style, std::size_t height,
-                      TopBoard::Clock::time_point now) {
+                      std::int64_t now_ns, TopBoard::Clock::time_point now) {
   report::Report report = board.Valves(view.sort, view.filter, now);
-  auto& rows = report.document["valves"].get_ref<report::Json::array_t&>();
-  view.rows = rows.size();
-  std::string text = Printable(Title(board, view, report.document)) + "\n\n";
-  const std::size_t room =
-      std::max<std::size_t>(1, height - std::min(height, kOtherLines));
-  view.first = std::min(view.first, rows.size() - std::min(rows.size(), room));
-  const std::size_t first = view.first;
-  const std::size_t below =
-      rows.size() - first - std::min(room, rows.size() - first);
-  rows.resize(rows.size() - below);
-  rows.erase(rows.begin(), rows.begin() + static_cast<std::ptrdiff_t>(first));
-  std::ostringstream table;
-  report.PrintText(table, {style, view.utc});
-  text += table.str();
-  std::istringstream lines(text);
-  std::vector<std::string> screen;
-  for (std::string line; std::getline(lines, line);) {
-    screen.push_back(Clipped(line, style.width));
+  std::ostringstream screen;
+  screen << Printable(Title(board, view, report.document, now_ns)) << "\n\n";
+  auto& rows = report.document["valves"].get_ref<Json::array_t&>();
+  const std::size_t all = rows.size();
+  rows.resize(std::min(
+      all, std::max<std::size_t>(height, kOtherLines + 1) - kOtherLines));
+  report.PrintText(screen, {style, view.utc});
+  if (all > rows.size()) {
+    screen << all - rows.size() << " more below\n";
   }
-  screen.resize(std::max<std::size_t>(2, height) - 2);
-  screen.push_back(
-      below > 0 ? Clipped(std::to_string(below) + " more below", style.width)
-                : "");
-  screen.push_back(Clipped(Keys(view), style.width));
-  text = screen.front();
-  for (std::size_t i = 1; i < screen.size(); ++i) {
-    text += "\n" + screen[i];
-  }
-  return text;
-}
-
-std::string Clipped(const std::string& line, std::size_t width) {
-  if (width == 0) {
-    return line;
-  }
-  std::string clipped;
-  std::size_t cells = 0;
-  bool escape = false;
-  bool fits = true;
-  for (const char c : line) {
-    if (escape || c == '\x1b') {
-      clipped += c;
-      escape = c != 'm';
-      continue;
-    }
-    if ((c & '\xC0') != '\x80') {  // Not a UTF-8 continuation byte.
-      fits = cells < width;
-      cells += fits ? 1 : 0;
-    }
-    if (fits) {
-      clipped += c;
-    }
-  }
-  return clipped;
+  return screen.str();
 }
 
 }  // namespace fdi::monitor

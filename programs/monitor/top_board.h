@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
@@ -17,8 +18,8 @@
 namespace fdi::monitor {
 
 enum class TopSort { kWorst, kValve, kFactor, kSince };
-std::string_view TopSortName(TopSort sort);  ///< "worst first", ...
-TopSort NextSort(TopSort sort);
+inline constexpr std::array<std::string_view, 4> kTopSorts{"worst", "valve",
+                                                           "factor", "since"};
 
 /// The latest state of every valve as published by monitors: what `top` shows.
 class TopBoard {
@@ -77,24 +78,16 @@ class TopBoard {
       monitors_;
 };
 
-/// The state of the view in `top`.
+/// What `top` shows of the board, and how.
 struct TopView {
   TopSort sort{TopSort::kWorst};
-  std::string filter;
-  bool typing{false};    ///< The filter is being typed.
-  std::size_t first{0};  ///< Row at the top.
-  std::size_t rows{0};   ///< Rows that pass the filter, as of TopScreen().
-  std::int64_t now_ns{0};
+  std::string filter;  ///< See TopBoard::Valves().
   bool utc{false};
 };
 
-/// Renders a whole screen: `height` lines, none wider than style.width. The
-/// view is scrolled no further than to the last row.
-std::string TopScreen(const TopBoard& board, TopView& view,
+/// A title and as many rows as fit into `height` lines, each with a newline.
+std::string TopScreen(const TopBoard& board, const TopView& view,
                       const report::TextStyle& style, std::size_t height,
-                      TopBoard::Clock::time_point now);
-
-/// `line` truncated to `width` cells; escape codes take no cells.
-std::string Clipped(const std::string& line, std::size_t width);
+                      std::int64_t now_ns, TopBoard::Clock::time_point now);
 
 }  // namespace fdi::monitor

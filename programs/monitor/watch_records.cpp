@@ -2,13 +2,13 @@
 
 #include <algorithm>
 
+#include "base/text.h"
 #include "base/time_text.h"
 #include "diagnosis/fault_catalogue.h"
 #include "diagnosis/records/certainty.h"
 #include "monitor/console/model_facts.h"
 #include "report/text_table.h"
 #include "storage/history/episode.h"
-#include "storage/history/history_database.h"
 
 namespace fdi::monitor {
 namespace {
@@ -31,10 +31,10 @@ std::string NameText(const FaultEvent& message, const std::string& faults) {
     return text + " " + faults +
            " strength=" + FormatNumber(message.transition.strength, 2);
   }
-  std::string names;
-  for (const FaultCandidate& candidate : message.candidates) {
-    names += (names.empty() ? "" : "|") + FaultName(candidate.fault);
-  }
+  const std::string names =
+      JoinText(message.candidates, "|", [](const FaultCandidate& candidate) {
+        return FaultName(candidate.fault);
+      });
   return names.empty() ? text : text + ", may be " + names;
 }
 

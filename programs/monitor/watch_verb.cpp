@@ -1,7 +1,6 @@
 #include <chrono>
 #include <cstdint>
 #include <iostream>
-#include <memory>
 #include <set>
 #include <string>
 
@@ -63,7 +62,8 @@ void PrintCounts(const WatchCounts& counts, std::uint64_t lost, bool json) {
   }
 }
 
-int RunWatch(WatchOptions options, const report::Context& context) {
+int RunWatch(const WatchOptions& given, const report::Context& context) {
+  WatchOptions options = given;
   if (options.events_only) {
     options.bus.vectors = Vectors::kNone;
   } else if (options.lossless) {
@@ -109,33 +109,29 @@ int RunWatch(WatchOptions options, const report::Context& context) {
 }  // namespace
 
 void AddWatchVerb(report::Program& program) {
-  auto options = std::make_shared<WatchOptions>();
-  CLI::App& watch = program.AddVerb(
-      "watch", "Print what monitors publish: decision vectors, fault events",
-      [options](const report::Context& context) {
-        return RunWatch(*options, context);
-      });
-  watch.add_flag("--count", options->count,
+  auto [watch, options] = AddVerb(
+      program, "watch",
+      "Print what monitors publish: decision vectors, fault events", RunWatch);
+  watch.add_flag("--count", options.count,
                  "Print only how many messages came, at the end");
-  watch.add_option("--valves", options->bus.valves, "Only ids that match GLOB");
-  watch.add_flag("--lossless", options->lossless,
+  watch.add_option("--valves", options.bus.valves, "Only ids that match GLOB");
+  watch.add_flag("--lossless", options.lossless,
                  "Every decision vector of monitors that run with "
                  "--lossless-decisions");
-  watch.add_flag("--events", options->events_only,
-                 "Leave out decision vectors");
+  watch.add_flag("--events", options.events_only, "Leave out decision vectors");
   watch
-      .add_option("--max-valves", options->bus.max_valves,
+      .add_option("--max-valves", options.bus.max_valves,
                   "Maximum number of valves")
       ->check(CLI::Range(1, 100000));
   watch
-      .add_option("--for", options->for_s, "Stop after this time [s]; 0: never")
+      .add_option("--for", options.for_s, "Stop after this time [s]; 0: never")
       ->check(CLI::NonNegativeNumber);
   watch
-      .add_option("--idle", options->idle_s,
+      .add_option("--idle", options.idle_s,
                   "Stop after this time without a vector or event [s]; 0: "
                   "never")
       ->check(CLI::NonNegativeNumber);
-  watch.add_option("--expect", options->expect,
+  watch.add_option("--expect", options.expect,
                    "Stop after N decision vectors; exit code 1 if fewer came");
 }
 

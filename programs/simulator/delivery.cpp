@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <charconv>
 #include <cmath>
 #include <cstdio>
 #include <cstring>
@@ -12,6 +11,7 @@
 #include <CLI/CLI.hpp>
 
 #include "base/error.h"
+#include "base/text.h"
 #include "base/time_text.h"
 #include "idl/wire.h"
 #include "import/csv.h"
@@ -172,11 +172,8 @@ double ParseSpeed(std::string_view text) {
   }
   constexpr double kSlowest = 1e-3;
   constexpr double kFastest = 1e6;
-  double speed = 1.0;
-  const auto [end, error] =
-      std::from_chars(text.data(), text.data() + text.size(), speed);
-  if (error != std::errc{} || end != text.data() + text.size() ||
-      !(speed >= kSlowest && speed <= kFastest)) {
+  const double speed = ParseWhole<double>(text).value_or(0.0);
+  if (!(speed >= kSlowest && speed <= kFastest)) {
     throw ConfigError("speed '" + std::string(text) +
                       "': expected a number in 0.001..1000000 (1 is real "
                       "time) or max");

@@ -1,7 +1,6 @@
 #include "programs/simulator/json_line_reader.h"
 
 #include <cmath>
-#include <utility>
 
 #include <nlohmann/json.hpp>
 

@@ -231,12 +231,9 @@ void StreamFeed::ConvertFlow(Sample& sample) {
 
 void StreamFeed::ReportIgnored(const std::vector<std::string>& names) {
   if (!reported_ && !names.empty()) {
-    std::string list;
-    for (const std::string& name : names) {
-      list += (list.empty() ? "not used: " : ",") + name;
-    }
     log_(LogLevel::kInfo,
-         EventLine("csv_note", {{"source", kStdin}, {"note", list}}));
+         EventLine("csv_note", {{"source", kStdin},
+                                {"note", "not used: " + Listed(names)}}));
     reported_ = true;
   }
 }

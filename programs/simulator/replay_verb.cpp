@@ -151,7 +151,9 @@ std::unique_ptr<Feed> OpenFeed(const ReplayOptions& options, double speed,
   return std::make_unique<StoredFeed>(std::move(recording.samples), restamping);
 }
 
-report::Report Replay(ReplayOptions options, const report::Context& context) {
+report::Report Replay(const ReplayOptions& given,
+                      const report::Context& context) {
+  ReplayOptions options = given;
   Check(options);
   options.stream.map = options.table.Read(context.options.utc);
   if (const auto target = FlowTargetOf(options.valve, context)) {
@@ -192,29 +194,26 @@ report::Report Replay(ReplayOptions options, const report::Context& context) {
 }  // namespace
 
 void AddReplayVerb(report::Program& program) {
-  auto options = std::make_shared<ReplayOptions>();
-  CLI::App& verb = program.AddVerb(
-      "replay", "Publish a stored run, a CSV file or what comes on stdin",
-      [options](const report::Context& context) -> report::Report {
-        return Replay(*options, context);
-      });
-  verb.add_option("--csv", options->csv,
+  auto [verb, options] = AddVerb(
+      program, "replay",
+      "Publish a stored run, a CSV file or what comes on stdin", Replay);
+  verb.add_option("--csv", options.csv,
                   "CSV file; - reads CSV or JSON lines from stdin and passes "
                   "each on at once, unless --speed is given")
       ->type_name("FILE|-");
-  options->table.AddTo(verb);
-  verb.add_option("--run", options->run, "A stored run, or a stretch of it")
+  options.table.AddTo(verb);
+  verb.add_option("--run", options.run, "A stored run, or a stretch of it")
       ->type_name("ID[@from:to]");
-  verb.add_option("--valve", options->valve,
+  verb.add_option("--valve", options.valve,
                   "Valve id (default: that of the stored run)")
       ->type_name("ID");
-  AddDeliveryOptions(verb, options->delivery);
-  verb.add_flag("--keep-stamps", options->keep_stamps,
+  AddDeliveryOptions(verb, options.delivery);
+  verb.add_flag("--keep-stamps", options.keep_stamps,
                 "Keep the time stamps instead of beginning now; t_s of a CSV "
                 "or of JSON is then Unix time");
-  verb.add_flag("--split-gaps", options->stream.split_gaps,
+  verb.add_flag("--split-gaps", options.stream.split_gaps,
                 "Accept gaps in the times of a CSV or of JSON, and keep them");
-  verb.add_option("--period", options->stream.period_s,
+  verb.add_option("--period", options.stream.period_s,
                   "Sample period of lines on stdin (default: their first "
                   "step; 1 s for JSON lines without t_s, which are stamped "
                   "on arrival)")

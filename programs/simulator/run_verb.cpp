@@ -1,7 +1,5 @@
-#include <charconv>
 #include <cstdio>
 #include <filesystem>
-#include <iostream>
 #include <limits>
 #include <memory>
 #include <utility>
@@ -10,6 +8,7 @@
 #include <CLI/CLI.hpp>
 
 #include "base/error.h"
+#include "base/text.h"
 #include "base/time_text.h"
 #include "programs/simulator/delivery.h"
 #include "programs/simulator/verbs.h"
@@ -193,11 +192,8 @@ report::Report Run(const RunOptions& options, const report::Context& context) {
 
 // A plain number, or a duration such as "10m".
 double SecondsOf(const std::string& text) {
-  double seconds = 0.0;
-  const char* end = text.data() + text.size();
-  const auto [rest, error] = std::from_chars(text.data(), end, seconds);
-  if (error == std::errc() && rest == end) {
-    return seconds;
+  if (const auto seconds = ParseWhole<double>(text)) {
+    return *seconds;
   }
   try {
     return static_cast<double>(ParseDuration(text)) / 1e9;
@@ -254,19 +250,15 @@ void AddScenarioOptions(CLI::App& verb, RunOptions& options) {
 }  // namespace
 
 void AddRunVerb(report::Program& program) {
-  auto options = std::make_shared<RunOptions>();
-  CLI::App& verb = program.AddVerb(
-      "run", "Simulate valves and publish their samples",
-      [options](const report::Context& context) -> report::Report {
-        return Run(*options, context);
-      });
-  AddScenarioOptions(verb, *options);
-  AddDeliveryOptions(verb, options->delivery);
-  verb.add_flag("--record", options->record,
+  auto [verb, options] =
+      AddVerb(program, "run", "Simulate valves and publish their samples", Run);
+  AddScenarioOptions(verb, options);
+  AddDeliveryOptions(verb, options.delivery);
+  verb.add_flag("--record", options.record,
                 "Store the runs, with their truth, in runs.db");
-  verb.add_flag("--no-publish", options->no_publish,
+  verb.add_flag("--no-publish", options.no_publish,
                 "Simulate only, as fast as possible");
-  verb.add_option("--export", options->export_file, "Write the run as CSV")
+  verb.add_option("--export", options.export_file, "Write the run as CSV")
       ->type_name("FILE.csv");
 }
 

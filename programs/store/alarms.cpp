@@ -5,7 +5,6 @@
 #include "base/error.h"
 #include "base/suggestion.h"
 #include "programs/store/verbs.h"
-#include "storage/history/history_database.h"
 #include "storage/history/history_editor.h"
 #include "storage/history/history_reader.h"
 
@@ -125,6 +124,7 @@ Report ShelfReport(const std::vector<Shelf>& shelves, const Context& context) {
 struct ShelveOptions {
   std::string valve;
   std::string fault;
+  std::string from;
   std::string duration{"8h"};
   NoteOptions note;
 };
@@ -149,19 +149,26 @@ void WarnIfUnknown(const std::string& valve, HistoryReader& reader,
 
 Report Shelve(const ShelveOptions& options, const Context& context) {
   const auto path = DataOf(context).history();
-  HistoryReader reader(path);
   const OperatorNote note = options.note.Note();
   if (options.duration.find_first_not_of("0123456789.") == std::string::npos) {
     throw ConfigError("--for " + options.duration +
                       ": expected a time with its unit, such as 30min, 8h or "
                       "3d");
   }
-  const std::int64_t until_ns = note.now_ns + ParseDuration(options.duration);
+  const auto from_ns =
+      options.from.empty()
+          ? std::nullopt
+          : std::optional(ParseTime(options.from, context.options.utc));
+  const std::int64_t until_ns =
+      from_ns.value_or(note.now_ns) + ParseDuration(options.duration);
+  // Makes the history where no monitor has run yet.
+  HistoryEditor editor(path);
+  HistoryReader reader(path);
   WarnIfUnknown(options.valve, reader, context);
-  const Shelf shelf = HistoryEditor(path).Shelve(
+  const Shelf shelf = editor.Shelve(
       options.valve,
       options.fault.empty() ? std::nullopt : std::optional(options.fault),
-      until_ns, note);
+      until_ns, note, from_ns);
   return ShelfReport({shelf}, context);
 }
 
@@ -240,6 +247,9 @@ void AddAlarmVerbs(report::Program& program, CLI::App& group) {
   shelve.add_option("valve", shelved.valve, "Valve id")->required();
   shelve.add_option("--fault", shelved.fault,
                     "Only this answer: f19, 'f3|f6', unknown");
+  shelve.add_option("--from", shelved.from,
+                    "Planned: from this time on, '2026-11-27 06:00' (default "
+                    "now; 90 days ahead at most)");
   shelve.add_option("--for", shelved.duration,
                     "How long: 8h, 30min, 3d; 90 days at most");
   shelved.note.AddTo(shelve);
@@ -250,9 +260,9 @@ void AddAlarmVerbs(report::Program& program, CLI::App& group) {
   unshelve.add_option("--valve", ended.valve, "All of this valve");
   ended.note.AddTo(unshelve);
 
-  auto [shelf, listed] =
-      AddVerb(program, group, "shelf",
-              "List what is shelved now, by whom and why", ListShelf);
+  auto [shelf, listed] = AddVerb(
+      program, group, "shelf",
+      "List what is shelved or planned to be, by whom and why", ListShelf);
   shelf.add_flag("--all", listed.all, "Also what was shelved before");
 }
 

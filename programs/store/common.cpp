@@ -2,6 +2,7 @@
 #include <sstream>
 
 #include "base/error.h"
+#include "base/text.h"
 #include "base/time_units.h"
 #include "diagnosis/fault_catalogue.h"
 #include "programs/store/clock.h"
@@ -34,14 +35,10 @@ void EpisodeOptions::AddTo(CLI::App& verb) {
   verb.add_option("--fault", fault,
                   std::string(kFaultNames) + ", paper1..paper5 or unknown");
   window.AddTo(verb);
-  std::string states;
-  for (const std::string& name : EpisodeStateNames()) {
-    states += (states.empty() ? "" : "|") + name;
-  }
   verb.add_option("--state", state,
                   "open, detected, isolated or closed of the episode; the "
                   "others of the alarm; unacked: unack or rtn_unack")
-      ->type_name(states);
+      ->type_name(JoinText(EpisodeStateNames(), "|"));
   AddLimit(verb, limit);
 }
 
@@ -211,7 +208,8 @@ Json ShelfJson(const Shelf& shelf) {
           {"origin", shelf.origin},
           {"ended_utc", TimeJson(shelf.ended_ns)},
           {"ended_by", TextJson(shelf.ended_by)},
-          {"ended_origin", TextJson(shelf.ended_origin)}};
+          {"ended_origin", TextJson(shelf.ended_origin)},
+          {"planned_utc", TimeJson(shelf.planned_ns)}};
 }
 
 Json HoursJson(const std::vector<CoverageTime>& coverage) {

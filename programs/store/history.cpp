@@ -9,7 +9,6 @@
 #include "report/plot/episode_figure.h"
 #include "report/plot/episode_page.h"
 #include "report/text_table.h"
-#include "storage/history/certainty.h"
 #include "storage/history/history_reader.h"
 #include "storage/history/strength.h"
 
@@ -521,14 +520,13 @@ void AddHistoryVerbs(report::Program& program) {
   AddHistoryFigures(program, group);
   AddAlarmVerbs(program, group);
 
-  auto exported = std::make_shared<EpisodeExportOptions>();
-  CLI::App& exporting = program.AddVerb(
-      group, "export",
-      "Write as CSV the list of episodes, or the trace of one of them",
-      [exported](const Context& c) { return ExportEpisodes(*exported, c); });
-  AddEpisode(exporting, exported->id, false);
-  AddOutput(exporting, exported->output);
-  exported->filter.AddTo(exporting);
+  auto [exporting, exported] =
+      AddVerb(program, group, "export",
+              "Write as CSV the list of episodes, or the trace of one of them",
+              ExportEpisodes);
+  AddEpisode(exporting, exported.id, false);
+  AddOutput(exporting, exported.output);
+  exported.filter.AddTo(exporting);
 
   auto [plot, plotted] =
       AddVerb(program, group, "plot",

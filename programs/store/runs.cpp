@@ -366,12 +366,11 @@ void AddRunsVerbs(report::Program& program) {
   AddSniffVerb(program, group);
   AddImport(program, group);
 
-  auto exported = std::make_shared<FileOptions>();
-  CLI::App& exporting = program.AddVerb(
-      group, "export", "Write a run, or a stretch of it, as CSV",
-      [exported](const Context& c) { return ExportRun(*exported, c); });
-  exporting.add_option("run", exported->selector, kSelector)->required();
-  AddOutput(exporting, exported->output);
+  auto [exporting, exported] =
+      AddVerb(program, group, "export",
+              "Write a run, or a stretch of it, as CSV", ExportRun);
+  exporting.add_option("run", exported.selector, kSelector)->required();
+  AddOutput(exporting, exported.output);
 
   auto [label, label_options] =
       AddVerb(program, group, "label",

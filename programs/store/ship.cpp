@@ -9,6 +9,7 @@
 
 #include "base/error.h"
 #include "base/log.h"
+#include "base/text.h"
 #include "plant/plant_reader.h"
 #include "plant/shipper.h"
 #include "programs/store/clock.h"
@@ -79,11 +80,10 @@ std::int64_t LeftOut(const Shipped& shipped) {
 
 // "left out 2 rows that the checks of the plant refuse: 2 of shelf"
 std::string LeftOutText(const Shipped& shipped) {
-  std::string tables;
-  for (const auto& [table, count] : shipped.left_out) {
-    tables +=
-        (tables.empty() ? "" : ", ") + std::to_string(count) + " of " + table;
-  }
+  const std::string tables =
+      JoinText(shipped.left_out, ", ", [](const auto& of) {
+        return std::to_string(of.second) + " of " + of.first;
+      });
   return tables.empty()
              ? ""
              : "left out " + std::to_string(LeftOut(shipped)) +
@@ -132,6 +132,10 @@ Report ShipReport(const ShipOptions& options, const std::string& plant,
     try {
       // A history that was restored from a backup is another file.
       if (!shipper || !shipper->InPlace()) {
+        // The monitor makes it, not we: it may be about to.
+        if (!std::filesystem::exists(data.history())) {
+          throw DataError("no database " + data.history().string());
+        }
         shipper.emplace(data, options.url,
                         ShipSource{options.host, options.monitor},
                         Limits(context, kShipping));
@@ -213,6 +217,7 @@ Report Ship(const ShipOptions& given, const Context& context) {
   }
   const DataDirectory data = DataOf(context);
   if (!options.init && !options.prune &&
+      (options.every.empty() || options.forget) &&
       !std::filesystem::exists(data.history())) {
     throw NotFoundError("no database " + data.history().string());
   }

@@ -57,26 +57,6 @@ std::vector<report::VerbExamples> Examples();
 /// For verbs without options.
 struct NoOptions {};
 
-/// Adds a verb to a group or, with program.root(), to the program. The action
-/// receives the Options that the caller binds to command-line options:
-///
-///     auto [verb, options] = AddVerb(program, group, "list", "...", List);
-///     verb.add_option("--valve", options.valve, "Glob over valve ids");
-template <typename Options>
-std::pair<CLI::App&, Options&> AddVerb(report::Program& program,
-                                       CLI::App& group, const std::string& name,
-                                       const std::string& description,
-                                       Report (*action)(const Options&,
-                                                        const Context&)) {
-  auto options = std::make_shared<Options>();
-  CLI::App& verb = program.AddVerb(
-      group, name, description,
-      report::ReportAction([options, action](const Context& context) {
-        return action(*options, context);
-      }));
-  return {verb, *options};
-}
-
 /// The data directory of --data.
 DataDirectory DataOf(const Context& context);
 /// The same, created if it does not exist; for verbs that write.

@@ -36,23 +36,19 @@ report::Report CompareSets(const CompareOptions& options,
 }  // namespace
 
 void AddCompareVerb(report::Program& program) {
-  auto options = std::make_shared<CompareOptions>();
-  CLI::App& verb = program.AddVerb(
-      "compare", "Compare two model sets on the same runs",
-      [options](const report::Context& context) -> report::Report {
-        return CompareSets(*options, context);
-      });
-  verb.add_option("a", options->a, "The set in use")
+  auto [verb, options] =
+      AddVerb(program, "compare", "Compare two model sets on the same runs",
+              CompareSets);
+  verb.add_option("a", options.a, "The set in use")
       ->required()
       ->type_name("NAME[@VERSION]");
-  verb.add_option("b", options->b, "The candidate")
+  verb.add_option("b", options.b, "The candidate")
       ->required()
       ->type_name("NAME[@VERSION]");
-  options->selection.AddTo(verb);
-  verb.add_flag("--assume-normal", options->assume_normal,
+  options.selection.AddTo(verb);
+  verb.add_flag("--assume-normal", options.assume_normal,
                 "Samples without truth count as free of faults");
-  verb.add_flag("--all", options->all,
-                "List runs on which both are alike, too");
+  verb.add_flag("--all", options.all, "List runs on which both are alike, too");
 }
 
 }  // namespace fdi::trainer

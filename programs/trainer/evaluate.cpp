@@ -136,30 +136,26 @@ void RefuseStudies(report::Program& program) {
 }  // namespace
 
 void AddEvaluateVerb(report::Program& program) {
-  auto options = std::make_shared<EvaluateOptions>();
-  CLI::App& verb = program.AddVerb(
-      "evaluate",
+  auto [verb, options] = AddVerb(
+      program, "evaluate",
       "Score runs with the monitor's engine: indices, confusion matrix, report",
-      [options](const report::Context& context) -> report::Report {
-        return RunEvaluate(*options, context);
-      });
-  verb.add_option("--model-set", options->model_set,
-                  "NAME (its active version)")
+      RunEvaluate);
+  verb.add_option("--model-set", options.model_set, "NAME (its active version)")
       ->type_name("NAME[@VERSION]");
-  verb.add_option("--valve", options->valve,
+  verb.add_option("--valve", options.valve,
                   "Take the model set assigned to this valve")
       ->type_name("ID");
-  options->selection.AddTo(verb);
-  verb.add_option("--report", options->report,
+  options.selection.AddTo(verb);
+  verb.add_option("--report", options.report,
                   "Write DIR/index.html: tables and traces of every run")
       ->type_name("DIR");
-  verb.add_option("--vectors", options->vectors,
+  verb.add_option("--vectors", options.vectors,
                   "Write every decision vector, numbers as hex floats")
       ->type_name("FILE.csv");
-  verb.add_flag("!--no-second-look", options->second_look,
+  verb.add_flag("!--no-second-look", options.second_look,
                 "Score what the observers say, without the second look by "
                 "the physics of an onboarded valve");
-  verb.add_flag("--assume-normal", options->assume_normal,
+  verb.add_flag("--assume-normal", options.assume_normal,
                 "Samples without truth count as free of faults");
   program.AllowCsv(verb, "One line per run instead of tables");
   RefuseStudies(program);

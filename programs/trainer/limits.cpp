@@ -1,4 +1,3 @@
-#include <memory>
 #include <optional>
 
 #include <CLI/CLI.hpp>
@@ -265,31 +264,28 @@ report::Report Run(const LimitsOptions& options,
 }  // namespace
 
 void AddLimitsVerb(report::Program& program) {
-  auto options = std::make_shared<LimitsOptions>();
-  CLI::App& verb = program.AddVerb(
-      "limits",
+  auto [verb, options] = AddVerb(
+      program, "limits",
       "Set the limits of an onboarded valve by more healthy hours, and by "
       "alarms that were labelled false",
-      [options](const report::Context& context) -> report::Report {
-        return Run(*options, context);
-      });
-  verb.add_option("--valve", options->valve, "Id of the valve")
+      Run);
+  verb.add_option("--valve", options.valve, "Id of the valve")
       ->required()
       ->type_name("ID");
-  verb.add_option("--runs", options->runs,
+  verb.add_option("--runs", options.runs,
                   "Healthy runs, or stretches of them [s] (default: all of the "
                   "valve that fdi-monitor run --record stored)")
       ->delimiter(',')
       ->type_name("ID[@from:to],...");
-  verb.add_option("--file", options->files,
+  verb.add_option("--file", options.files,
                   "Healthy CSV file, not stored; repeatable")
       ->type_name("FILE.csv[@from:to]");
-  options->table.AddTo(verb);
-  verb.add_option("--since", options->since,
+  options.table.AddTo(verb);
+  verb.add_option("--since", options.since,
                   "Recorded samples and labelled episodes from then on "
                   "(default: since the valve was onboarded)")
       ->type_name("TIME");
-  verb.add_flag("--dry-run", options->dry_run,
+  verb.add_flag("--dry-run", options.dry_run,
                 "Show what the limits would become and exit")
       ->configurable(false);
   program.AddExamples(

@@ -42,11 +42,7 @@ Json ChannelJson(const ChannelSpec& channel, const ModelSet& models) {
           {"unit", UnitOf(channel.output, models.flow_unit)},
           {"lower_threshold", channel.lower_threshold},
           {"upper_threshold", channel.upper_threshold},
-          {"windows", std::move(windows)},
-          {"drift",
-           {{"lower_mean", channel.drift.lower_mean},
-            {"upper_mean", channel.drift.upper_mean},
-            {"log_scale", channel.drift.log_scale}}}};
+          {"windows", std::move(windows)}};
 }
 
 Json ObserverJson(const Observer& observer, const ModelSet& models) {
@@ -88,21 +84,13 @@ std::string WindowsText(const ModelSet& models) {
                            {"window [samples]", Align::kRight},
                            {"mean below", Align::kRight},
                            {"mean above", Align::kRight},
-                           {"deviation above", Align::kRight},
-                           {"mean may drift", Align::kRight},
-                           {"deviation times", Align::kRight}});
+                           {"deviation above", Align::kRight}});
   for (const ChannelSpec& channel : models.channels) {
     for (const WindowLimits& window : channel.windows) {
-      const bool longest = &window == &channel.windows.back();
-      const DriftLimits& drift = channel.drift;
       table.AddRow({channel.name, std::to_string(window.length),
                     FormatNumber(window.lower_mean, 3),
                     FormatNumber(window.upper_mean, 3),
-                    FormatNumber(std::exp(window.upper_log_rms), 3),
-                    longest ? FormatNumber(drift.lower_mean, 3) + " .. " +
-                                  FormatNumber(drift.upper_mean, 3)
-                            : "",
-                    longest ? FormatNumber(std::exp(drift.log_scale), 2) : ""});
+                    FormatNumber(std::exp(window.upper_log_rms), 3)});
     }
   }
   std::ostringstream text;

@@ -27,6 +27,7 @@
 #include "trainer/campaign/file_runs.h"
 #include "trainer/campaign/run_input.h"
 #include "trainer/fleet/valve_types.h"
+#include "trainer/learning/extension.h"
 #include "trainer/learning/labelled_episodes.h"
 #include "trainer/onboarding/onboarding.h"
 #include "trainer/onboarding/record_verdict.h"
@@ -66,6 +67,8 @@ struct OnboardOptions : TypeOptions {
   bool fit{true};
   bool assess{true};
   bool gains{false};
+  bool extend{false};
+  bool accept{false};
   PlantVerbOptions plant;
 };
 
@@ -148,6 +151,46 @@ Json OnboardingJson(const Onboarding& onboarding,
     json["coverage"] = CoverageJson(*onboarding.coverage);
   }
   return json;
+}
+
+// What the set that is extended saw of the faults, and what the new one sees.
+Json ExtendsJson(const ModelSet& before, const Onboarding& onboarding) {
+  Json faults = Json::array();
+  for (const CoverageChange& change :
+       ChangesOf(*onboarding.coverage_before, *onboarding.coverage)) {
+    const auto strength = [&](const std::optional<double>& smallest) {
+      return smallest ? Json(change.negative ? -*smallest : *smallest) : Json();
+    };
+    faults.push_back({{"fault", FaultName(change.fault)},
+                      {"before", strength(change.before)},
+                      {"after", strength(change.after)}});
+  }
+  return {{"model_set", before.name},
+          {"version", before.version},
+          {"content_hash", storage::HashHex(before.content_hash)},
+          {"hours", before.threshold_hours},
+          {"faults", std::move(faults)}};
+}
+
+// Hours that a person vouches for are learnt, but not what they would hide
+// without that being said.
+void RequireAccepted(const Onboarding& onboarding) {
+  std::string lost;
+  for (const CoverageChange& change :
+       ChangesOf(*onboarding.coverage_before, *onboarding.coverage)) {
+    if (change.lost()) {
+      lost += (lost.empty() ? "" : ", ") + FaultName(change.fault) +
+              (change.negative ? " (-)" : "");
+    }
+  }
+  if (!lost.empty()) {
+    throw DataError(
+        "with these hours, faults that the present set detects would not be "
+        "detected at any strength: " +
+        lost +
+        ". Nothing was stored; --accept stores it all the same, if the valve "
+        "was healthy");
+  }
 }
 
 void AddFit(const simulator::ValveFit& fit, report::Report& report) {
@@ -277,8 +320,11 @@ report::Report ReportOf(const Onboarding& onboarding,
 
 // Runs in several flow units are converted to that of the first, by the type's
 // medium.
+//
+// @param unit of the flow; none: that of the first run.
 std::vector<TrainingRun> LoadRuns(const OnboardOptions& options,
                                   const ValveType& type,
+                                  std::optional<FlowUnit> unit,
                                   const report::Context& context) {
   if (options.runs.empty() && options.files.empty()) {
     throw ConfigError("healthy data are needed: --runs ID,... or --file CSV");
@@ -295,9 +341,10 @@ std::vector<TrainingRun> LoadRuns(const OnboardOptions& options,
       options.runs, options.files, {context.options.data_dir}, csv);
   std::vector<TrainingRun> runs;
   for (storage::StoredRun& run : stored) {
-    ConvertFlow(
-        run, simulator::FlowTarget{stored.front().info.run.flow_unit, medium},
-        context.log);
+    ConvertFlow(run,
+                simulator::FlowTarget{
+                    unit.value_or(stored.front().info.run.flow_unit), medium},
+                context.log);
     runs.push_back(ToTrainingRun(run, true));
     if (!options.signals.empty()) {
       runs.back() =
@@ -331,6 +378,59 @@ Onboarding OnboardOrSayWhyNot(const std::vector<TrainingRun>& runs,
   }
 }
 
+// What the valve is onboarded from, and how.
+struct OnboardingJob {
+  std::vector<TrainingRun> runs;
+  OnboardingOptions settings;
+};
+
+OnboardingJob NewJob(const OnboardOptions& options, storage::ModelStore& store,
+                     const report::Context& context) {
+  OnboardingJob job;
+  const FoundType found = FindType(options.type, &store);
+  job.runs = LoadRuns(options, found.type, std::nullopt, context);
+  job.settings.name = options.name.empty() ? options.valve : options.name;
+  job.settings.type = found.type;
+  job.settings.fit = options.fit && !found.stored;
+  job.settings.of_type = SetOf(found, store);
+  job.settings.assess = options.assess;
+  job.settings.false_alarms_per_hour = options.false_alarms_per_hour;
+  return job;
+}
+
+// The former record and the new hours, all as the valve measures it; the fit
+// starts where the former one ended.
+OnboardingJob ExtensionJob(const OnboardOptions& options,
+                           storage::ModelStore& store,
+                           const report::Context& context) {
+  OnboardOptions more = options;
+  const FormerRecord former = ReadFormerRecord(
+      options.valve, store, {context.options.data_dir}, more.files);
+  OnboardOptions before = options;
+  before.runs = former.runs;
+  before.files = former.files;
+  for (OnboardOptions* part : {&before, &more}) {
+    if (part->files.empty()) {
+      part->table = {};
+    }
+  }
+  const FlowUnit unit = former.models->flow_unit;
+  OnboardingJob job;
+  job.runs = LoadRuns(before, former.type, unit, context);
+  job.settings.former_runs = job.runs.size();
+  for (TrainingRun& run : LoadRuns(more, former.type, unit, context)) {
+    job.runs.push_back(std::move(run));
+  }
+  for (TrainingRun& run : job.runs) {
+    run = WithSignals(std::move(run), former.signals);
+  }
+  job.settings.name = former.models->name;
+  job.settings.type = former.type;
+  job.settings.extends = former.models;
+  job.settings.false_alarms_per_hour = former.models->false_alarms_per_hour;
+  return job;
+}
+
 report::Report OnboardValve(const OnboardOptions& options,
                             const report::Context& context) {
   if (options.valve.empty()) {
@@ -339,8 +439,10 @@ report::Report OnboardValve(const OnboardOptions& options,
   if (options.plant.dry_run || !options.plant.shard.empty()) {
     throw ConfigError("--dry-run and --shard are of --plant");
   }
-  const std::string name = options.name.empty() ? options.valve : options.name;
-  RequireStorable(name, "--name");
+  if (!options.extend) {
+    RequireStorable(options.name.empty() ? options.valve : options.name,
+                    "--name");
+  }
   if (!options.save_type.empty()) {
     RequireStorable(options.save_type, "--save-type");
   }
@@ -348,16 +450,9 @@ report::Report OnboardValve(const OnboardOptions& options,
   storage::EnsureExists(directory);
   storage::ModelStore store(directory.models(),
                             storage::Access::kOccasionalWriter);
-  const FoundType found = FindType(options.type, &store);
-  const std::vector<TrainingRun> runs = LoadRuns(options, found.type, context);
-  OnboardingOptions settings;
-  settings.name = name;
-  settings.type = found.type;
-  settings.fit = options.fit && !found.stored;
-  settings.of_type = SetOf(found, store);
-  settings.false_alarms_per_hour = options.false_alarms_per_hour;
+  auto [runs, settings] = options.extend ? ExtensionJob(options, store, context)
+                                         : NewJob(options, store, context);
   settings.threads = options.threads;
-  settings.assess = options.assess;
   settings.software = context.software;
   settings.created_ns = NowNs();
   report::StopSignals signals;
@@ -374,16 +469,28 @@ report::Report OnboardValve(const OnboardOptions& options,
             .gains;
   }
   bar.Finish();
+  if (settings.extends && !options.accept) {
+    RequireAccepted(onboarding);
+  }
   signals.EndWithin(std::chrono::milliseconds(0));
   onboarding.models =
       *store.Store(ResultOf(options.valve, onboarding, options.save_type));
   const std::chrono::duration<double> seconds =
       std::chrono::steady_clock::now() - start;
-  return ReportOf(
+  report::Report report = ReportOf(
       onboarding, settings.of_type, JudgeRecord(runs, onboarding.hours),
       "valve " + options.valve + ": " + FormatNumber(onboarding.hours, 2) +
           " h of healthy data, onboarded in " +
           std::to_string(std::lround(seconds.count())) + " s");
+  if (settings.extends) {
+    report.document["extends"] = ExtendsJson(*settings.extends, onboarding);
+    report.Line("extends " + NameOf(*settings.extends) +
+                "; faults whose smallest detected strength differs:");
+    report.Table("extends/faults", {{"fault", "fault"},
+                                    {"detected from", "before"},
+                                    {"now from", "after"}});
+  }
+  return report;
 }
 
 report::Report Assess(const CoverageOptions& options,
@@ -457,6 +564,15 @@ void AddOptions(CLI::App& verb, OnboardOptions& options) {
                 "Take the parameters of the type as they are");
   verb.add_flag("!--no-coverage", options.assess,
                 "Leave out the table of faults that can be detected");
+  verb.add_flag("--extend", options.extend,
+                "Make the models of the valve anew from what they were made "
+                "from and from these healthy hours")
+      ->configurable(false);
+  verb.add_flag("--accept", options.accept,
+                "Of --extend: store the models even if a fault is not detected "
+                "any more")
+      ->configurable(false)
+      ->needs("--extend");
   verb.add_flag("--gains", options.gains,
                 "Compute what each missing transmitter would add; takes the "
                 "time of an onboarding for each");
@@ -478,10 +594,18 @@ void AddOnboardVerb(report::Program& program) {
                                       options->false_alarms_per_hour, context);
       });
   AddOptions(verb, *options);
-  // The rows of a table state these.
-  for (const char* option : {"--valve", "--runs", "--type", "--signals",
-                             "--save-type", "--name", "--gains"}) {
+  // The rows of a table state these, or leave nothing to choose: a type is
+  // fitted once, and no row gets a table of faults.
+  for (const char* option :
+       {"--valve", "--runs", "--type", "--signals", "--save-type", "--name",
+        "--gains", "--no-fit", "--no-coverage"}) {
     verb.get_option("--plant")->excludes(verb.get_option(option));
+  }
+  // The set that is extended states these.
+  for (const char* option :
+       {"--plant", "--type", "--signals", "--save-type", "--name", "--no-fit",
+        "--no-coverage", "--false-alarms-per-hour"}) {
+    verb.get_option("--extend")->excludes(verb.get_option(option));
   }
   program.AddExamples(
       {{"onboard",
@@ -489,6 +613,8 @@ void AddOnboardVerb(report::Program& program) {
           "fdi-trainer onboard --valve FV-101 --runs 1a2b,3c4d"},
          {"From a CSV file, with what it would gain by more transmitters",
           "fdi-trainer onboard --valve FV-101 --file fv101.csv --gains"},
+         {"With a day on which the valve was healthy and an alarm came",
+          "fdi-trainer onboard --valve FV-101 --extend --file day.csv"},
          {"All loops of a plant: what the table matches, then the work",
           "fdi-trainer onboard --plant plant.toml --dry-run"},
          {"The work; after an interruption the same command goes on",

@@ -1,6 +1,4 @@
-#include <memory>
 #include <string>
-#include <vector>
 
 #include <CLI/CLI.hpp>
 
@@ -160,17 +158,13 @@ report::Report Show(const ShowOptions& options,
 }  // namespace
 
 void AddShowVerb(report::Program& program) {
-  auto options = std::make_shared<ShowOptions>();
-  CLI::App& verb = program.AddVerb(
-      "show", "Show a model set, and its rules",
-      [options](const report::Context& context) -> report::Report {
-        return Show(*options, context);
-      });
-  verb.add_option("model-set", options->model_set,
+  auto [verb, options] =
+      AddVerb(program, "show", "Show a model set, and its rules", Show);
+  verb.add_option("model-set", options.model_set,
                   "NAME (its active version) or NAME@VERSION")
       ->required()
       ->type_name("NAME[@VERSION]");
-  verb.add_flag("--rules", options->rules, "Print the rules in words");
+  verb.add_flag("--rules", options.rules, "Print the rules in words");
   program.AddRemoved("show", "--pictures",
                      "it is fdi-study pictures, which the source tree builds "
                      "with -DFDI_BENCH=ON");

@@ -1,18 +1,17 @@
 #include <charconv>
 #include <chrono>
 #include <cmath>
-#include <memory>
 #include <optional>
 
 #include <CLI/CLI.hpp>
 
 #include "base/error.h"
 #include "base/log.h"
+#include "base/text.h"
 #include "base/time_text.h"
 #include "diagnosis/fault_catalogue.h"
 #include "programs/trainer/model_report.h"
 #include "programs/trainer/verbs.h"
-#include "report/help.h"
 #include "report/models/lineage_text.h"
 #include "report/program.h"
 #include "report/progress.h"
@@ -232,9 +231,9 @@ report::Report PlanReport(const LabelPlan& plan) {
     }
   }
   report.Line("next version of " + plan.training.name + ", built on " + parent +
-              "\nruns: " + report::Joined(plan.runs));
+              "\nruns: " + JoinText(plan.runs));
   if (!plan.missing.empty()) {
-    report.Line("not in runs.db: " + report::Joined(plan.missing));
+    report.Line("not in runs.db: " + JoinText(plan.missing));
   }
   report.Line("").Table("episodes", {{"episode", "episode_id"},
                                      {"valve", "valve_id"},
@@ -384,14 +383,11 @@ void AddLabelOptions(CLI::App& verb, TrainOptions& options) {
 }  // namespace
 
 void AddTrainVerb(report::Program& program) {
-  auto options = std::make_shared<TrainOptions>();
-  CLI::App& verb = program.AddVerb(
-      "train", "Train a model set and store it as the next version of its name",
-      [options](const report::Context& context) -> report::Report {
-        return Train(*options, context);
-      });
-  AddOptions(verb, *options);
-  AddLabelOptions(verb, *options);
+  auto [verb, options] = AddVerb(
+      program, "train",
+      "Train a model set and store it as the next version of its name", Train);
+  AddOptions(verb, options);
+  AddLabelOptions(verb, options);
   program.AddExamples(
       {{"train",
         {{"The paper's observers, simulating what they are trained on",

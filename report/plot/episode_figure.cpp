@@ -5,7 +5,6 @@
 #include <cmath>
 #include <cstdio>
 #include <iterator>
-#include <limits>
 
 #include "base/error.h"
 #include "diagnosis/fault_catalogue.h"

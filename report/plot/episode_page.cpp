@@ -37,8 +37,9 @@ Column Field(std::string heading, std::string text) {
   return column;
 }
 
-std::string_view BySimulation(std::string_view layer) {
+std::string_view ByLayer(std::string_view layer) {
   return layer == LayerName(Layer::kPhysics) ? ", by simulation of the valve"
+         : layer == LayerName(Layer::kAudit) ? ", by the audit of the loop"
                                              : "";
 }
 
@@ -49,7 +50,7 @@ std::string FaultLine(const Episode& e, const std::string& name) {
     return line;
   }
   line += ": " + name + " (" + *e.fault + ")";
-  return line.append(BySimulation(e.layer.value_or("")));
+  return line.append(ByLayer(e.layer.value_or("")));
 }
 
 std::string AlarmLine(const Alarm& alarm, bool utc) {
@@ -100,7 +101,8 @@ std::string EndText(std::string_view reason) {
        {"stream_ended", "the valve's data ended"},
        {"stale_timeout", "no data came any more"},
        {"model_changed", "another model set judges the valve"},
-       {"superseded", "a newer source of its data took over"}}};
+       {"superseded",
+        "another episode, or a newer source of its data, took over"}}};
   for (const auto& [name, text] : kEnds) {
     if (reason == name) {
       return text;
@@ -287,7 +289,7 @@ std::string EventSentence(const HistoryEntry& event,
                      : event.kind == "REISOLATED" ? "The name became "
                                                   : "Grown worse: ";
   text += event.faults.empty() ? "none" : NameAndFault(event.faults, texts);
-  text.append(BySimulation(event.layer));
+  text.append(ByLayer(event.layer));
   text += ", strength " + report::FormatNumber(event.strength, 2);
   const auto severity =
       event.priority ? SeverityOf(*event.priority) : std::nullopt;

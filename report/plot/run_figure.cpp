@@ -1,12 +1,11 @@
 #include "report/plot/run_figure.h"
 
 #include <algorithm>
-#include <cmath>
 #include <cstdio>
 #include <iterator>
-#include <limits>
 #include <map>
 
+#include "base/text.h"
 #include "diagnosis/fault_catalogue.h"
 
 namespace fdi::plot {
@@ -119,11 +118,9 @@ std::string Refused(const std::vector<StoredSample>& samples) {
       ++counts[stored.intake];
     }
   }
-  std::string text;
-  for (const auto& [intake, count] : counts) {
-    text += (text.empty() ? "" : ", ") + std::to_string(count) + " " +
-            std::string(IntakeName(intake));
-  }
+  const std::string text = JoinText(counts, ", ", [](const auto& of) {
+    return std::to_string(of.second) + " " + std::string(IntakeName(of.first));
+  });
   return text.empty() ? "" : "refused and not drawn: " + text + " samples";
 }
 

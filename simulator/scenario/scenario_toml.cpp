@@ -11,6 +11,7 @@
 #include "base/csv_cells.h"
 #include "base/error.h"
 #include "base/field_list.h"
+#include "base/text.h"
 #include "base/time_text.h"
 #include "import/csv.h"
 #include "simulator/parameter_fields.h"
@@ -82,11 +83,8 @@ class FieldReader {
       constexpr auto& kNames = kEnumNames<Enum>;
       const auto found = std::ranges::find(kNames, *text);
       if (found == kNames.end()) {
-        std::string names;
-        for (const std::string_view name : kNames) {
-          names += (names.empty() ? "" : ", ") + std::string(name);
-        }
-        table_.Refuse(key, "'" + *text + "': expected one of " + names);
+        table_.Refuse(key,
+                      "'" + *text + "': expected one of " + JoinText(kNames));
       }
       field = static_cast<Enum>(found - kNames.begin());
     }
@@ -106,11 +104,7 @@ class FieldReader {
 // "[a, b, c]", made by `text_of` from `items`.
 template <typename Items, typename TextOf>
 std::string List(const Items& items, TextOf text_of) {
-  std::string list;
-  for (const auto& item : items) {
-    list += (list.empty() ? "" : ", ") + text_of(item);
-  }
-  return '[' + list + ']';
+  return '[' + JoinText(items, ", ", text_of) + ']';
 }
 
 using Lines = std::vector<std::pair<std::string, std::string>>;
@@ -341,11 +335,8 @@ void AppendExcitation(const Scenario& scenario, Lines& result) {
 std::string InputText(const InputProfile& input) {
   Lines lines;
   AppendDifferences("", input, InputProfile{}, lines);
-  std::string table;
-  for (const auto& [key, value] : lines) {
-    table += (table.empty() ? "" : ", ") + key + " = " + value;
-  }
-  return '{' + table + '}';
+  const auto line = [](const auto& l) { return l.first + " = " + l.second; };
+  return '{' + JoinText(lines, ", ", line) + '}';
 }
 
 std::string ModeText(const ModeStretch& stretch) {

@@ -11,6 +11,7 @@
 
 #include "base/error.h"
 #include "base/field_list.h"
+#include "base/median.h"
 #include "simulator/parameter_fields.h"
 
 namespace fdi::simulator {
@@ -27,13 +28,6 @@ double Mean(const std::vector<double>& values) {
     sum += value;
   }
   return sum / static_cast<double>(values.size());
-}
-
-double Median(std::vector<double> values) {
-  const auto middle =
-      values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 // About the median, what is beyond five robust deviations drawn in.
@@ -359,16 +353,20 @@ Field FromNumber(const PhysicalValue& value) {
   if constexpr (std::is_floating_point_v<Field>) {
     return value.value;
   } else {
+    using Whole = std::numeric_limits<int>;
+    constexpr bool kSigned = std::is_same_v<Field, int>;
+    constexpr double kLeast = kSigned ? static_cast<double>(Whole::min()) : 0.0;
     constexpr double kMost =
         std::is_same_v<Field, bool> ? 1.0
         : std::is_enum_v<Field>
             ? static_cast<double>(kEnumNames<Field>.size()) - 1.0
-            : static_cast<double>(std::numeric_limits<int>::max());
-    if (!(value.value >= 0.0 && value.value <= kMost &&
+            : static_cast<double>(Whole::max());
+    if (!(value.value >= kLeast && value.value <= kMost &&
           value.value == std::floor(value.value))) {
       throw DataError(
           "the physics of the model set has " + value.name + " = " +
-          std::to_string(value.value) + ", expected a whole number of 0 to " +
+          std::to_string(value.value) + ", expected a whole number of " +
+          std::to_string(static_cast<int>(kLeast)) + " to " +
           std::to_string(static_cast<int>(kMost)) + ": onboard the valve anew");
     }
     return static_cast<Field>(static_cast<int>(value.value));

@@ -13,6 +13,7 @@
 #include <unistd.h>
 
 #include "base/error.h"
+#include "base/text.h"
 #include "diagnosis/records/valve_glob.h"
 #include "storage/database/data_directory.h"
 #include "storage/database/locks.h"
@@ -180,14 +181,6 @@ std::vector<std::string> SplitNames(std::string_view joined) {
     joined.remove_prefix(std::min(bar + 1, joined.size()));
   }
   return names;
-}
-
-std::string JoinNames(const std::vector<std::string>& names) {
-  std::string joined;
-  for (const std::string& name : names) {
-    joined += (joined.empty() ? "" : "|") + name;
-  }
-  return joined;
 }
 
 SqliteError::SqliteError(int code, const std::string& message)

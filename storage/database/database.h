@@ -43,7 +43,6 @@ std::int64_t UtcNow();
 /// Lists of names are stored in one column, joined by |: "a|b" is {"a", "b"},
 /// and "" is {}.
 std::vector<std::string> SplitNames(std::string_view joined);
-std::string JoinNames(const std::vector<std::string>& names);
 
 /// A failed SQLite call on an open database. (Errors in opening a file are
 /// DataErrors.)

@@ -139,8 +139,13 @@ std::int64_t MaxCountWithin(const std::vector<std::int64_t>& stamps,
 
 }  // namespace
 
+bool IsOver(const Shelf& shelf, std::int64_t now_ns) {
+  return now_ns >= shelf.until_ns || shelf.ended_ns;
+}
+
 bool IsActive(const Shelf& shelf, std::int64_t now_ns) {
-  return now_ns < shelf.until_ns && !shelf.ended_ns;
+  return !IsOver(shelf, now_ns) &&
+         (!shelf.planned_ns || shelf.from_ns <= now_ns);
 }
 
 bool Covers(const Shelf& shelf, const Episode& episode) {
@@ -218,11 +223,11 @@ std::vector<Alarm> AsAlarms(std::vector<Episode> episodes,
 }
 
 std::vector<Shelf> ReadShelves(Database& database,
-                               std::optional<std::int64_t> in_force_at_ns) {
+                               std::optional<std::int64_t> not_over_at_ns) {
   Statement rows = database.Prepare(SelectSql<Shelf>(
-      in_force_at_ns ? history_sql::shelves_in_force : history_sql::shelves));
-  if (in_force_at_ns) {
-    rows.Bind(*in_force_at_ns);
+      not_over_at_ns ? history_sql::shelves_not_over : history_sql::shelves));
+  if (not_over_at_ns) {
+    rows.Bind(*not_over_at_ns);
   }
   return ReadRecords<Shelf>(rows);
 }

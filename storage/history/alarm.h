@@ -29,15 +29,22 @@ struct Shelf {
   std::optional<std::int64_t> ended_ns;
   std::string ended_by;
   std::string ended_origin;
+  /// When it was planned; nothing: it began when it was made.
+  std::optional<std::int64_t> planned_ns;
 };
 
-/// Ordered by beginning: those in force at a time, or all.
+/// Ordered by their making: those that are not over at a time, in force or
+/// planned, or all.
 std::vector<Shelf> ReadShelves(Database& database,
-                               std::optional<std::int64_t> in_force_at_ns = {});
+                               std::optional<std::int64_t> not_over_at_ns = {});
 
-/// Until its end, unless somebody has ended it. Whether now is before its
-/// beginning does not matter: then a clock was set back, or that of the other
-/// monitor of a pair is ahead, and what somebody has shelved stays shelved.
+/// Whether it has ended, or somebody has ended it.
+bool IsOver(const Shelf& shelf, std::int64_t now_ns);
+
+/// In force: until it is over, and if it was planned, from its beginning on. Of
+/// any other it does not matter whether now is before its beginning: then a
+/// clock was set back, or that of the other monitor of a pair is ahead, and
+/// what somebody has shelved stays shelved.
 bool IsActive(const Shelf& shelf, std::int64_t now_ns);
 
 /// Whether `shelf` applies to this valve and diagnosis. A shelved fault covers
@@ -157,7 +164,7 @@ AlarmStatistics ComputeAlarmStatistics(const std::vector<AlarmSpan>& spans,
 }  // namespace fdi::storage
 
 FDI_FIELDS(fdi::storage::Shelf, shelf_id, valve_id, fault, from_ns, until_ns,
-           who, comment, origin, ended_ns, ended_by, ended_origin)
+           who, comment, origin, ended_ns, ended_by, ended_origin, planned_ns)
 
 FDI_FIELDS(fdi::storage::AlarmSpan, valve_id, fault, detected_ns, ended_ns,
            label, last_ns)

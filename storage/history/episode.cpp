@@ -2,13 +2,13 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <charconv>
 #include <cstdio>
 #include <utility>
 
 #include "base/error.h"
 #include "base/suggestion.h"
+#include "base/text.h"
 
 namespace fdi::storage {
 namespace {
@@ -55,25 +55,14 @@ std::vector<std::string> EpisodeStateNames() {
 }
 
 EpisodeState ParseEpisodeState(std::string_view name) {
-  const auto* found =
-      std::find_if(kStates.begin(), kStates.end(), [name](const auto& state) {
-        return std::equal(
-            name.begin(), name.end(), state.first.begin(), state.first.end(),
-            [](char a, char b) {
-              return std::tolower(static_cast<unsigned char>(a)) == b;
-            });
-      });
+  const auto* found = std::ranges::find(kStates, Lower(name),
+                                        &decltype(kStates)::value_type::first);
   if (found == kStates.end()) {
     std::string message = "unknown state '" + std::string(name) + "'";
     if (const auto meant = Suggest(std::string(name), EpisodeStateNames())) {
       message += " (did you mean '" + *meant + "'?)";
     }
-    message += "; there are";
-    for (const auto& state : kStates) {
-      message += (&state == kStates.begin() ? " " : ", ");
-      message += state.first;
-    }
-    throw ConfigError(message);
+    throw ConfigError(message + "; there are " + JoinText(EpisodeStateNames()));
   }
   return found->second;
 }

@@ -71,9 +71,9 @@ class History {
   virtual AlarmStatistics AlarmFigures(const EpisodeFilter& filter,
                                        std::int64_t now_ns) = 0;
 
-  /// Ordered by beginning: those in force at a time, or all.
+  /// As ReadShelves().
   virtual std::vector<Shelf> Shelves(
-      std::optional<std::int64_t> in_force_at_ns) = 0;
+      std::optional<std::int64_t> not_over_at_ns) = 0;
 
   /// The hours of one valve that begin in the window, ordered by time.
   virtual std::vector<HealthHour> Health(const HealthFilter& filter) = 0;

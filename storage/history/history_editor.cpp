@@ -4,6 +4,7 @@
 
 #include "base/error.h"
 #include "base/printable.h"
+#include "base/text.h"
 #include "diagnosis/fault_catalogue.h"
 #include "storage/database/record.h"
 #include "storage/history/episode.h"
@@ -14,6 +15,8 @@ namespace fdi::storage {
 namespace sql = history_sql;
 namespace {
 
+// A shelf of the other monitor that begins later than clocks differ is planned.
+constexpr std::int64_t kClocksDifferNs = 60'000'000'000;
 constexpr std::size_t kMaxWhoLength = 128;
 constexpr std::size_t kMaxCommentLength = 2000;
 
@@ -64,6 +67,24 @@ void CheckShelfTime(std::int64_t from_ns, std::int64_t until_ns) {
   }
 }
 
+void CheckPlan(std::int64_t from_ns, std::int64_t now_ns) {
+  if (from_ns <= now_ns || from_ns - now_ns > kMaxShelfNs) {
+    throw ConfigError(
+        "a shelf is planned from a time after now, at most 90 days ahead");
+  }
+}
+
+// Whether `shelf` takes the place of one that is there.
+bool Replaces(const Shelf& shelf, const Shelf& before, std::int64_t now_ns) {
+  if (before.valve_id != shelf.valve_id || before.fault != shelf.fault) {
+    return false;
+  }
+  return shelf.planned_ns
+             ? !IsActive(before, now_ns) && before.from_ns < shelf.until_ns &&
+                   shelf.from_ns < before.until_ns
+             : IsActive(before, now_ns);
+}
+
 std::string CheckedLabel(std::string_view label) {
   if (label == "true" || label == "false") {
     return std::string(label);
@@ -93,10 +114,7 @@ std::string CheckedFaults(const std::string& faults) {
   }
   std::sort(numbers.begin(), numbers.end());
   numbers.erase(std::unique(numbers.begin(), numbers.end()), numbers.end());
-  std::vector<std::string> names;
-  std::transform(numbers.begin(), numbers.end(), std::back_inserter(names),
-                 FaultName);
-  return JoinNames(names);
+  return JoinText(numbers, "|", FaultName);
 }
 
 // Of two notes of one kind at the same instant, the second is stamped one
@@ -125,7 +143,7 @@ Shelf ReadShelf(Database& database, std::int64_t shelf_id) {
 void EndShelfRow(Database& database, std::int64_t shelf_id,
                  const OperatorNote& note) {
   const Shelf shelf = ReadShelf(database, shelf_id);
-  if (!IsActive(shelf, note.now_ns)) {
+  if (IsOver(shelf, note.now_ns)) {
     throw DataError("shelved alarm " + std::to_string(shelf_id) + " of " +
                     shelf.valve_id + " is over already");
   }
@@ -199,6 +217,8 @@ bool HistoryEditor::AdoptShelf(const OperatorAction& action) {
   const std::optional<std::string> fault =
       action.value.empty() ? std::nullopt
                            : std::optional(CheckedFaults(action.value));
+  const std::int64_t now_ns = UtcNow();
+  const bool planned = action.stamp_ns > now_ns + kClocksDifferNs;
   Transaction transaction(database_);
   const auto find = [&] {
     return database_.QueryInt64(sql::find_shelf, action.valve_id, fault,
@@ -208,7 +228,8 @@ bool HistoryEditor::AdoptShelf(const OperatorAction& action) {
   const bool fresh = !shelf_id;
   if (fresh) {
     database_.Run(sql::insert_shelf, action.valve_id, fault, action.stamp_ns,
-                  action.until_ns, note.who, note.comment, note.origin);
+                  action.until_ns, note.who, note.comment, note.origin,
+                  planned ? std::optional(now_ns) : std::nullopt);
     shelf_id = find();
   }
   const bool ended =
@@ -225,13 +246,18 @@ bool HistoryEditor::AdoptShelf(const OperatorAction& action) {
 
 Shelf HistoryEditor::Shelve(std::string_view valve_id,
                             const std::optional<std::string>& fault,
-                            std::int64_t until_ns, const OperatorNote& note) {
+                            std::int64_t until_ns, const OperatorNote& note,
+                            std::optional<std::int64_t> from_ns) {
   const OperatorNote checked = Checked(note);
   Shelf shelf;
+  if (from_ns) {
+    CheckPlan(*from_ns, checked.now_ns);
+    shelf.planned_ns = checked.now_ns;
+  }
   shelf.valve_id = Plain(std::string(valve_id));
   RequireLength(shelf.valve_id, "valve", 1, kMaxIdLength);
   shelf.fault = fault ? std::optional(CheckedFaults(*fault)) : std::nullopt;
-  shelf.from_ns = checked.now_ns;
+  shelf.from_ns = from_ns.value_or(checked.now_ns);
   shelf.until_ns = until_ns;
   CheckShelfTime(shelf.from_ns, until_ns);
   shelf.who = checked.who;
@@ -239,12 +265,13 @@ Shelf HistoryEditor::Shelve(std::string_view valve_id,
   shelf.origin = checked.origin;
   Transaction transaction(database_);
   for (const Shelf& before : ReadShelves(database_, checked.now_ns)) {
-    if (before.valve_id == shelf.valve_id && before.fault == shelf.fault) {
+    if (Replaces(shelf, before, checked.now_ns)) {
       EndShelfRow(database_, before.shelf_id, checked);
     }
   }
   database_.Run(sql::insert_shelf, shelf.valve_id, shelf.fault, shelf.from_ns,
-                shelf.until_ns, shelf.who, shelf.comment, shelf.origin);
+                shelf.until_ns, shelf.who, shelf.comment, shelf.origin,
+                shelf.planned_ns);
   shelf.shelf_id = database_.LastInsertRowid();
   transaction.Commit();
   return shelf;

@@ -49,14 +49,18 @@ class HistoryEditor {
   std::uint64_t Label(std::string_view id, std::string_view label,
                       const OperatorNote& note);
 
-  /// Suppresses the alarms of a valve from now on. An earlier shelf for the
-  /// same valve and fault ends.
+  /// Suppresses the alarms of a valve from now on, or from a later time on, as
+  /// for work that is planned. An earlier shelf in force for the same valve and
+  /// fault ends; where this one is planned, a planned one that overlaps it.
   /// @param fault names joined by |, or "unknown"; nothing: any.
-  /// @throws ConfigError for another fault, or unless until_ns is after now
-  ///   and at most kMaxShelfNs later.
+  /// @param from_ns nothing: now.
+  /// @throws ConfigError for another fault, unless from_ns is after now and at
+  ///   most kMaxShelfNs later, or unless until_ns is after the beginning and at
+  ///   most kMaxShelfNs later.
   Shelf Shelve(std::string_view valve_id,
                const std::optional<std::string>& fault, std::int64_t until_ns,
-               const OperatorNote& note);
+               const OperatorNote& note,
+               std::optional<std::int64_t> from_ns = std::nullopt);
 
   /// @throws NotFoundError; DataError if it has ended already.
   Shelf EndShelf(std::int64_t shelf_id, const OperatorNote& note);

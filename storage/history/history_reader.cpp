@@ -315,8 +315,8 @@ AlarmStatistics HistoryReader::AlarmFigures(const EpisodeFilter& filter,
 }
 
 std::vector<Shelf> HistoryReader::Shelves(
-    std::optional<std::int64_t> in_force_at_ns) {
-  return ReadShelves(database_, in_force_at_ns);
+    std::optional<std::int64_t> not_over_at_ns) {
+  return ReadShelves(database_, not_over_at_ns);
 }
 
 std::vector<CommonCause> HistoryReader::OpenCauses() {

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <utility>
 
 #include "base/error.h"
+#include "base/text.h"
 #include "diagnosis/fault_catalogue.h"
 #include "storage/database/record.h"
 #include "storage/history/episode.h"
@@ -68,7 +68,7 @@ struct Entry {
         isolated.push_back(names[bit]);
       }
     }
-    return JoinNames(isolated);
+    return JoinText(isolated, "|");
   }
 };
 
@@ -91,7 +91,8 @@ Entry InsertEpisode(Database& database, const FaultEvent& event,
             t.detection_stamp_ns, Finite(t.factor), Finite(t.strength),
             models.name + "@" + std::to_string(models.version),
             models.content_hash, FlowUnitName(models.flow_unit),
-            JoinNames(channels), JoinNames(entry.names), PriorityOf(t.severity))
+            JoinText(channels, "|"), JoinText(entry.names, "|"),
+            PriorityOf(t.severity))
       .Run();
   return entry;
 }

@@ -69,6 +69,7 @@ EXISTS (SELECT 1 FROM episode_fault f
 -- name: is_shelved
 EXISTS (SELECT 1 FROM shelf s
   WHERE s.valve_id = e.valve_id AND s.until_ns > ?5 AND s.ended_ns IS NULL
+    AND (s.planned_ns IS NULL OR s.from_ns <= ?5)
     AND (s.fault IS NULL OR s.fault = e.fault))
 -- The columns are kFieldsOf<EpisodeStatistics>. A label is right if it says
 -- true or names a fault of the answer.
@@ -330,13 +331,14 @@ ORDER BY from_ns DESC, difference_id DESC LIMIT ?5
 -- ---- Shelves. The columns are kFieldsOf<Shelf>.
 -- name: shelves
 FROM shelf ORDER BY shelf_id
--- name: shelves_in_force
+-- name: shelves_not_over
 FROM shelf
 WHERE until_ns > ?1 AND ended_ns IS NULL
 ORDER BY shelf_id
 -- name: insert_shelf
-INSERT INTO shelf (valve_id, fault, from_ns, until_ns, who, comment, origin)
-VALUES (?, ?, ?, ?, ?, nullif(?, ''), ?)
+INSERT INTO shelf
+  (valve_id, fault, from_ns, until_ns, who, comment, origin, planned_ns)
+VALUES (?, ?, ?, ?, ?, nullif(?, ''), ?, ?)
 -- name: find_shelf
 SELECT shelf_id FROM shelf
 WHERE valve_id = ? AND fault IS ? AND from_ns = ? AND who = ?
@@ -556,8 +558,9 @@ INSERT INTO change (item, key, part)
 SELECT 'moved', episode_id, ?2 FROM episode
 WHERE valve_id = ?1 AND ended_ns IS NULL AND EXISTS (SELECT 1 FROM ship_cursor)
 -- name: copy_shelves
-INSERT INTO shelf (valve_id, fault, from_ns, until_ns, who, comment, origin)
-SELECT valve_id, fault, from_ns, until_ns, who, comment, origin
+INSERT INTO shelf
+  (valve_id, fault, from_ns, until_ns, who, comment, origin, planned_ns)
+SELECT valve_id, fault, from_ns, until_ns, who, comment, origin, planned_ns
 FROM source.shelf s
 WHERE valve_id = ?1 AND until_ns > ?2 AND ended_ns IS NULL
   AND NOT EXISTS (SELECT 1 FROM main.shelf t

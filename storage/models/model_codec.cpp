@@ -4,7 +4,6 @@
 #include <array>
 #include <charconv>
 #include <cstdio>
-#include <limits>
 #include <stdexcept>
 #include <string>
 #include <type_traits>
@@ -14,6 +13,7 @@
 #include <zlib.h>
 
 #include "diagnosis/fault_catalogue.h"
+#include "diagnosis/fit_window.h"
 #include "storage/database/bytes.h"
 
 namespace fdi::storage {
@@ -21,13 +21,15 @@ namespace fdi::storage {
 // The bytes of a model set, little endian:
 //
 //   file    = "FDIM" format:uint32 length:uint64 payload crc:uint32
-//   format  = 3, + 1 with physics, + 2 with a floor, + 4 with drift limits,
+//   format  = 3, + 1 with physics, + 2 with a floor, + 4 with a former drift,
 //             + 8 with an interpolation allowance, + 16 with names before t_k,
 //             + 32 with the trim of a floor, + 64 with a share of the flow that
-//             is too little
+//             is too little, + 128 with limits of a fit
 //   payload = the fields of ModelSet in the order of Fields() below, the floor
 //             last; then [physics: list] [drift: of each channel] [allowance]
-//             [early_error] [flow shape of the floor: list] [flow_share]
+//             [early_error] [flow shape of the floor: list]
+//             [flow_share] [fit: of each channel of each observer, and what its
+//             fault moves: int32]
 //
 // The CRC-32 covers all bytes before it. Encoding: a double as its 64 bits; int
 // as int32; int64 unchanged; bool and enumerations as uint8; a text as uint32
@@ -46,9 +48,10 @@ constexpr std::uint32_t kWithAllowance = 8;
 constexpr std::uint32_t kWithEarlyNames = 16;
 constexpr std::uint32_t kWithFlowShape = 32;
 constexpr std::uint32_t kWithFlowShare = 64;
+constexpr std::uint32_t kWithFit = 128;
 constexpr std::uint32_t kLastFormat =
     kFormat + kWithPhysics + kWithFloor + kWithDrift + kWithAllowance +
-    kWithEarlyNames + kWithFlowShape + kWithFlowShare;
+    kWithEarlyNames + kWithFlowShape + kWithFlowShare + kWithFit;
 constexpr std::uint32_t kMaxPhysics = 256;
 constexpr std::size_t kFrame =
     2 * sizeof(std::uint32_t) + sizeof(std::uint64_t) + sizeof(std::uint32_t);
@@ -155,32 +158,33 @@ void Fields(A& a, T& window) {
     command);
 }
 
-template <typename A, Of<DriftLimits> T>
-void Fields(A& a, T& drift) {
-  auto& [lower_mean, upper_mean, log_scale] = drift;
-  a(lower_mean, upper_mean, log_scale);
-}
-
-// Without the drift, which is appended behind the other fields.
+// Without the former drift, which is appended behind the other fields.
 template <typename A, Of<ChannelSpec> T>
 void Fields(A& a, T& channel) {
-  auto& [name, output, lower_threshold, upper_threshold, windows, drift] =
-      channel;
+  auto& [name, output, lower_threshold, upper_threshold, windows,
+         former_drift] = channel;
   a(name, output, lower_threshold, upper_threshold,
     Limited{windows, kMaxWindows});
 }
 
+template <typename A, Of<FitBounds> T>
+void Fields(A& a, T& fit) {
+  auto& [lower_mean, upper_mean, upper_square] = fit;
+  a(lower_mean, upper_mean, upper_square);
+}
+
+// Without the limits of the fit, which are appended behind the other fields.
 template <typename A, Of<ChannelObserver> T>
 void Fields(A& a, T& channel) {
   auto& [model, difference, membership, residual_sd, correlation_time,
-         interpolation_error, validation] = channel;
+         interpolation_error, validation, fit] = channel;
   a(model, difference, membership, residual_sd, correlation_time,
     interpolation_error, validation);
 }
 
 template <typename A, Of<Observer> T>
 void Fields(A& a, T& observer) {
-  auto& [name, fault, strength, channels] = observer;
+  auto& [name, fault, strength, channels, moved] = observer;
   a(name, fault, strength, Limited{channels, kMaxChannels});
 }
 
@@ -319,9 +323,9 @@ class Decoder {
   std::uint32_t format_;
 };
 
-bool FollowsDrift(const ModelSet& models) {
+bool HasFormerDrift(const ModelSet& models) {
   return std::ranges::any_of(models.channels, [](const ChannelSpec& channel) {
-    return channel.drift != DriftLimits{};
+    return channel.former_drift != std::array<double, 3>{};
   });
 }
 
@@ -352,9 +356,10 @@ std::vector<std::byte> EncodeModelSet(const ModelSet& models) {
   if (!models.physics.empty()) {
     payload(Limited{models.physics, kMaxPhysics});
   }
-  const bool drifts = FollowsDrift(models);
+  const bool drifts = HasFormerDrift(models);
   for (std::size_t c = 0; drifts && c < models.channels.size(); ++c) {
-    payload(models.channels[c].drift);
+    const auto& [lower, upper, log_scale] = models.channels[c].former_drift;
+    payload(lower, upper, log_scale);
   }
   const double allowance = models.decision.interpolation_allowance;
   if (allowance > 0.0) {
@@ -372,13 +377,21 @@ std::vector<std::byte> EncodeModelSet(const ModelSet& models) {
   if (low_flow) {
     payload(models.floor->flow_share);
   }
+  const bool fits = JudgesFit(models);
+  for (std::size_t o = 0; fits && o < models.observers.size(); ++o) {
+    for (const ChannelObserver& channel : models.observers[o].channels) {
+      payload(channel.fit);
+    }
+    payload(static_cast<std::int32_t>(models.observers[o].moved));
+  }
   ByteWriter writer;
   writer.Put(kMagic);
   writer.Put(kFormat + (models.physics.empty() ? 0U : kWithPhysics) +
              (models.floor ? kWithFloor : 0U) + (drifts ? kWithDrift : 0U) +
              (allowance > 0.0 ? kWithAllowance : 0U) +
              (early_error > 0.0 ? kWithEarlyNames : 0U) +
-             (shaped ? kWithFlowShape : 0U) + (low_flow ? kWithFlowShare : 0U));
+             (shaped ? kWithFlowShape : 0U) + (low_flow ? kWithFlowShare : 0U) +
+             (fits ? kWithFit : 0U));
   writer.Put(static_cast<std::uint64_t>(payload.writer.size()));
   writer.Append(payload.writer.view().data(), payload.writer.size());
   writer.Put(Checksum(writer.view()));
@@ -417,7 +430,8 @@ ModelSet DecodeModelSet(std::span<const std::byte> bytes,
   }
   if (((format - kFormat) & kWithDrift) != 0) {
     for (ChannelSpec& channel : models.channels) {
-      decoder(channel.drift);
+      auto& [lower, upper, log_scale] = channel.former_drift;
+      decoder(lower, upper, log_scale);
     }
   }
   if (((format - kFormat) & kWithAllowance) != 0) {
@@ -434,6 +448,16 @@ ModelSet DecodeModelSet(std::span<const std::byte> bytes,
       payload.Refuse("a share of the flow without a floor");
     }
     decoder(models.floor->flow_share);
+  }
+  if (((format - kFormat) & kWithFit) != 0) {
+    for (Observer& observer : models.observers) {
+      for (ChannelObserver& channel : observer.channels) {
+        decoder(channel.fit);
+      }
+      std::int32_t moved = 0;
+      decoder(moved);
+      observer.moved = static_cast<SignalMask>(moved);
+    }
   }
   payload.ExpectEnd();
   models.content_hash = ContentHash(models);  // Of what is stored.

@@ -1,12 +1,12 @@
 #include "storage/models/models.h"
 
 #include <cerrno>
-#include <charconv>
 #include <cstring>
 #include <fstream>
 #include <iterator>
 
 #include "base/error.h"
+#include "base/text.h"
 #include "diagnosis/fault_catalogue.h"
 #include "storage/database/record.h"
 #include "storage/models/model_codec.h"
@@ -151,13 +151,8 @@ ModelReference ParseModelReference(std::string_view text) {
   reference.name = std::string(text.substr(0, at));
   bool good = IsName(reference.name);
   if (at != std::string_view::npos) {
-    const std::string_view digits = text.substr(at + 1);
-    int version = 0;
-    const auto [end, error] =
-        std::from_chars(digits.data(), digits.data() + digits.size(), version);
-    good = good && error == std::errc() &&
-           end == digits.data() + digits.size() && version >= 1;
-    reference.version = version;
+    reference.version = ParseWhole<int>(text.substr(at + 1));
+    good = good && reference.version.value_or(0) >= 1;
   }
   if (!good) {
     throw ConfigError("model set \"" + std::string(text) +

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "base/error.h"
+#include "base/text.h"
 #include "storage/database/record.h"
 #include "storage/models/models.h"
 #include "storage/models/sql.h"
@@ -454,10 +455,7 @@ void ModelStore::StoreType(const ValveType& type) {
 ValveType ModelStore::LoadTemplate(std::string_view name) {
   Statement row = database_.Prepare(sql::valve_type);
   if (!row.Bind(name).Step()) {
-    std::string there;
-    for (const ValveType& type : ListTemplates()) {
-      there += (there.empty() ? "" : ", ") + type.name;
-    }
+    const std::string there = JoinText(ListTemplates(), ", ", &ValveType::name);
     throw NotFoundError("no valve type '" + std::string(name) + "' in " +
                         database_.path().string() +
                         (there.empty() ? "" : "; there are " + there));

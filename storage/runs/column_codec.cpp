@@ -11,6 +11,7 @@
 #include <zlib.h>
 
 #include "base/error.h"
+#include "base/median.h"
 
 namespace fdi::storage {
 
@@ -246,13 +247,11 @@ Residuals ResidualsOf(std::span<const std::int64_t> x, int order) {
   if (order == 0) {
     // The median has the smallest sum of distances and, unlike the mean, is not
     // moved by a bad reading.
-    std::vector<std::int64_t> sorted(x.begin(), x.end());
-    const auto middle =
-        sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
-    std::nth_element(sorted.begin(), middle, sorted.end());
-    result.seeds = {*middle};
+    const std::int64_t middle =
+        Median(std::vector<std::int64_t>(x.begin(), x.end()));
+    result.seeds = {middle};
     for (const std::int64_t value : x) {
-      result.Push(WrapSubtract(value, *middle));
+      result.Push(WrapSubtract(value, middle));
     }
     return result;
   }

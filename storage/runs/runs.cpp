@@ -1,10 +1,10 @@
 #include "storage/runs/runs.h"
 
-#include <charconv>
 #include <cmath>
 #include <utility>
 
 #include "base/error.h"
+#include "base/text.h"
 #include "diagnosis/fault_catalogue.h"
 #include "storage/database/record.h"
 #include "storage/runs/run_rows.h"
@@ -41,14 +41,11 @@ double ParseBound(std::string_view bound, double absent,
   if (bound.empty()) {
     return absent;
   }
-  double value = 0.0;
-  const auto [end, error] =
-      std::from_chars(bound.data(), bound.data() + bound.size(), value);
-  if (error != std::errc() || end != bound.data() + bound.size() ||
-      !std::isfinite(value)) {
+  const auto value = ParseWhole<double>(bound);
+  if (!value || !std::isfinite(*value)) {
     RefuseSelector(text, '"' + std::string(bound) + "\" is not a number");
   }
-  return value;
+  return *value;
 }
 
 // Seconds from the start of a run as ns UTC, clamped to the range of int64.

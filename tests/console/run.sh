@@ -22,7 +22,7 @@ export FDI_CHROMIUM FDI_BIN=$1 FDI_NODE_MODULES=$2
 export FDI_CAMPAIGN=$PWD/../survival/quick.toml
 # Those without a browser together, then one after the other: the load is
 # measured alone.
-node --test csv.test.mjs drift.test.mjs route.test.mjs stream.test.mjs \
+node --test csv.test.mjs route.test.mjs stream.test.mjs \
   trend_data.test.mjs
 for file in console load login views; do
   node --test "$file.test.mjs"

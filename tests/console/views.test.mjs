@@ -98,7 +98,7 @@ function tile(id, state, faults = [], more = {}) {
   return {id, state, faults, quality: 'LIVE', reasons: '', missing: [],
     certainty: faults.length > 0 ? 'likely' : null,
     factor: faults.length > 0 ? 0.9 : null, strength: null, d0: 1,
-    drift_used: null, stamp_ms: kNowMs, since_ms: null, episode: null,
+    stamp_ms: kNowMs, since_ms: null, episode: null,
     model_set: 'm@1', shelved_until_ms: null, unacked: false, spark: [],
     ...more};
 }
@@ -239,7 +239,7 @@ function trend(last, {count = 30, faults = ['f19', 'f6']} = {}) {
     f: column(10), residuals: [column(last.residual ?? 0)],
     d0: column(last.d0), d: faults.map((_, f) => column(last.d[f])),
     state: column(last.state), quality: column('LIVE'),
-    gaps: [], marks: [], drift: [], words: ''};
+    gaps: [], marks: [], words: ''};
 }
 
 test('a healthy valve shows no fault, and no number for one', async () => {
@@ -293,6 +293,7 @@ test('words say how sure a name is; the number is a hint', async () => {
 test('what is judged in part only is said, with the reason', async () => {
   monitor.reset([tile('half', 'PARTLY_JUDGED', [],
       {missing: ['P1'], unjudged: ['F']}),
+  tile('wide', 'PARTLY_JUDGED', [], {blind: true}),
   tile('bar', 'NOT_JUDGED', [], {quality: 'BAD_INPUT',
     refused: {reason: 'range', signals: ['P1'], flow_unit: 'm3/h'}}),
   tile('mass', 'NOT_JUDGED', [], {quality: 'BAD_INPUT',
@@ -303,11 +304,12 @@ test('what is judged in part only is said, with the reason', async () => {
   await page.locator('.tile', {hasText: 'half'}).waitFor();
 
   assert.match(await said('half'), /Partly judged[^]*no P1; F not judged/);
+  assert.match(await said('wide'), /limits too wide to see a fault/);
   assert.match(await said('bar'), /bad input: P1 implausible: in another unit/);
   assert.match(await said('mass'), /flow in another unit than m³\/h/);
   assert.deepEqual(await page.locator('.tile .tile-id').allTextContents(),
-      ['bar', 'half', 'mass', 'well']);
-  await page.getByRole('button', {name: /Not or partly judged 3/}).waitFor();
+      ['bar', 'half', 'mass', 'wide', 'well']);
+  await page.getByRole('button', {name: /Not or partly judged 4/}).waitFor();
 
   await page.goto(`${address}/#/valve/half`);
   await page.locator('.state-line').getByText('no P1; F not judged').waitFor();
@@ -404,6 +406,87 @@ test('groups have counts and select their valves', async () => {
   await close(page);
 });
 
+test('groups of the file come before the beginnings of ids', async () => {
+  monitor.reset([tile('U1-FV-1', 'NORMAL'), tile('U1-FV-2', 'ISOLATED',
+      ['f19']), tile('U2-LV-1', 'NOT_JUDGED', [], {active: true, fault: 'f6'}),
+  tile('U3-PV-1', 'NORMAL')]);
+  monitor.answers.groups = {groups: [
+    {name: 'Boiler house', valves: ['U[12]-*']},
+    {name: 'Air header', valves: ['U1-FV-2']}]};
+  const page = await openShared(browser, address, '#/');
+  const group = page.getByLabel('Group');
+  await page.locator('.tile', {hasText: 'Boiler house'}).first().waitFor();
+
+  assert.deepEqual(await group.locator('option').allTextContents(),
+      ['All groups (3)', 'Air header (1, 1 in alarm)',
+        'Boiler house (3, 2 in alarm)', 'U3-PV (1)']);
+  await group.selectOption('Boiler house');
+  await until(async () => await page.locator('.tile').count() === 3, 'three');
+  await page.getByPlaceholder('Search').fill('air header');
+  await until(async () => await page.locator('.tile').count() === 1, 'one');
+  await close(page);
+});
+
+test('an alarm stays one while its valve is not judged', async () => {
+  const episode = '0000000000000001';
+  const held = {active: true, unacked: true, episode, fault: 'f19',
+    severity: 'high', quality: 'SETTLING', reasons: 'waiting'};
+  monitor.reset([tile('V', 'NOT_JUDGED', [], held),
+    tile('W', 'NORMAL', [], {unacked: true}), tile('X', 'NORMAL')],
+  [alarm(episode, 'V', 'f19')]);
+  monitor.answers['valves/V/trend'] =
+    trend({state: 'NORMAL', d0: 1, d: [0, 0]});
+  const page = await openShared(browser, address, '#/');
+  const said = page.locator('.tile', {hasText: 'Flow transmitter wrong'});
+  await said.waitFor();
+
+  assert.match(await said.innerText(), /not judged now[^]*settling/);
+  assert.deepEqual(await page.locator('.tile .tile-id').allTextContents(),
+      ['V', 'W', 'X']);
+  await page.getByRole('button', {name: /In alarm 1/}).waitFor();
+  await page.goto(`${address}/#/valve/V`);
+  await page.locator('.state-line')
+      .getByText('Flow transmitter wrong (f19): not judged now').waitFor();
+  await close(page);
+});
+
+test('the legend says which rivals a name still has', async () => {
+  monitor.reset([tile('V', 'ISOLATED', ['f19'])]);
+  const data = trend({state: 'ISOLATED', d0: 0, d: [0.9, 0.5, 0.1]},
+      {faults: ['f19', 'f6', 'f3']});
+  data.d[2][0] = 1;  // It fitted before.
+  monitor.answers['valves/V/trend'] = data;
+  const page = await openShared(browser, address, '#/valve/V');
+  const legend = page.locator('.panel', {hasText: 'How well'})
+      .locator('.legend button');
+  await legend.nth(3).waitFor();
+
+  assert.deepEqual(await legend.evaluateAll((nodes) => nodes.map((node) =>
+    [node.lastChild.textContent, node.className])), [['excluded', 'quiet'],
+    ['explains it', 'strong'], ['not excluded', ''], ['excluded', 'quiet']]);
+  await close(page);
+});
+
+test('work on a healthy valve is planned from a later time', async () => {
+  monitor.reset([tile('V', 'NORMAL', [], {shelf_planned_ms: kNowMs + 60000})]);
+  Object.assign(monitor.answers.status, {write: true, user: 'anna'});
+  monitor.answers['valves/V/trend'] =
+    trend({state: 'NORMAL', d0: 1, d: [0, 0]});
+  const page = await openShared(browser, address, '#/valve/V');
+  await page.locator('.state-line').getByText('shelf planned from').waitFor();
+  await page.getByRole('button', {name: 'Shelve V'}).click();
+  await page.getByLabel('From (empty: now)').fill('2031-05-06T07:08');
+  await page.getByLabel('Reason').fill('overhaul');
+  const [request] = await Promise.all([
+    page.waitForRequest((each) => each.url().endsWith('/shelf')),
+    page.getByRole('dialog').getByRole('button', {name: 'Shelve'}).click()]);
+
+  assert.deepEqual(request.postDataJSON(), {valve: 'V', fault: null,
+    minutes: 480, from_ms: new Date(2031, 4, 6, 7, 8).getTime(), who: 'anna',
+    comment: 'overhaul'});
+  await close(page);
+});
+
 test('a narrow screen keeps what to check', async () => {
   monitor.reset([], [alarm('0000000000000001', 'V', 'f19',
       {check: 'Compare it.'})]);
@@ -457,13 +540,15 @@ test('the report has the worst with their factors, and what nobody judges',
 
 test('a valve page says what judges it and what that cannot see', async () => {
   monitor.reset([tile('V', 'NORMAL', [], {missing: ['P1']})]);
-  monitor.answers.status.model_sets = [{model_set: 'm@1', faults: ['f19']}];
+  monitor.answers.status.model_sets = [{model_set: 'm@1',
+    faults: ['f19'], undetectable: ['f19']}];
   monitor.answers['valves/V/trend'] =
     trend({state: 'NORMAL', d0: 0.97, d: [1, 0.99]});
   const page = await openShared(browser, address, '#/valve/V');
 
   await page.getByText('Judged by model set m@1, without P1. Faults ' +
-    'that it cannot name: Plug worn.').waitFor();
+    'that it cannot name: Plug worn. Faults that look normal to it: ' +
+    'Flow transmitter wrong.').waitFor();
   await close(page);
 });
 
@@ -494,10 +579,12 @@ test('every kind of tile can be read, at any size, light and dark',
       tile('FV-2', 'DETECTED', [], {certainty: 'not yet', since_ms: kNowMs}),
       tile('FV-3', 'PARTLY_JUDGED', [], {missing: ['P1'], unjudged: ['F']}),
       tile('FV-4', 'NOT_JUDGED', [], {quality: 'STALE', stamp_ms: 1}),
+      tile('FV-6', 'NOT_JUDGED', [], {quality: 'SETTLING', active: true,
+        reasons: 'waiting', fault: 'f19|f6', since_ms: 1, strength: 0.5}),
       tile('LV-5', 'NORMAL')],
       [alarm(episode, 'FV-1', 'f19|f6', {label: 'f6', check: 'Look.'})]);
-      monitor.answers['valves/FV-1/trend'] =
-        trend({state: 'NORMAL', d0: 1, d: [1, 1]});
+      monitor.answers['valves/FV-1/trend'] = trend({state: 'ISOLATED', d0: 0,
+        d: [1, 0.4], residual: -76.6});
       monitor.answers.status.write = true;
       for (const [width, height] of [[1400, 900], [1280, 800], [390, 800]]) {
         const page = await openShared(browser, address, '#/',
@@ -512,13 +599,18 @@ test('every kind of tile can be read, at any size, light and dark',
                 colorScheme === 'dark');
             assert.deepEqual(faults, [], `${hash} ${width} ${colorScheme}`);
           }
-          const cut = await page.locator('.tile-how, .tile-what, .tag')
+          const cut = await page.locator(
+              '.tile-how, .tile-what, .tile-quality, .tag')
               .evaluateAll((nodes) => nodes.filter((node) =>
                 node.scrollHeight > node.clientHeight + 3)
                   .map((node) => node.textContent));
           assert.deepEqual(cut, [], `${hash} ${width}`);
           assert.ok(await page.evaluate(() =>
             document.documentElement.scrollWidth <= innerWidth), hash);
+          const wide = await page.locator('.table-box').evaluateAll((nodes) =>
+            nodes.filter((node) => node.scrollWidth > node.clientWidth)
+                .map((node) => node.textContent));
+          assert.deepEqual(wide, [], `${hash} ${width}`);
           // What is there to act must not have to be scrolled to.
           const hidden = await page.locator('.row-actions button')
               .evaluateAll((nodes) => nodes.filter((node) =>

@@ -104,38 +104,6 @@ TEST(SnapshotTest, DamagedSnapshotsAreRefused) {
   EXPECT_FALSE(engine.Restore(other_format));
 }
 
-// 1.5 limits in 18 h, of which 1.4 may be followed.
-TEST(SnapshotTest, DriftThatWasFollowedStays) {
-  ModelSet models = *WatchedPlant();
-  const double limit = models.channels[1].windows[0].upper_mean;
-  models.channels[1].drift = {0.0, 1.4 * limit, 0.0};
-  const auto shared = std::make_shared<const ModelSet>(models);
-  const auto drifting = [&](int k) {
-    Sample sample = PlantSample(static_cast<std::uint64_t>(k));
-    sample.values[Index(Signal::kF)] += std::min(k / 43200.0, 1.5) * limit;
-    return sample;
-  };
-  ValveEngine before(shared);
-  for (int k = 0; k < 64800; ++k) {
-    ASSERT_FALSE(before.Step(drifting(k)).detected) << k;
-  }
-  for (const bool resumed : {false, true}) {
-    ValveEngine after(shared);
-    if (resumed) {
-      ASSERT_TRUE(after.Restore(before.Save()));
-      EXPECT_EQ(after.followed_drift(1).mean, 1.4 * limit);
-      EXPECT_GT(after.followed_drift(1).mean_full_ns, 0);
-      EXPECT_EQ(after.followed_drift(1).mean_full_ns,
-                before.followed_drift(1).mean_full_ns);
-    }
-    bool detected = false;
-    for (int k = 65800; k < 66400; ++k) {
-      detected = after.Step(drifting(k)).detected || detected;
-    }
-    EXPECT_EQ(detected, !resumed);
-  }
-}
-
 TEST(SnapshotTest, OpenEpisodeIsNotCarriedOn) {
   ValveEngine before(WatchedPlant());
   for (int k = 0; k < 100; ++k) {

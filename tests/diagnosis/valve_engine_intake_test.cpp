@@ -161,5 +161,16 @@ TEST(ValveEngineIntakeTest, ChannelWithoutItsSignalAbstains) {
   EXPECT_EQ(FaultSetName(engine.models(), seen.last.isolated), "f1");
 }
 
+TEST(ValveEngineIntakeTest, WhereEveryFaultLooksNormalNothingIsJudged) {
+  ModelSet models = *SharedPlant();
+  models.undetectable = {models.faults.begin() + 1, models.faults.end()};
+  ValveEngine seeing(std::make_shared<const ModelSet>(models));
+  EXPECT_EQ(StepRange(seeing, 0, 50).last.confidence, 1.0);
+
+  models.undetectable = models.faults;
+  ValveEngine blind(std::make_shared<const ModelSet>(models));
+  EXPECT_EQ(StepRange(blind, 0, 50).last.confidence, 0.0);
+}
+
 }  // namespace
 }  // namespace fdi

@@ -137,6 +137,15 @@ std::vector<Kind> Kinds() {
     return k >= from && k <= to;
   };
   std::vector<Kind> kinds = {
+      {"months in front, in quotes", Wide("t_stamp," + names,
+                                          [](std::size_t k) {
+                                            return '"' +
+                                                   Clock(
+                                                       "%b %d, %Y %I:%M:%S "
+                                                       "%p",
+                                                       k) +
+                                                   '"';
+                                          })},
       {"seconds since 1970", Wide("ts," + names, count(1, 0))},
       {"milliseconds since 1970", Wide("ts," + names, count(1000, 0))},
       {"microseconds since 1970", Wide("ts," + names, count(1000000, 0))},
@@ -547,6 +556,8 @@ TEST(KindsTest, UnitsAndRangesBeatLettersOfTags) {
   };
   for (const Tag& tag : std::initializer_list<Tag>{
            {"FIC-101.OP", Signal::kCv},
+           {"FIC-101/PID1/OUT", Signal::kCv},
+           {"FIC-101/PID1/PV", Signal::kF},
            {"17FC.OUT", Signal::kCv},
            {"FY12", Signal::kCv},
            {"FV_211", Signal::kCv},
@@ -561,6 +572,13 @@ TEST(KindsTest, UnitsAndRangesBeatLettersOfTags) {
            {"Vanne 12 recopie", Signal::kX},
            {"Válvula 12 posición", Signal::kX},
            {"Zawór 12 położenie", Signal::kX},
+           {"Retroalimentación válvula", Signal::kX},
+           {"RV12 Soll Ventilstellung", Signal::kCv},
+           {"Consigne position vanne", Signal::kCv},
+           {"Flujo másico", Signal::kF},
+           {"Pression sortie [bar]", Signal::kP2},
+           {"Presión salida [bar]", Signal::kP2},
+           {"Inlet temp [°C]", Signal::kT1},
            {"FT101 [t/h]", Signal::kF},
            {"Durchfluß 3 [m³/h]", Signal::kF},
            {"débit eau", Signal::kF},

@@ -103,6 +103,41 @@ TEST_F(PlantTableTest, StarsMatchAndTwoMatchesAreAmbiguous) {
   EXPECT_THAT(names.Find("FIC1*"), IsEmpty());
 }
 
+TEST_F(PlantTableTest, ReadingsOfALoopBeyondTheirRangeAreNone) {
+  const PlantTable table = ReadPlantTable(
+      Write("p.csv", "name,op,pv,pv_range,sp\nL1,A,B,0..50,C\n"));
+  const TagMatch match =
+      MatchTags(table.rows[0], TagNames({"A", "B", "C"}), "day.csv");
+  const ColumnMap map = LoopColumns(table.rows[0], match, {});
+  ASSERT_EQ(map.columns.size(), 3U);
+  EXPECT_EQ(map.columns[1].column, "B");
+  EXPECT_EQ(map.columns[1].lowest, -5.0);
+  EXPECT_EQ(map.columns[1].highest, 55.0);
+  EXPECT_EQ(map.columns[1].scale, 1.0);  // It stays in its own unit.
+  EXPECT_EQ(map.columns[2].highest, ColumnMapping{}.highest);
+}
+
+// A flow at standard conditions: what to type depends on where it is stated.
+TEST_F(PlantTableTest, AUnitOfGasSaysHowToLeaveTheFlowOut) {
+  const PlantTable table =
+      ReadPlantTable(Write("p.csv",
+                           "name,op,pv,pv_unit,f,f_unit,service\n"
+                           "L1,A,B,Nm3/h,,,F\nL2,A,B,,C,Nm3/h,F\n"));
+  const auto refusal = [&](std::size_t row) -> std::string {
+    const TagMatch match =
+        MatchTags(table.rows[row], TagNames({"A", "B", "C"}), "day.csv");
+    try {
+      ValveColumns(table.rows[row], match, {});
+    } catch (const ConfigError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_THAT(refusal(0), HasSubstr("pv_unit is \"Nm3/h\""));
+  EXPECT_THAT(refusal(0), HasSubstr("type service = -"));
+  EXPECT_THAT(refusal(1), HasSubstr("type f = -"));
+}
+
 // Lines keep their numbers, quality and quotes their columns.
 TEST_F(PlantTableTest, AProjectionIsTheTableOfItsColumns) {
   const auto path = Write("wide.csv",

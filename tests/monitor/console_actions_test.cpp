@@ -31,6 +31,14 @@ TEST_F(ConsoleActionsTest, AnAlarmIsAcknowledgedLabelledAndShelved) {
   EXPECT_EQ(action["kind"], "ACK");
   EXPECT_EQ(action["comment"], "seen");
   EXPECT_EQ(action["origin"], "console 127.0.0.1");
+  const std::int64_t from_ms = shelf["until_ms"].get<std::int64_t>() + 1000;
+  const Json planned = Post("/api/v1/shelf", {{"who", "bo"},
+                                              {"valve", "LV-1"},
+                                              {"minutes", 30},
+                                              {"from_ms", from_ms}});
+  EXPECT_EQ(planned["from_ms"], from_ms);
+  EXPECT_EQ(Get("/api/v1/shelf")["shelf"].size(), 2U);
+  Post("/api/v1/shelf/" + planned["shelf_id"].dump() + "/end", {{"who", "bo"}});
   Post("/api/v1/shelf/" + shelf["shelf_id"].dump() + "/end", {{"who", "bo"}});
   EXPECT_TRUE(Get("/api/v1/shelf")["shelf"].empty());
   Post("/api/v1/shelf/" + shelf["shelf_id"].dump() + "/end", {{"who", "bo"}},
@@ -62,6 +70,11 @@ TEST_F(ConsoleActionsTest, BodiesThatCannotBeAreRefused) {
   Post(episode + "/ack", {{"comment", "nobody"}}, 400);
   Post(episode + "/ack", {{"who", 7}}, 400);
   Post(episode + "/label", {{"who", "anna"}, {"label", "f99"}}, 400);
+  for (const Json& from : {Json("now"), Json(-1), Json(1.5), Json(1)}) {
+    Post("/api/v1/shelf",
+         {{"who", "bo"}, {"valve", "LV-1"}, {"minutes", 5}, {"from_ms", from}},
+         400);
+  }
   for (const Json& minutes : {Json(0), Json(-5), Json("30"), Json(1e9)}) {
     Post("/api/v1/shelf",
          {{"who", "bo"}, {"valve", "LV-1"}, {"minutes", minutes}}, 400);

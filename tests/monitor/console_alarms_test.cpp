@@ -139,6 +139,31 @@ TEST_F(AlarmBookTest, TellsWhenAShelfRunsOut) {
   EXPECT_FALSE(book_.ByValve()->at("V").shelved_until_ns);
 }
 
+TEST_F(AlarmBookTest, TellsWhenAPlannedShelfBegins) {
+  Begin("V");
+  const std::int64_t from_ns = kDetected + 600 * kSecond;
+  storage::HistoryEditor(path_).Shelve("V", std::nullopt, from_ns + kSecond,
+                                       By("anna", kDetected), from_ns);
+  book_.Refresh(kDetected + kSecond);
+  EXPECT_FALSE(book_.ByValve()->at("V").shelved_until_ns);
+  EXPECT_EQ(book_.ByValve()->at("V").shelf_planned_ns, from_ns);
+  EXPECT_TRUE(book_.Refresh(from_ns - 1).empty());
+
+  ASSERT_EQ(book_.Refresh(from_ns).size(), 1U);
+  EXPECT_TRUE(book_.ByValve()->at("V").shelved_until_ns);
+  EXPECT_FALSE(book_.ByValve()->at("V").shelf_planned_ns);
+}
+
+TEST_F(AlarmBookTest, AnAlarmIsActiveUntilItHasReturned) {
+  Begin("V");
+  book_.Refresh(kDetected);
+  EXPECT_TRUE(book_.ByValve()->at("V").active);
+  End("V");
+  book_.Refresh(kDetected);
+  EXPECT_FALSE(book_.ByValve()->at("V").active);
+  EXPECT_TRUE(book_.ByValve()->at("V").unacked);
+}
+
 class StoredModelsTest : public testing::Test {
  protected:
   StoredModelsTest() {

@@ -112,22 +112,6 @@ TEST_F(LiveBoardTest, AnotherModelSetBeginsTheTrendAnew) {
   EXPECT_EQ(board_.Trend("V1")->now.models->hash, 0x5678U);
 }
 
-TEST_F(LiveBoardTest, DriftIsThatOfTheModelSet) {
-  Show(0, 5);
-  EXPECT_TRUE(std::isnan(board_.Trend("V1")->now.drift_used));
-  board_.OnDrift("V1", std::array{FollowedDrift{-0.375, -0.5, 0.1, 0.2}});
-  EXPECT_EQ(board_.Trend("V1")->now.drift_used, 0.75);
-  EXPECT_EQ(board_.Trend("V1")->drift.at(0).mean, -0.375);
-  const auto other = monitor::SharedLinearModels(0x5678);
-  ValveEngine engine(other);
-  const Sample sample = PlantSample(5);
-  board_.OnVerdict("V1", sample,
-                   {engine.Step(sample), other.get(), true, false});
-
-  EXPECT_TRUE(board_.Trend("V1")->drift.empty());
-  EXPECT_TRUE(std::isnan(board_.Trend("V1")->now.drift_used));
-}
-
 TEST_F(LiveBoardTest, AValveWithoutModelsHasReadingsOnly) {
   Verdict verdict;
   verdict.quality = Quality::kUnassigned;

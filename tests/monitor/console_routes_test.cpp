@@ -71,31 +71,6 @@ TEST_F(ConsoleRoutesTest, ValvesAndTrendsOfAnyId) {
   EXPECT_EQ(Get("/api/v1/status")["model_sets"][0]["T"], 0.7);
 }
 
-TEST_F(ConsoleRoutesTest, ATrendTellsHowFarTheLimitsHaveFollowedTheValve) {
-  Start();
-  ShowValve("V1", 3);
-  ShowValve("V2", 3);
-  console_->live().OnDrift(
-      "V1", std::array{FollowedDrift{-0.25, -0.25, std::log(1.5), std::log(3.0),
-                                     monitor::PlantSample(2).stamp_ns, 0}});
-
-  EXPECT_EQ(Get("/api/v1/valves/V1/trend")["drift"],
-            Json::array({{{"channel", "X"},
-                          {"unit", "%"},
-                          {"mean", -0.25},
-                          {"mean_bound", -0.25},
-                          {"mean_used", 1.0},
-                          {"mean_full_since_ms", 1'700'000'002'000},
-                          {"scale", 1.5},
-                          {"scale_bound", 3.0},
-                          {"scale_used", 0.369},
-                          {"scale_full_since_ms", nullptr}}}));
-  const Json tiles = Get("/api/v1/valves")["valves"];
-  EXPECT_EQ(tiles[0]["drift_used"], 1.0);
-  EXPECT_TRUE(tiles[1]["drift_used"].is_null());
-  EXPECT_EQ(Get("/api/v1/valves/V2/trend")["drift"], Json::array());
-}
-
 TEST_F(ConsoleRoutesTest, AValveThatIsNotJudgedIsNotCalledNormal) {
   Start();
   const auto models = monitor::SharedLinearModels();
@@ -117,6 +92,7 @@ TEST_F(ConsoleRoutesTest, WhatIsPartlyJudgedIsNotCalledNormal) {
   const auto models = monitor::SharedLinearModels();
   Verdict verdict;
   verdict.quality = Quality::kLive;
+  verdict.confidence = 1.0;
   const auto show = [&](const Sample& sample) {
     console_->live().OnVerdict("V1", sample,
                                {verdict, models.get(), false, false});
@@ -131,9 +107,15 @@ TEST_F(ConsoleRoutesTest, WhatIsPartlyJudgedIsNotCalledNormal) {
   EXPECT_EQ(partly["unjudged"], Json::array({"X"}));
   EXPECT_TRUE(partly["refused"].is_null());
 
+  verdict.residuals[0] = 0.0;
+  verdict.confidence = 0.0;
+  const Json blind = show(monitor::PlantSample(2));
+  EXPECT_EQ(blind["state"], "PARTLY_JUDGED");
+  EXPECT_EQ(blind["blind"], true);
+
   verdict.quality = Quality::kBadInput;
   verdict.intake = Intake::kRange;
-  const Json refused = show(monitor::PlantSample(2, 1e6));
+  const Json refused = show(monitor::PlantSample(3, 1e6));
 
   EXPECT_EQ(refused["state"], "NOT_JUDGED");
   EXPECT_EQ(refused["refused"]["reason"], "range");

@@ -1,4 +1,5 @@
-// A valve without a model set, from its samples to the history.
+// The audit of a valve's loop, without a model set and beside one, from its
+// samples to the history.
 #include "monitor/names/loop_judge.h"
 
 #include <algorithm>
@@ -13,6 +14,7 @@
 #include "storage/history/history_reader.h"
 #include "storage/history/history_writer.h"
 #include "tests/monitor/fake_sinks.h"
+#include "tests/monitor/linear_models.h"
 #include "tests/monitor/test_support.h"
 #include "tests/storage/temporary_directory.h"
 
@@ -59,17 +61,19 @@ class LoopJudgeTest : public testing::Test {
   // Samples [from, to), each once the answers to those before are there.
   void Feed(std::uint64_t from, std::uint64_t to, double x_follows) {
     for (std::uint64_t k = from; k < to; ++k) {
-      const ValveOutcome outcome =
-          valve_.Step(At(k, x_follows), 1, now_, outlet_);
-      last_ = outcome.verdict;
-      models_ = outcome.models;
-      while (worker_.busy()) {
-        std::this_thread::yield();
-      }
+      Give(At(k, x_follows));
+    }
+  }
+  void Give(const Sample& sample) {
+    const ValveOutcome outcome = valve_.Step(sample, 1, now_, outlet_);
+    last_ = outcome.verdict;
+    models_ = outcome.models;
+    while (worker_.busy()) {
+      std::this_thread::yield();
     }
   }
 
-  AuditWorker worker_;
+  AuditWorker worker_{true};
   ValveMonitor::TimePoint now_{};
   LoopOutlet outlet_;
   ValveMonitor valve_{"V1",
@@ -87,7 +91,7 @@ TEST_F(LoopJudgeTest, ALoopThatIsSoundIsJudgedAndNormal) {
   EXPECT_EQ(models_, nullptr);
   EXPECT_EQ(last_.quality, Quality::kUnassigned);
 
-  Feed(720, 1000, 1.0);
+  Feed(720, 1100, 1.0);
   ASSERT_NE(models_, nullptr);
   EXPECT_EQ(models_->name, "audit");
   EXPECT_EQ(last_.quality, Quality::kLive);
@@ -96,7 +100,7 @@ TEST_F(LoopJudgeTest, ALoopThatIsSoundIsJudgedAndNormal) {
 }
 
 TEST_F(LoopJudgeTest, ARodThatStandsIsAnEpisodeWithItsEvidence) {
-  Feed(1, 1000, 0.0);
+  Feed(1, 1100, 0.0);
 
   ASSERT_THAT(outlet_.kinds, ElementsAre(TransitionKind::kDetected,
                                          TransitionKind::kIsolated));
@@ -124,13 +128,104 @@ TEST_F(LoopJudgeTest, ARodThatStandsIsAnEpisodeWithItsEvidence) {
 }
 
 TEST_F(LoopJudgeTest, ItsEpisodeEndsWithTheStreamAndWithAModelSet) {
-  Feed(1, 1000, 0.0);
+  Feed(1, 1100, 0.0);
   EXPECT_FALSE(valve_.Adopt(std::nullopt, outlet_));  // As it was.
   ASSERT_TRUE(valve_.EndStream(1, outlet_));
   ASSERT_EQ(outlet_.kinds.size(), 3U);
   EXPECT_EQ(outlet_.kinds[2], TransitionKind::kClosed);
   EXPECT_EQ(outlet_.events[2].transition.reason, EndReason::kStreamEnded);
   EXPECT_FALSE(valve_.episode_open());
+}
+
+// Beside the observers of a valve whose X is CV.
+class AuditBesideModelsTest : public LoopJudgeTest {
+ protected:
+  AuditBesideModelsTest() { valve_.Adopt(SlowModels(), outlet_); }
+  static EngineParts SlowModels() {
+    ModelSet models = LinearModels();
+    models.sample_period_s = 10.0;
+    return EngineParts(std::make_shared<const ModelSet>(models));
+  }
+  // X through a play of 2 %, which is within the observers' limits, and off.
+  void FeedSticky(std::uint64_t from, std::uint64_t to, double off = 0.0) {
+    for (std::uint64_t k = from; k < to; ++k) {
+      Sample sample = At(k, 1.0);
+      const double cv = sample[Signal::kCv];
+      rod_ = std::clamp(rod_, cv - 1.0, cv + 1.0);
+      sample.Set(Signal::kX, rod_ + off);
+      Give(sample);
+    }
+  }
+
+ private:
+  double rod_{50.0};
+};
+
+TEST_F(AuditBesideModelsTest, TellsWhatTheObserversDoNotSee) {
+  FeedSticky(1, 1100);
+  ASSERT_THAT(outlet_.kinds, ElementsAre(TransitionKind::kDetected,
+                                         TransitionKind::kIsolated));
+  EXPECT_EQ(outlet_.events[1].model_set, "audit");
+  EXPECT_EQ(outlet_.events[1].transition.layer, Layer::kAudit);
+  EXPECT_EQ(outlet_.events[1].candidates.at(0).fault, kStiction);
+  EXPECT_GE(outlet_.points, LoopWatch::kPoints);
+  EXPECT_TRUE(valve_.episode_open());
+  // The decision vector is that of the model set, and nothing is said to be
+  // normal.
+  EXPECT_EQ(models_->name, "linear");
+  EXPECT_EQ(last_.quality, Quality::kLive);
+  EXPECT_EQ(last_.state, State::kNormal);
+  EXPECT_EQ(outlet_.normal, 1);  // Before it was found.
+
+  // One alarm of one valve: the observers' takes its place.
+  FeedSticky(1100, 1140, kF7Offset);
+  ASSERT_EQ(outlet_.kinds.size(), 5U);
+  EXPECT_EQ(outlet_.kinds[2], TransitionKind::kClosed);
+  EXPECT_EQ(outlet_.events[2].transition.reason, EndReason::kSuperseded);
+  EXPECT_EQ(outlet_.events[2].episode_id, outlet_.events[1].episode_id);
+  EXPECT_EQ(outlet_.kinds[3], TransitionKind::kDetected);
+  EXPECT_EQ(outlet_.events[3].model_set, "linear");
+  EXPECT_EQ(outlet_.kinds[4], TransitionKind::kIsolated);
+}
+
+// The observers know what is normal for the valve, the audit does not.
+TEST_F(AuditBesideModelsTest, LeavesTheValveAloneUnlessItIsToTellOfAll) {
+  AuditWorker others;
+  others.Start();
+  ValveMonitor valve("V1", SlowModels(), {}, nullptr,
+                     std::make_shared<const SeverityCatalogue>(), &others);
+  std::swap(valve, valve_);
+  FeedSticky(1, 1100);
+  EXPECT_TRUE(outlet_.events.empty());
+  std::swap(valve, valve_);
+  others.Stop();
+}
+
+TEST_F(AuditBesideModelsTest, SaysNothingWhileTheObserversFindAFault) {
+  Feed(1, 1300, 0.0);  // A rod that stands.
+  ASSERT_FALSE(outlet_.events.empty());
+  for (const FaultEvent& event : outlet_.events) {
+    EXPECT_EQ(event.model_set, "linear");
+  }
+}
+
+// As after a restart of the monitor: the audit has to judge the loop again.
+TEST_F(AuditBesideModelsTest, WhatItFoundOnlyItFindsNormal) {
+  OpenEpisode left;
+  left.valve_id = "V1";
+  left.source_id = 1;
+  left.detection_stamp_ns = At(1, 1.0).stamp_ns;
+  left.episode_id = EpisodeId("V1", 1, left.detection_stamp_ns);
+  left.last_stamp_ns = At(5, 1.0).stamp_ns;
+  left.layer = Layer::kAudit;
+  left.model_hash = AuditModels(LoopWatch::kInterval_s)->content_hash;
+  valve_.Recover(left);
+  Feed(6, 700, 1.0);
+  ASSERT_EQ(outlet_.events.size(), 1U);
+  EXPECT_EQ(outlet_.events[0].transition.reason, EndReason::kUnknown);
+  EXPECT_EQ(outlet_.normal, 0);
+  Feed(700, 1100, 1.0);
+  EXPECT_GE(outlet_.normal, 1);
 }
 
 // What does not fit is refused, and the loop asks again.

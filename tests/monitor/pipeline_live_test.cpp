@@ -30,15 +30,10 @@ class FakeLive : public ValveListener {
   void OnSilence(const std::string& valve_id, Silence silence) override {
     notice.Apply([&] { silences.emplace_back(valve_id, silence); });
   }
-  void OnDrift(const std::string& valve_id,
-               std::span<const FollowedDrift> channels) override {
-    notice.Apply([&] { drift[valve_id] = channels[0]; });
-  }
 
   Notice notice;
   std::vector<std::string> shown;
   std::vector<std::pair<std::string, Silence>> silences;
-  std::map<std::string, FollowedDrift> drift;
 };
 
 class PipelineLiveTest : public PipelineTest {
@@ -89,51 +84,6 @@ TEST_F(PipelineLiveTest, ShowsWhenAValveEndsOrFallsSilent) {
       board_.notice.Await([this] { return board_.silences.size() == 2; }));
   EXPECT_THAT(board_.silences, ElementsAre(std::pair("V1", Silence::kEnded),
                                            std::pair("V2", Silence::kStale)));
-}
-
-// After the first hour the limits on the mean follow by 1/8 % an hour, up to
-// 0.05 %; those on the noise by a factor of 2 in 8 h, up to 1.02. V1 is off
-// downwards, V2 upwards, V3 to either side.
-TEST_F(PipelineLiveTest, ADriftIsShownAndOnceAtItsBoundCountedAndLogged) {
-  ModelSet models = LinearModels();
-  models.channels[0].windows = {{30, -1.0, 1.0, 1.0}};
-  models.channels[0].drift = {-0.05, 0.05, std::log(1.02)};
-  models_ = std::make_shared<const ModelSet>(models);
-  Start();
-  const auto offer = [this](std::uint64_t from, std::uint64_t to) {
-    Feed("V1", from, to, -0.2);
-    Feed("V2", from, to, 0.2);
-    for (std::uint64_t k = from; k < to; ++k) {
-      pipeline_->OnSample("V3", PlantSample(k, k % 2 == 0 ? -2.3 : 2.3), 1);
-    }
-  };
-  auto tend = [this, now = std::chrono::steady_clock::now()]() mutable {
-    pipeline_->Poll(now += std::chrono::milliseconds(300));
-  };
-
-  offer(0, 3600 + 720);
-  tend();
-  EXPECT_NEAR(board_.drift.at("V1").mean, -0.025, 0.001);
-  EXPECT_NEAR(board_.drift.at("V2").mean_used(), 0.5, 0.02);
-  EXPECT_EQ(pipeline_->census().near_bound, 0U);
-  EXPECT_THAT(lines_, testing::Each(testing::StartsWith("valve_seen")));
-  lines_.clear();
-  offer(3600 + 720, 3600 + 1350);
-  tend();
-  EXPECT_EQ(pipeline_->census().near_bound, 3U);
-  offer(3600 + 1350, 3600 + 1500);
-  tend();
-  tend();
-
-  EXPECT_EQ(board_.drift.at("V1").mean, -0.05);
-  EXPECT_THAT(lines_,
-              testing::UnorderedElementsAre(
-                  "drift_at_bound id=M118 valve=V1 channel=X direction=down "
-                  "followed=-0.05",
-                  "drift_at_bound id=M118 valve=V2 channel=X direction=up "
-                  "followed=0.05",
-                  "drift_at_bound id=M118 valve=V3 channel=X direction=wider "
-                  "followed=1.02"));
 }
 
 class FailingListener : public ValveListener {

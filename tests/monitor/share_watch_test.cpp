@@ -63,21 +63,6 @@ TEST(ContestedStatusTest, LongAndStrangeNamesFitTheWire) {
   EXPECT_EQ(StatusOf(facts).text.find('\n'), std::string::npos);
 }
 
-TEST(MeasuresOfTest, ValvesWhoseDriftIsNearItsBoundAreOnThePageOfMetrics) {
-  const Counters counters;
-  const StatusFacts facts{.counters = counters,
-                          .census = {.near_bound = 3},
-                          .samples = {},
-                          .datagrams = {},
-                          .refused_participants = 0,
-                          .decisions = {},
-                          .journal = {}};
-  Exposition page;
-  page.Add(MeasuresOf(facts));
-  EXPECT_NE(page.text().find("\nfdi_valves_drift_near_bound 3\n"),
-            std::string::npos);
-}
-
 TEST(ParsePartitionsTest, NamesAreCheckedAndPatternsOnlyWhereTheyMakeSense) {
   EXPECT_TRUE(ParsePartitions("", false).empty());
   EXPECT_EQ(ParsePartitions("hall-1,a/b.c_2", false),

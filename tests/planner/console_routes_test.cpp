@@ -23,7 +23,7 @@ class PlannerRoutesTest : public storage::HistoryFixture {
     ConsoleOptions options;
     options.address.host = "127.0.0.1";
     options.files = directory_.path();
-    options.routes = planner::ConsoleRoutes();
+    options.routes = planner::ConsoleRoutes({{"air west", {"V/*"}}});
     std::string listening;
     console_.emplace(options, report::GlobalOptions{},
                      [&listening](LogLevel, std::string_view line) {
@@ -93,6 +93,11 @@ TEST_F(PlannerRoutesTest, WhatCannotBeIsRefused) {
   Get("/api/v1/worklist?top=0", 400);
   Get("/api/v1/worklist?discipline=plumber", 400);
   Get("/api/v1/worklist?limit=Q%3D1", 400);
+}
+
+TEST_F(PlannerRoutesTest, GroupsOfTheFileAreThoseOfThePage) {
+  EXPECT_EQ(Get("/api/v1/groups")["groups"],
+            Json::parse(R"([{"name": "air west", "valves": ["V/*"]}])"));
 }
 
 TEST_F(PlannerRoutesTest, WorkListIsAFileToo) {

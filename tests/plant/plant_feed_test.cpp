@@ -146,7 +146,7 @@ TEST_F(PlantFeedTest, TrendsHaveTheirNamesFromTheModelSet) {
 
 // A valve that was taken out of service, and a monitor that nobody will start
 // again; one that is there again is new.
-TEST_F(PlantFeedTest, WhatIsSilentForADayIsForgotten) {
+TEST_F(PlantFeedTest, WhatIsSilentForLongIsForgotten) {
   Status(kA);
   Vector(kA, 1);
   Vector(kA, 1, "V2");

@@ -112,6 +112,8 @@ TEST(SuggestTest, AFaultIsSuggestedUnlessItsNumberIsWrong) {
   EXPECT_EQ(DidYouMeanFault("ture", {"true"}), " (did you mean 'true'?)");
   EXPECT_EQ(DidYouMeanFault("f99"), "");
   EXPECT_EQ(DidYouMeanFault("seat"), "");
+  EXPECT_EQ(DidYouMeanFault("x_stuck"),
+            " (a finding: it says what is seen, not what is wrong)");
 }
 
 TEST(SuggestTest, NearWordsAreMeantAndFarOnesAreNot) {

@@ -124,6 +124,17 @@ TEST_P(RecoveryTest, RecoversTheParametersOfASimulatedValve) {
 INSTANTIATE_TEST_SUITE_P(ValveIdentification, RecoveryTest,
                          ::testing::Values(-1, 1));
 
+// As much flow where the record is, from a much smaller valve.
+TEST(ValveIdentificationTest, FindsAFlatTrim) {
+  const ValveParameters nominal = ParameterSet("lublin-actuator-3-refit");
+  ValveParameters truth = nominal;
+  truth.trim.exponent = 1.5;
+  truth.trim.kv_m3_h *= std::exp(0.6 * (1.5 - nominal.trim.exponent));
+  const ValveFit fit = FitValve({Recording(truth, 400, 3)}, nominal);
+  ExpectRecovered(fit, "trim.kv_m3_h", truth.trim.kv_m3_h, 0.05);
+  ExpectRecovered(fit, "trim.exponent", truth.trim.exponent, 0.05);
+}
+
 // The command of a row acts over the period before its stamp.
 TEST(ValveIdentificationTest, FindsTheDelayOfTheCommand) {
   const ValveParameters truth = ParameterSet("lublin-actuator-3-refit");

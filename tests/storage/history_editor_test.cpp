@@ -250,6 +250,63 @@ TEST_F(HistoryEditorTest, ShelvingHasItsLimits) {
   EXPECT_EQ(HistoryReader(path_).Shelves().size(), 0U);
 }
 
+TEST_F(HistoryEditorTest, APlannedShelfBeginsAtItsTime) {
+  const std::int64_t from = now_ + 3600 * kSecond;
+  const std::int64_t until = from + 3600 * kSecond;
+  const auto plan = [&](std::int64_t begin, std::int64_t end) {
+    return editor_.Shelve("LV-1", std::nullopt, end, By("anna", now_), begin);
+  };
+  const Shelf planned = plan(from, until);
+  editor_.Shelve("LV-1", std::nullopt, now_ + kSecond, By("jan", now_));
+
+  HistoryReader reader(path_);
+  const auto shelf_at = [&](std::int64_t ns) {
+    EpisodeFilter filter;
+    filter.now_ns = ns;
+    filter.state = EpisodeState::kAlarmShelved;
+    const bool found = !reader.List(filter).empty();
+    const auto alarm = reader.Alarms(reader.List(), ns).front();
+    EXPECT_EQ(found, alarm.shelf.has_value()) << ns - now_;
+    return alarm.shelf ? alarm.shelf->who : "";
+  };
+  EXPECT_EQ(shelf_at(now_), "jan") << "what is in force stays";
+  EXPECT_EQ(shelf_at(from - 1), "");
+  EXPECT_EQ(shelf_at(from), "anna");
+  EXPECT_EQ(shelf_at(until), "");
+  EXPECT_EQ(reader.Shelves(from - 1).size(), 1U) << "planned is not over";
+
+  // Another plan for the same time takes its place; one for later does not.
+  plan(from - kSecond, until);
+  plan(until, until + kSecond);
+  EXPECT_EQ(reader.Shelves(from).size(), 2U);
+  EXPECT_EQ(reader.Shelves()[0].ended_by, "anna");
+  EXPECT_THROW(editor_.EndShelf(planned.shelf_id, By("eva", now_)), DataError);
+  const auto last = reader.Shelves().back().shelf_id;
+  EXPECT_EQ(editor_.EndShelf(last, By("eva", now_)).ended_by, "eva");
+
+  EXPECT_THROW(plan(now_, until), ConfigError);
+  EXPECT_THROW(plan(from, from), ConfigError);
+  EXPECT_THROW(plan(now_ + kMaxShelfNs + 1, now_ + kMaxShelfNs + 2),
+               ConfigError);
+}
+
+TEST_F(HistoryEditorTest, AShelfPlannedOnTheOtherMonitorIsPlannedHere) {
+  OperatorAction action;
+  action.monitor = "host:1";
+  action.kind = OperatorActionKind::kShelve;
+  action.valve_id = "LV-1";
+  action.who = "anna";
+  action.stamp_ns = UtcNow() + 3600 * kSecond;
+  action.until_ns = action.stamp_ns + kSecond;
+  ASSERT_TRUE(editor_.Adopt(action));
+  EXPECT_FALSE(IsActive(HistoryReader(path_).Shelves().back(), UtcNow()));
+  // Clocks differ by less than this.
+  action.valve_id = "LV-2";
+  action.stamp_ns = UtcNow() + 5 * kSecond;
+  ASSERT_TRUE(editor_.Adopt(action));
+  EXPECT_TRUE(IsActive(HistoryReader(path_).Shelves().back(), UtcNow()));
+}
+
 TEST_F(HistoryEditorTest, TheShelfIsAppendOnly) {
   editor_.Shelve("LV-1", std::nullopt, now_ + kSecond, By("anna", now_));
   Database file(path_, HistorySchema(), Access::kOccasionalWriter);

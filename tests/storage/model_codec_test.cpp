@@ -74,14 +74,20 @@ TEST(ModelCodecTest, NamesBeforeTkReadBackInTheirOwnFormat) {
   EXPECT_EQ(DecodeModelSet(bytes, "test").decision.early_error, 1e-3);
 }
 
-// Sets of before do not know it, and keep their bytes.
-TEST(ModelCodecTest, TooLittleFlowReadsBackInItsOwnFormat) {
+// Sets of before know neither, and keep their bytes.
+TEST(ModelCodecTest, FitLimitsAndTooLittleFlowReadBackInTheirOwnFormat) {
   ModelSet models = RandomModelSet("valve", 5);
+  models.observers[2].channels[1].fit = {-0.75, 0.5, 2.25};
+  models.observers[1].moved = MaskOf(Signal::kT1);
   models.floor.emplace().flow_share = 0.5;
   AddFindings(models);
   const auto bytes = EncodeModelSet(models);
-  EXPECT_EQ(bytes[4], std::byte{3 + 2 + 64});
+  EXPECT_EQ(bytes[4], std::byte{3 + 2 + 64 + 128});
   const ModelSet back = DecodeModelSet(bytes, "test");
+  EXPECT_EQ(back.observers[2].channels[1].fit, (FitBounds{-0.75, 0.5, 2.25}));
+  EXPECT_EQ(back.observers[2].channels[0].fit, FitBounds{});
+  EXPECT_EQ(back.observers[1].moved, MaskOf(Signal::kT1));
+  EXPECT_EQ(back.observers[2].moved, 0);
   EXPECT_EQ(back.floor->flow_share, 0.5);
   EXPECT_EQ(back.faults.back(), kLowFlow);
 }
@@ -177,17 +183,17 @@ TEST(ModelCodecTest, FlowShapeIsPartOfTheNewerFormatAlone) {
   EXPECT_EQ(EncodeModelSet(back), bytes);
 }
 
-// Likewise sets of before a drift was followed.
-TEST(ModelCodecTest, DriftIsPartOfTheNewerFormatAlone) {
+// What nothing uses any more still belongs to the hash of such a set.
+TEST(ModelCodecTest, AFormerDriftIsReadAndKept) {
   ModelSet models = RandomModelSet("valve");
   models.physics = {{"trim.kv_m3_h", 118.5}};
   ASSERT_EQ(std::to_integer<int>(EncodeModelSet(models)[4]), 4);
-  models.channels.back().drift = {-0.5, 0.25, 1.0};
+  models.channels.back().former_drift = {-0.5, 0.25, 1.0};
   const auto bytes = EncodeModelSet(models);
   EXPECT_EQ(std::to_integer<int>(bytes[4]), 8);
   const ModelSet back = DecodeModelSet(bytes, "test");
-  EXPECT_EQ(back.channels.front().drift, DriftLimits{});
-  EXPECT_EQ(back.channels.back().drift, models.channels.back().drift);
+  EXPECT_EQ(back.channels.back().former_drift,
+            models.channels.back().former_drift);
   ASSERT_EQ(back.physics.size(), 1U);
   EXPECT_EQ(EncodeModelSet(back), bytes);
 }
@@ -256,7 +262,7 @@ TEST(ModelCodecTest, RefusalsNameThePlaceAndTheReason) {
   auto older = bytes;
   older[4] = std::byte{2};
   EXPECT_THAT(Refusal(WithValidChecksum(older)),
-              HasSubstr("format version 2, this program reads 3 to 130"));
+              HasSubstr("format version 2, this program reads 3 to 258"));
   EXPECT_THAT(Refusal({}), HasSubstr("is not a model set"));
   // The length of the name stands first in the payload, after 16 bytes.
   auto huge = bytes;

@@ -182,7 +182,7 @@ class PlantFixture : public HistoryFixture {
            "gap_id"},
           {"shelf",
            "shelf_id, valve_id, fault, from_ns, until_ns, who, comment, "
-           "origin, ended_ns, ended_by, ended_origin",
+           "origin, ended_ns, ended_by, ended_origin, planned_ns",
            "shelf_id"},
           {"monitor_session",
            "session_id, start_ns, alive_ns, stop_ns, clean, software",

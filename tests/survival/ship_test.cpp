@@ -475,7 +475,7 @@ TEST_F(ShipTest, RefusalsHaveAReasonAndCode3) {
   EXPECT_EQ(Store("history list --from '" + Url("screen") + "'").code, 0);
   owner.Run("UPDATE fdi.plant SET version = version + 1");
   refused(Ship("a"),
-          "schema fdi has version 6, this program needs 5: update "
+          "schema fdi has version 7, this program needs 6: update "
           "this program");
   refused(Store("ship --data " + Folder("a").string() +
                 " --to 'postgresql://x:secret@/plant?host=/nowhere'"),
@@ -586,6 +586,12 @@ TEST_F(ShipTest, RetentionOfBothSides) {
                     " WHERE episode_id = '" + EpisodeIdText(Id("old")) + "'"),
         std::vector<std::string>{"|0"});
   }
+  plant.Run(
+      "UPDATE fdi.episode SET label = NULL, detected_ns = detected_ns + d, "
+      "ended_ns = ended_ns + d FROM (SELECT 315360000000000000) AS years (d) "
+      "WHERE label IS NOT NULL");
+  EXPECT_EQ(there(kDetected - kSecond), Pair(0, 2));
+  EXPECT_EQ(there(*limits.before_ns), Pair(1, 2)) << "by its arrival";
 }
 
 // The verbs say of the plant what they say of the history.
@@ -1008,6 +1014,17 @@ TEST_F(ShipTest, ABadRowHidesNoGoodOne) {
   note("1 row could not be read: strength: unknown fault 'f99'");
   EXPECT_NO_THROW(reader.Trace(Id()));
   note("1 row could not be read: evidence");
+  owner.RunScript(
+      "INSERT INTO fdi.common_cause VALUES (1, 'a', 'air', 1, NULL), "
+      "(1, 'b', 'air', 9223372036854775807, NULL);"
+      "INSERT INTO fdi.common_cause_member VALUES (1, 'a', '1', 'V1', 'f7', "
+      "1), "
+      "(1, 'a', '2', 'V2', 'f7', 9223372036854775807), "
+      "(1, 'b', '3', 'V3', 'f7', 1)");
+  const auto causes = reader.OpenCauses();
+  ASSERT_EQ(causes.size(), 1U);
+  EXPECT_EQ(causes[0].members.size(), 1U);
+  note("2 rows could not be read: common cause: ");
   const auto start = Clock::now();
   EXPECT_EQ(reader.AlarmFigures({}, kDetected + kSecond).valves.size(), 2U);
   EXPECT_LT(Clock::now() - start, milliseconds(1000));
@@ -1029,6 +1046,7 @@ TEST_F(ShipTest, AnUpgradeMovesBadRowsAside) {
   owner.RunScript(kBadRows);
   owner.RunScript(
       "DELETE FROM fdi.episode_strength;"
+      "ALTER TABLE fdi.shelf DROP COLUMN planned_ns;"
       "DROP FUNCTION fdi.is_stamp, fdi.is_finite; DROP TABLE fdi.unsound;"
       "DROP INDEX fdi.data_gap_once, fdi.shelf_once;"
       "ALTER TABLE fdi.data_gap ADD PRIMARY KEY (gap_id, monitor_id);"

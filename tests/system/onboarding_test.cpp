@@ -66,23 +66,30 @@ TEST_F(OnboardingTest, FaultsOnARealValveAreSeenAndNamedNarrowly) {
   }
 }
 
-// No fault run of this valve, nor its model, was used.
+// No fault run of this valve, nor its model, was used. Every third recording,
+// all with FDI_ALL_RECORDINGS: each takes a dozen seconds of looks.
 TEST_F(OnboardingTest, FaultsOfAnotherModelAreSeenAndNamed) {
   Onboard("REF", Reference("plant_faultfree_211") + "@20:");
-  std::string files;
+  std::vector<std::string> names;
   for (const auto& entry :
        std::filesystem::directory_iterator(folder_ / "valve-reference")) {
-    const std::string name = entry.path().filename().string();
-    if (name.starts_with("plant_f") && name != "plant_faultfree_211.csv") {
-      files += " --file " + entry.path().string();
+    const std::string name = entry.path().stem().string();
+    if (name.starts_with("plant_f") && name != "plant_faultfree_211") {
+      names.push_back(name);
     }
   }
-  const nlohmann::json scored =
-      RunJson("evaluate --model-set REF" + files)["runs"];
-  ASSERT_EQ(scored.size(), 35U);
+  ASSERT_EQ(names.size(), 35U);
+  std::sort(names.begin(), names.end());
+  const bool all = std::getenv("FDI_ALL_RECORDINGS") != nullptr;
+  std::string files;
+  for (std::size_t i = 0; i < names.size(); i += all ? 1 : 3) {
+    files += " --file " + Reference(names[i]);
+  }
   int detected = 0;
   int contained = 0;
   int exact = 0;
+  const nlohmann::json scored =
+      RunJson("evaluate --model-set REF" + files)["runs"];
   for (const auto& run : scored) {
     SCOPED_TRACE(run["run_id"].get<std::string>());
     if (run["fault"] == nullptr || run["fault"] == "normal") {
@@ -94,9 +101,10 @@ TEST_F(OnboardingTest, FaultsOfAnotherModelAreSeenAndNamed) {
     contained += Contains(run);
     exact += run["d_acc"] == 1.0;
   }
-  EXPECT_GE(detected, 23);  // 27 move X or F.
-  EXPECT_GE(contained, 18);
-  EXPECT_GE(exact, 14);
+  // 27 of the 35, and 9 of the third, move X or F.
+  EXPECT_GE(detected, all ? 23 : 7);
+  EXPECT_GE(contained, all ? 18 : 6);
+  EXPECT_GE(exact, all ? 14 : 5);
 }
 
 }  // namespace

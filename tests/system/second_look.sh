@@ -12,7 +12,7 @@ record() {  # FILE OPTIONS
 }
 
 record healthy.csv --seed 31 --duration 3600
-record faulty.csv --seed 32 --duration 720 --fault f3:abrupt@300:strength=0.6
+record faulty.csv --seed 32 --duration 600 --fault f3:abrupt@300:strength=0.6
 "$bin/fdi-trainer" onboard --valve LV-1 --file healthy.csv --no-coverage \
   >onboard.log 2>&1 || fail "onboarding fails"
 "$bin/fdi-trainer" evaluate --valve LV-1 --file faulty.csv --json \
@@ -23,7 +23,7 @@ wanted=$(sqlite3 :memory: "select group_concat(value, '|') from
 
 start
 timeout 400 "$bin/fdi-simulator" --domain "$domain" replay --csv faulty.csv \
-  --valve LV-1 --speed 10 >simulator.log 2>&1 || fail "the simulator fails"
+  --valve LV-1 --speed 12 >simulator.log 2>&1 || fail "the simulator fails"
 stop
 
 found=$(history "select group_concat(name, '|') from

@@ -53,30 +53,15 @@ TEST_F(TopSystemTest, OnceIsTheTableOfWhatWasSaidLast) {
   EXPECT_EQ(table["monitor"], "OK");
 }
 
-TEST_F(TopSystemTest, KeysSortFilterAndQuitAndTheTerminalIsAsBefore) {
-  PtyProcess top(Top(), 120, 20);
+TEST_F(TopSystemTest, TheTableComesAgainUntilCtrlC) {
+  std::vector<std::string> command = Top();
+  command.insert(command.end(), {"--filter", "V1", "--sort", "since"});
+  PtyProcess top(command, 120, 20);
   const termios before = top.Settings();
+  EXPECT_TRUE(top.AwaitText("1 with 'V1'")) << top.output();
   EXPECT_TRUE(top.AwaitText("ISOLATED")) << top.output();
-  EXPECT_EQ(top.Settings().c_lflag & ICANON, 0U);
-
-  top.Type("s");
-  EXPECT_TRUE(top.AwaitText("by valve")) << top.output();
-  top.Type("/nothing\r");
-  EXPECT_TRUE(top.AwaitText("0 with 'nothing'")) << top.output();
   top.ClearOutput();
-  top.Type("/\x1b");
   EXPECT_TRUE(top.AwaitText("ISOLATED")) << top.output();
-  top.Type("q");
-
-  EXPECT_EQ(top.AwaitExit(), 0);
-  EXPECT_THAT(top.output(), HasSubstr("\x1b[?25h\x1b[?1049l"));
-  EXPECT_EQ(top.Settings().c_lflag, before.c_lflag);
-}
-
-TEST_F(TopSystemTest, AnInterruptPutsTheTerminalBackToo) {
-  PtyProcess top(Top(), 60, 8);
-  const termios before = top.Settings();
-  EXPECT_TRUE(top.AwaitText("V1")) << top.output();
 
   top.Type("\x03");  // Ctrl-C
 

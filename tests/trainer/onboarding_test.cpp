@@ -267,6 +267,17 @@ TEST(RecordChecksTest, SimulationHasToBeBetterThanNone) {
   }
 }
 
+TEST(RecordChecksTest, AFlowThatMovesWithoutTheCommandIsNotRefused) {
+  TrainingRun run = RunOf({"r", SimulateHealthy(Lublin(), 900.0, 3)});
+  double sign = 1.0;
+  for (LabelledSample& labelled : run.samples) {
+    sign = -sign;
+    labelled.sample.Set(Signal::kCv, 60.0 + 0.3 * sign);
+    labelled.sample.Set(Signal::kX, 60.0 + 0.3 * sign);
+  }
+  EXPECT_NO_THROW(CheckFit({run}, {0.3, 30.0, 0.0, 0.0}, {}, 40.0));
+}
+
 // Models of a few faults; what a table says of a fault that is as plain as
 // half the flow, and of one that has no effect on X.
 TEST(CoverageTest, SaysFromWhichStrengthOnAFaultIsSeen) {

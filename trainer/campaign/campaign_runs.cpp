@@ -4,11 +4,11 @@
 #include <bit>
 #include <cstdint>
 #include <map>
-#include <mutex>
 #include <optional>
 #include <utility>
 
 #include "base/error.h"
+#include "base/mutex.h"
 #include "base/time_text.h"
 #include "import/csv.h"
 #include "report/progress.h"
@@ -239,17 +239,17 @@ class Collector {
     }
     storage::RunRecorder recorder(directory_.runs());
     std::uint64_t done = 0;
-    std::mutex mutex;
+    Mutex mutex;
     const auto simulate = [&](std::size_t i) {
       const auto samples = Simulate(config_of(i), [&](std::uint64_t count) {
-        const std::scoped_lock lock(mutex);
+        const MutexLock lock(mutex);
         done += count;
         if (progress_) {
           progress_(static_cast<double>(done) / static_cast<double>(total),
                     RunLabel(runs_[i]));
         }
       });
-      const std::scoped_lock lock(mutex);
+      const MutexLock lock(mutex);
       const auto key =
           recorder.Begin(RunRowOf(std::get<SimulatedRun>(runs_[i].source),
                                   options_.start_ns, options_.software));

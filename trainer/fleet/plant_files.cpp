@@ -16,13 +16,12 @@ constexpr std::size_t kMaxShelved = std::size_t{512} << 20U;
 }  // namespace
 
 PlantFiles::Shelved& PlantFiles::At(const std::filesystem::path& path) {
-  const std::scoped_lock lock(mutex_);
+  const MutexLock lock(mutex_);
   Shelved& shelved = files_[path];
   shelved.used = ++clock_;
   return shelved;
 }
 
-// The caller holds shelved.loading.
 void PlantFiles::Load(const std::filesystem::path& path, Shelved& shelved) {
   if (!shelved.error.empty()) {
     throw DataError(shelved.error);
@@ -45,7 +44,7 @@ std::shared_ptr<const importer::ColumnIndex> PlantFiles::Open(
   std::shared_ptr<const importer::ColumnIndex> index;
   bool loaded = false;
   {
-    const std::scoped_lock lock(shelved.loading);
+    const MutexLock lock(shelved.loading);
     if (!shelved.index) {
       Load(path, shelved);
       loaded = true;
@@ -61,29 +60,31 @@ std::shared_ptr<const importer::ColumnIndex> PlantFiles::Open(
 const importer::TagNames& PlantFiles::TagsOf(
     const std::filesystem::path& path) {
   Shelved& shelved = At(path);
+  const importer::TagNames* tags = nullptr;  // Once there, they stay.
   bool loaded = false;
   {
-    const std::scoped_lock lock(shelved.loading);
+    const MutexLock lock(shelved.loading);
     if (!shelved.tags) {
       Load(path, shelved);
       loaded = true;
     }
+    tags = shelved.tags.get();
   }
   if (loaded) {
     MakeRoom();
   }
-  return *shelved.tags;
+  return *tags;
 }
 
 // Lets go of the tables that were not used for longest. A table in use lives on
 // with its user; one that is being loaded is passed over.
 void PlantFiles::MakeRoom() {
-  const std::scoped_lock lock(mutex_);
+  const MutexLock lock(mutex_);
   std::vector<Shelved*> kept;
   std::size_t bytes = 0;
   for (auto& [path, shelved] : files_) {
     if (shelved.loading.try_lock()) {
-      const std::scoped_lock loading(std::adopt_lock, shelved.loading);
+      const MutexLock loading(shelved.loading, std::adopt_lock);
       if (shelved.index) {
         bytes += shelved.index->bytes();
         kept.push_back(&shelved);
@@ -93,7 +94,7 @@ void PlantFiles::MakeRoom() {
   std::ranges::sort(kept, {}, &Shelved::used);
   for (std::size_t i = 0; i + 1 < kept.size() && bytes > kMaxShelved; ++i) {
     if (kept[i]->loading.try_lock()) {
-      const std::scoped_lock loading(std::adopt_lock, kept[i]->loading);
+      const MutexLock loading(kept[i]->loading, std::adopt_lock);
       if (kept[i]->index) {
         bytes -= kept[i]->index->bytes();
         kept[i]->index.reset();
@@ -103,9 +104,10 @@ void PlantFiles::MakeRoom() {
 }
 
 std::map<std::string, std::vector<std::string>> PlantFiles::AllTags() const {
-  const std::scoped_lock lock(mutex_);
+  const MutexLock lock(mutex_);
   std::map<std::string, std::vector<std::string>> tags;
   for (const auto& [path, shelved] : files_) {
+    const MutexLock loading(shelved.loading);
     if (shelved.tags) {
       tags[path.string()] = shelved.tags->all();
     }

@@ -3,10 +3,10 @@
 #include <filesystem>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <vector>
 
+#include "base/mutex.h"
 #include "import/column_index.h"
 #include "import/plant_table.h"
 
@@ -30,21 +30,22 @@ class PlantFiles {
 
  private:
   struct Shelved {
-    std::mutex loading;
-    std::shared_ptr<const importer::ColumnIndex> index;
-    std::unique_ptr<importer::TagNames> tags;
-    std::string error;  // DataError's; empty: none.
+    mutable Mutex loading;
+    std::shared_ptr<const importer::ColumnIndex> index GUARDED_BY(loading);
+    std::unique_ptr<importer::TagNames> tags GUARDED_BY(loading);
+    std::string error GUARDED_BY(loading);  // DataError's; empty: none.
     std::uint64_t used{0};
   };
   Shelved& At(const std::filesystem::path& path);
-  void Load(const std::filesystem::path& path, Shelved& shelved);
+  void Load(const std::filesystem::path& path, Shelved& shelved)
+      REQUIRES(shelved.loading);
   void MakeRoom();
 
   importer::ColumnMap form_;
   std::size_t max_lines_;
-  mutable std::mutex mutex_;
-  std::map<std::filesystem::path, Shelved> files_;
-  std::uint64_t clock_{0};
+  mutable Mutex mutex_;
+  std::map<std::filesystem::path, Shelved> files_ GUARDED_BY(mutex_);
+  std::uint64_t clock_ GUARDED_BY(mutex_){0};
 };
 
 /// Where the record of a row is: a file and its columns.

@@ -109,7 +109,7 @@ std::vector<storage::StoredRun> ReadRuns(const PlantJob& job,
   }
   if (runs.empty()) {
     throw DataError("no sample is from " +
-                    (job.row.from.empty() ? "the begin" : job.row.from) +
+                    (job.row.from.empty() ? "the start" : job.row.from) +
                     " to " + (job.row.to.empty() ? "the end" : job.row.to) +
                     ": the record is from " + seen +
                     "; correct from and to, or the file");
@@ -117,9 +117,10 @@ std::vector<storage::StoredRun> ReadRuns(const PlantJob& job,
   return runs;
 }
 
-// The longest stretch in AUTO with what is judged; its last two hours.
+// The longest stretch in AUTO with what is judged, of which two hours count:
+// the last ones; and its period.
 std::span<const storage::StoredSample> AuditedPart(
-    const std::vector<storage::StoredRun>& runs) {
+    const std::vector<storage::StoredRun>& runs, double& audited_period_s) {
   std::span<const storage::StoredSample> longest;
   for (const storage::StoredRun& run : runs) {
     const double period_s = run.info.run.period_s;
@@ -142,6 +143,7 @@ std::span<const storage::StoredSample> AuditedPart(
         const std::size_t count = std::min(k - begin, most);
         if (count > longest.size()) {
           longest = all.subspan(k - count, count);
+          audited_period_s = period_s;
         }
         begin = judged ? k : k + 1;
       }
@@ -241,6 +243,17 @@ std::uint64_t InputHash(const PlantJob& job, const std::vector<RowText>& texts,
     input += '\n';
   }
   for (std::size_t i = 0; i < texts.size(); ++i) {
+    const importer::ColumnMap& form = texts[i].form;
+    input += form.zone + '\n' + std::string(1, form.decimal) +
+             std::to_string(static_cast<int>(form.date_order)) + ' ' +
+             std::to_string(static_cast<int>(form.time_form)) + ' ' +
+             NumberText(form.time_scale) + '\n' + Listed(form.no_reading) +
+             '\n';
+    if (form.resampling) {
+      input += NumberText(form.resampling->period_s) + ' ' +
+               NumberText(form.resampling->limit_s) +
+               (form.resampling->linear ? " linear\n" : " hold\n");
+    }
     input += Listed({job.sources[i].match.columns.begin(),
                      job.sources[i].match.columns.end()}) +
              '\n' + texts[i].text;
@@ -270,13 +283,13 @@ std::vector<TrainingRun> ReadValve(const PlantJob& job,
 std::string AuditLoop(const PlantJob& job, const std::vector<RowText>& texts,
                       bool utc, bool fits) {
   const std::vector<storage::StoredRun> runs = ReadRuns(job, texts, true, utc);
-  const auto part = AuditedPart(runs);
+  loop::Window window;
+  window.period_s = runs.front().info.run.period_s;
+  const auto part = AuditedPart(runs, window.period_s);
   if (part.size() < loop::kMinSamples) {
     return "not judged: at most " + std::to_string(part.size()) +
            " samples in a row in AUTO with op and pv";
   }
-  loop::Window window;
-  window.period_s = runs.front().info.run.period_s;
   window.op = SeriesOf(part, Signal::kCv);
   window.x = SeriesOf(part, Signal::kX);
   window.pv = SeriesOf(part, Signal::kF);

@@ -2,10 +2,8 @@
 
 #include <algorithm>
 #include <chrono>
-#include <condition_variable>
 #include <cstdio>
 #include <map>
-#include <mutex>
 #include <new>
 #include <optional>
 #include <span>
@@ -13,6 +11,7 @@
 #include <utility>
 
 #include "base/error.h"
+#include "base/mutex.h"
 #include "diagnosis/fault_catalogue.h"
 #include "storage/models/model_codec.h"
 #include "trainer/campaign/campaign_runs.h"
@@ -229,9 +228,7 @@ class PlantRun {
         std::max(1, threads / std::max(1, static_cast<int>(tasks_.size())));
     ParallelFor(std::min(threads, static_cast<int>(tasks_.size())), threads,
                 [this](int) { Work(); });
-    if (settings_.stop && settings_.stop()) {
-      throw Interrupted("interrupted");
-    }
+    StopIfAsked();
     return std::move(outcomes_);
   }
 
@@ -304,7 +301,7 @@ class PlantRun {
         listed.group != outcome.loop.group) {
       outcome.loop.grade = listed.grade;
       outcome.loop.group = listed.group;
-      const std::scoped_lock lock(store_mutex_);
+      const MutexLock lock(store_mutex_);
       store_.PutLoop(outcome.loop, EntryOf(job.row));
     }
   }
@@ -334,7 +331,7 @@ class PlantRun {
 
   // The next task that waits for nothing; null: there is none left.
   Task* Next() {
-    std::unique_lock lock(mutex_);
+    MutexLock lock(mutex_);
     while (!failed_) {
       bool waiting = false;
       for (Task& task : tasks_) {
@@ -367,7 +364,7 @@ class PlantRun {
         Done(*task);
       }
     } catch (...) {
-      const std::scoped_lock lock(mutex_);
+      const MutexLock lock(mutex_);
       failed_ = true;
       changed_.notify_all();
       throw;
@@ -375,7 +372,7 @@ class PlantRun {
   }
 
   void Done(const Task& task) {
-    const std::scoped_lock lock(mutex_);
+    const MutexLock lock(mutex_);
     done_cost_ += task.cost;
     if (progress_) {
       progress_(
@@ -391,14 +388,14 @@ class PlantRun {
     for (const std::size_t row : kind.rows) {
       {
         // A row that was onboarded before its type was deleted stays.
-        const std::scoped_lock lock(mutex_);
+        const MutexLock lock(mutex_);
         attempted_[row] = attempted_[row] != 0 ? attempted_[row] : todo_[row];
       }
       if (Attempt(row, kind)) {
         break;
       }
     }
-    const std::scoped_lock lock(mutex_);
+    const MutexLock lock(mutex_);
     kind.ready = true;
   }
 
@@ -409,7 +406,7 @@ class PlantRun {
           ReadValve(jobs_[row], TextsOf(jobs_[row], files_), settings_.utc);
       const Onboarding onboarding = OnboardWith(row, runs, kind.base, nullptr);
       Keep(row, onboarding, "first of its type", kind.name, start);
-      const std::scoped_lock lock(store_mutex_);
+      const MutexLock lock(store_mutex_);
       kind.known = FindType(kind.name, &store_);
       kind.models = SetOf(*kind.known, store_);
       return true;
@@ -496,12 +493,13 @@ class PlantRun {
         ResultOf(jobs_[row].row.name, onboarding, type_name);
     if (todo_[row]) {
       result.entry.type = jobs_[row].row.type;
+      result.entry.sense = jobs_[row].row.sense;
       result.loop = outcome.loop;
     } else {
       result.entry = {};  // Of another shard, or there already.
     }
     {
-      const std::scoped_lock lock(store_mutex_);
+      const MutexLock lock(store_mutex_);
       const auto saved = store_.Store(result);
       outcome.model_set = saved->name + '@' + std::to_string(saved->version);
     }
@@ -520,7 +518,7 @@ class PlantRun {
   void StoreLoop(std::size_t row, PlantOutcome outcome,
                  std::chrono::steady_clock::time_point start) {
     {
-      const std::scoped_lock lock(store_mutex_);
+      const MutexLock lock(store_mutex_);
       store_.PutLoop(outcome.loop, EntryOf(jobs_[row].row));
     }
     outcome.seconds = SecondsSince(start);
@@ -534,7 +532,7 @@ class PlantRun {
     outcome.loop.state = LoopState::kRefused;
     outcome.loop.finding = reason;
     if (jobs_[row].row.error.empty()) {
-      const std::scoped_lock lock(store_mutex_);
+      const MutexLock lock(store_mutex_);
       store_.PutLoop(outcome.loop, EntryOf(jobs_[row].row));
     }
   }
@@ -554,11 +552,11 @@ class PlantRun {
   std::vector<Task> tasks_;
   double all_cost_{0.0};
   int inner_threads_{1};
-  std::mutex mutex_;  // Of tasks, kinds and progress.
-  std::condition_variable changed_;
-  bool failed_{false};
-  double done_cost_{0.0};
-  std::mutex store_mutex_;
+  Mutex mutex_;  // Also of tasks and kinds, once the work began.
+  CondVar changed_;
+  bool failed_ GUARDED_BY(mutex_){false};
+  double done_cost_ GUARDED_BY(mutex_){0.0};
+  Mutex store_mutex_;
 };
 
 }  // namespace
@@ -580,12 +578,15 @@ std::vector<PlantOutcome> CheckPlant(const std::vector<PlantJob>& jobs,
   std::vector<PlantOutcome> outcomes(jobs.size());
   ParallelFor(static_cast<int>(jobs.size()), settings.threads, [&](int k) {
     const auto i = static_cast<std::size_t>(k);
+    PlantOutcome& outcome = outcomes[i];
+    outcome.in_shard = mine[i];
+    if (!mine[i]) {
+      return;
+    }
     PlantJob job = jobs[i];
     // The first lines of a file tell its form, not what is in the window.
     job.row.from.clear();
     job.row.to.clear();
-    PlantOutcome& outcome = outcomes[i];
-    outcome.in_shard = mine[i];
     outcome.loop = LoopOf(job.row);
     outcome.loop.finding = job.error.empty() ? kinds.ErrorOf(i) : job.error;
     Kind* kind = kinds.Of(i);

@@ -6,8 +6,8 @@
 #include <nlohmann/json.hpp>
 
 #include "base/error.h"
+#include "base/text.h"
 #include "diagnosis/fault_catalogue.h"
-#include "report/help.h"
 #include "storage/models/models.h"
 #include "storage/runs/runs.h"
 #include "trainer/campaign/campaign_fields.h"
@@ -85,7 +85,7 @@ std::string ParentOf(const std::vector<storage::Episode>& episodes) {
   }
   if (sets.size() > 1) {
     throw ConfigError("the labelled episodes are of several model sets (" +
-                      report::Joined({sets.begin(), sets.end()}) +
+                      JoinText(sets) +
                       "): choose the one to build on with --parent "
                       "NAME[@VERSION]");
   }
@@ -229,16 +229,13 @@ void RequireTrainable(const LabelPlan& plan, bool drop_missing,
         std::to_string(plan.missing.size()) + " of the " +
         std::to_string(plan.parent->training_runs.size()) + " runs that " +
         parent +
-        " was trained on are not in runs.db: " + report::Joined(plan.missing) +
+        " was trained on are not in runs.db: " + JoinText(plan.missing) +
         "; --drop-missing does without "
         "them");
   }
   if (!plan.refused.empty() && !skip_refused) {
-    std::string text;
-    for (const LabelledEpisode& episode : plan.refused) {
-      text += (text.empty() ? "" : "; ") + RefusalText(episode);
-    }
-    throw DataError(text + "; --skip-refused does without " +
+    throw DataError(JoinText(plan.refused, "; ", RefusalText) +
+                    "; --skip-refused does without " +
                     (plan.refused.size() == 1 ? "it" : "them"));
   }
   if (!plan.has_news) {

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "base/error.h"
+#include "base/median.h"
 #include "diagnosis/fault_catalogue.h"
 #include "diagnosis/records/valve_glob.h"
 #include "storage/models/models.h"
@@ -85,14 +86,6 @@ int FaultMeant(const storage::Episode& episode) {
         "fault");
   }
   return isolated.front();
-}
-
-template <typename T>
-T Median(std::vector<T> values) {
-  const auto middle =
-      values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 // The median step in time [s]; 0 for fewer than two samples.

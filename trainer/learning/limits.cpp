@@ -23,7 +23,6 @@ constexpr std::size_t kMinResiduals = 100;
 constexpr double kCommandsCovered = 0.8;
 constexpr double kSeenMean = 1.5;     // times what was seen; as in calibration
 constexpr double kSeenLogRms = 0.25;  // more than what was seen; likewise
-constexpr double kMaxDriftFactor = 3.0;  // as FitDriftLimits has it
 
 // Calls visit(channel, window or null, kind, limit) for every limit, in the
 // order of LimitsOf(). That on a deviation is a logarithm.
@@ -282,40 +281,6 @@ ModelSet Combine(const ModelSet& parent, const ModelSet& fitted,
   return models;
 }
 
-// A bound that leaves half of what a fault passes its limit by.
-double AdaptBound(double bound, double before, double after) {
-  // A fault whose window mean is m passes the limit L by m − L, and the bound
-  // on drift is at most half of that (FitDriftLimits). With a new limit L′,
-  //
-  //     bound′ = (m − L′)/2 = bound + (L − L′)/2,
-  //
-  // for which m need not be known. The bound on the scale is the same in
-  // logarithms.
-  return std::clamp(bound + 0.5 * (before - after), 0.0,
-                    kMaxDriftFactor * after);
-}
-
-void SetDrift(const ModelSet& parent, ModelSet& models) {
-  for (std::size_t c = 0; c < parent.channels.size(); ++c) {
-    const ChannelSpec& before = parent.channels[c];
-    if (before.windows.empty() || before.drift == DriftLimits{}) {
-      continue;
-    }
-    // The drift is followed by the longest window alone
-    // (Detection::AdaptLimits).
-    const WindowLimits& from = before.windows.back();
-    const WindowLimits& to = models.channels[c].windows.back();
-    DriftLimits& drift = models.channels[c].drift;
-    drift.lower_mean =
-        -AdaptBound(-before.drift.lower_mean, -from.lower_mean, -to.lower_mean);
-    drift.upper_mean =
-        AdaptBound(before.drift.upper_mean, from.upper_mean, to.upper_mean);
-    drift.log_scale = std::clamp(
-        before.drift.log_scale + 0.5 * (from.upper_log_rms - to.upper_log_rms),
-        0.0, std::log(kMaxDriftFactor));
-  }
-}
-
 }  // namespace
 
 std::string_view LimitKindName(LimitKind kind) {
@@ -391,7 +356,6 @@ NewLimits SetLimits(const ModelSet& parent, const HealthyResiduals& data) {
     result.models.threshold_hours = fitted.threshold_hours;
   }
   result.models.floor = data.floor ? data.floor : parent.floor;
-  SetDrift(parent, result.models);
   Validate(result.models);
   return result;
 }
@@ -423,7 +387,8 @@ void RequireHealthy(const ModelSet& first, const ModelSet& parent,
       LimitText(limits[worst]) + "), accepted is up to " +
       Digits(kMaxReachRatio, 2) +
       " times. That is hardly a healthy valve: leave this time out (--runs "
-      "ID@from:to), or label its episode false if the valve was healthy");
+      "ID@from:to). If the valve was healthy, label its episode false, or make "
+      "its models anew with these hours (fdi-trainer onboard --extend)");
 }
 
 // On a valve that follows its normal model exactly, fault i alone makes the
@@ -504,7 +469,9 @@ void RequireVisible(const std::vector<Visibility>& faults) {
     throw DataError(
         "with limits as wide as these data ask for, faults that the set knows "
         "would not be seen at any strength: " +
-        gone + ". If the valve is as it should be, onboard it anew");
+        gone +
+        ". If the valve is as it should be, make its models anew with these "
+        "hours: fdi-trainer onboard --extend");
   }
 }
 

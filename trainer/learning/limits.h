@@ -40,8 +40,7 @@ struct Peak {
   std::int64_t stamp_ns{0};
 };
 
-/// Parallel to LimitsOf(models). Limits are taken as they stand in the set:
-/// what a monitor has followed of a drift is not known here.
+/// Parallel to LimitsOf(models).
 std::vector<Peak> PeaksOf(const ModelSet& models, const HealthyResiduals& data);
 
 /// How the limits of a set came about anew.
@@ -62,10 +61,6 @@ struct NewLimits {
 /// FitThresholds() if that is closer; otherwise it stays.
 ///
 /// The floor becomes as wide as the data ask for (WidenFloor()).
-///
-/// DriftLimits follow, so that half of what a fault passes its limit by stays
-/// (FitDriftLimits): with c the change of the limit, the bound moves by -c/2,
-/// and is at most three times the limit.
 ///
 /// @throws DataError if a channel has fewer than 100 residuals.
 NewLimits SetLimits(const ModelSet& parent, const HealthyResiduals& data);

@@ -45,9 +45,10 @@ bool IsStored(const std::string& run, const std::filesystem::path& file) {
   }
 }
 
-// The set that diagnoses the valve, made for it by onboarding.
-std::shared_ptr<const ModelSet> AssignedSet(const std::string& valve,
-                                            storage::ModelStore& store) {
+}  // namespace
+
+std::shared_ptr<const ModelSet> OnboardedSet(const std::string& valve,
+                                             storage::ModelStore& store) {
   const auto reference = store.AssignedModelSet(valve);
   if (!reference) {
     throw NotFoundError("valve " + valve +
@@ -67,6 +68,8 @@ std::shared_ptr<const ModelSet> AssignedSet(const std::string& valve,
   return models;
 }
 
+namespace {
+
 // Older sets have no settings, and an empty text is no JSON. Without exceptions
 // parse() then returns a value that contains nothing.
 bool HasLearnedLimits(const storage::Lineage& lineage) {
@@ -74,7 +77,8 @@ bool HasLearnedLimits(const storage::Lineage& lineage) {
       .contains(kLimits);
 }
 
-// The set of onboarding, whose observers those made here have.
+}  // namespace
+
 ModelSet FirstSet(const ModelSet& models, storage::ModelStore& store) {
   // Each set made here names its predecessor; the chain ends at onboarding.
   ModelSet first = models;
@@ -87,6 +91,8 @@ ModelSet FirstSet(const ModelSet& models, storage::ModelStore& store) {
   }
   return first;
 }
+
+namespace {
 
 // The episodes of the valve, by detection.
 std::vector<storage::Episode> EpisodesOf(const std::string& valve,
@@ -296,7 +302,7 @@ LimitsPlan MakeLimitsPlan(LimitsRequest request,
   ModelSet first;
   {
     storage::ModelStore store(directory.models());
-    plan.labels.parent = AssignedSet(request.valve, store);
+    plan.labels.parent = OnboardedSet(request.valve, store);
     plan.labels.lineage =
         store.LineageOf({plan.parent().name, plan.parent().version});
     first = FirstSet(plan.parent(), store);

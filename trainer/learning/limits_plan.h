@@ -1,18 +1,31 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "diagnosis/model_set.h"
 #include "storage/database/data_directory.h"
+#include "storage/models/models.h"
 #include "storage/runs/runs.h"
 #include "trainer/learning/healthy_residuals.h"
 #include "trainer/learning/label_plan.h"
 #include "trainer/learning/limits.h"
 
 namespace fdi::trainer {
+
+/// The set that diagnoses the valve, made for it by onboarding.
+/// @throws NotFoundError if there is none; DataError if it was made otherwise
+/// or
+///   in an earlier epoch of the valve.
+std::shared_ptr<const ModelSet> OnboardedSet(const std::string& valve,
+                                             storage::ModelStore& store);
+
+/// The set of onboarding that `models` has its observers from: itself, unless
+/// its limits were set later (StoreLimits).
+ModelSet FirstSet(const ModelSet& models, storage::ModelStore& store);
 
 /// Which healthy data the limits of a valve are to be set by.
 struct LimitsRequest {

@@ -148,14 +148,14 @@ std::vector<Sample> FaultSynthesizer::Healthy(const Stretch& stretch) const {
   const std::tuple key{stretch.run_id, stretch.samples.front().stamp_ns,
                        stretch.samples.size()};
   {
-    const std::scoped_lock lock(mutex_);
+    const MutexLock lock(mutex_);
     const auto found = healthy_.find(key);
     if (found != healthy_.end()) {
       return found->second;
     }
   }
   std::vector<Sample> samples = Simulate({}, stretch.samples);
-  const std::scoped_lock lock(mutex_);
+  const MutexLock lock(mutex_);
   healthy_.emplace(key, samples);
   return samples;
 }

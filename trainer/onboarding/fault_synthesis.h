@@ -2,11 +2,11 @@
 
 #include <cstddef>
 #include <map>
-#include <mutex>
 #include <string>
 #include <tuple>
 #include <vector>
 
+#include "base/mutex.h"
 #include "diagnosis/model_set.h"
 #include "diagnosis/sample.h"
 #include "simulator/excitation.h"
@@ -73,11 +73,11 @@ class FaultSynthesizer {
   std::vector<Sample> Healthy(const Stretch& stretch) const;
 
   ValveType type_;
-  mutable std::mutex mutex_;
+  mutable Mutex mutex_;
   // By run, first stamp and length.
   mutable std::map<std::tuple<std::string, std::int64_t, std::size_t>,
                    std::vector<Sample>>
-      healthy_;
+      healthy_ GUARDED_BY(mutex_);
 };
 
 /// A healthy valve of the type, simulated for `duration_s` in a closed loop

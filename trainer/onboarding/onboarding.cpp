@@ -146,6 +146,22 @@ CoverageTable AssessCoverage(std::shared_ptr<const ModelSet> models,
   return table;
 }
 
+std::vector<CoverageChange> ChangesOf(const CoverageTable& before,
+                                      const CoverageTable& after) {
+  std::vector<CoverageChange> changes;
+  for (const FaultCoverage& now : after.faults) {
+    const auto then =
+        std::ranges::find_if(before.faults, [&](const FaultCoverage& fault) {
+          return fault.fault == now.fault && fault.negative == now.negative;
+        });
+    if (then != before.faults.end() && then->detectable != now.detectable) {
+      changes.push_back(
+          {now.fault, now.negative, then->detectable, now.detectable});
+    }
+  }
+  return changes;
+}
+
 TransmitterGain GainOf(Signal signal, const CoverageTable& less,
                        const CoverageTable& more) {
   return {signal, Gained(less, more, &FaultCoverage::detectable),
@@ -559,6 +575,34 @@ simulator::RecordFit Compare(const std::vector<TrainingRun>& runs,
       {runs.front().period_s, type.interpolated_command, type.command_delay});
 }
 
+// The physics stay as they were where hours that a person vouches for do not
+// suit any: they count for what the observers see.
+void FitPhysics(const std::vector<TrainingRun>& runs,
+                const OnboardingOptions& options, double meter_end,
+                Onboarding& onboarding) {
+  OnboardingOptions from = options;
+  from.type = onboarding.type;
+  const simulator::ValveFit fit = FitType(runs, from);
+  try {
+    CheckFit(runs, fit.fitted, fit.values, meter_end);
+  } catch (const DataError&) {
+    if (options.extends) {
+      return;
+    }
+    throw;
+  }
+  onboarding.type.parameters = fit.parameters;
+  onboarding.type.interpolated_command = fit.interpolated_command;
+  onboarding.type.command_delay = fit.command_delay;
+  onboarding.fit = fit;
+}
+
+std::vector<TrainingRun> FormerRuns(const std::vector<TrainingRun>& all,
+                                    std::size_t count) {
+  return WithoutStops(
+      {all.begin(), all.begin() + static_cast<std::ptrdiff_t>(count)});
+}
+
 double Hours(const std::vector<TrainingRun>& runs) {
   double hours = 0.0;
   for (const TrainingRun& run : runs) {
@@ -566,10 +610,6 @@ double Hours(const std::vector<TrainingRun>& runs) {
   }
   return hours;
 }
-
-}  // namespace
-
-namespace {
 
 // Faults act in proportion to the size of a valve, so that a set serves valves
 // of its own size only.
@@ -630,13 +670,7 @@ Onboarding Onboard(const std::vector<TrainingRun>& all,
   const double meter_end = result.type.parameters.instruments.flow.high;
   if (options.fit) {
     Part(progress, 0.0, kFitShare)(0.0, "fitting the physical parameters");
-    OnboardingOptions fit = options;
-    fit.type = result.type;
-    result.fit = FitType(runs, fit);
-    result.type.parameters = result.fit->parameters;
-    result.type.interpolated_command = result.fit->interpolated_command;
-    result.type.command_delay = result.fit->command_delay;
-    CheckFit(runs, result.fit->fitted, result.fit->values, meter_end);
+    FitPhysics(runs, options, meter_end, result);
   } else {
     CheckFit(runs, Compare(runs, result.type), {}, meter_end);
   }
@@ -661,9 +695,16 @@ Onboarding Onboard(const std::vector<TrainingRun>& all,
   result.left_out_s = 3600.0 * (result.hours - Hours(runs));
   if (options.assess) {
     Part(progress, kFitShare + kTrainShare, 0.0)(0.0, "scoring every fault");
-    result.coverage =
-        AssessCoverage(std::make_shared<const ModelSet>(result.models), faults,
-                       synthesize, LongestStretch(runs), options.threads);
+    const Stretch stretch = LongestStretch(
+        options.extends ? FormerRuns(all, options.former_runs) : runs);
+    const auto assess = [&](std::shared_ptr<const ModelSet> models) {
+      return AssessCoverage(std::move(models), faults, synthesize, stretch,
+                            options.threads);
+    };
+    result.coverage = assess(std::make_shared<const ModelSet>(result.models));
+    if (options.extends) {
+      result.coverage_before = assess(options.extends);
+    }
   }
   Part(progress, 1.0, 0.0)(0.0, "done");
   return result;

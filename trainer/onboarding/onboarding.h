@@ -54,6 +54,20 @@ CoverageTable AssessCoverage(std::shared_ptr<const ModelSet> models,
 TransmitterGain GainOf(Signal signal, const CoverageTable& less,
                        const CoverageTable& more);
 
+/// The smallest strength of a fault that is detected, by two sets.
+struct CoverageChange {
+  int fault{0};
+  bool negative{false};
+  std::optional<double> before{};
+  std::optional<double> after{};
+
+  bool lost() const { return before && !after; }
+};
+
+/// Faults whose smallest strength differs.
+std::vector<CoverageChange> ChangesOf(const CoverageTable& before,
+                                      const CoverageTable& after);
+
 /// The run as a valve gives it that measures `signals` alone.
 TrainingRun WithSignals(TrainingRun run, SignalMask signals);
 
@@ -90,6 +104,10 @@ struct OnboardingOptions {
   std::optional<ModelSet> of_type{};
   /// Throw NotOfType where `of_type` cannot serve, instead of simulating.
   bool only_of_type{false};
+  /// The set that the first `former_runs` runs made, the others being added:
+  /// both sets are scored on the former ones.
+  std::shared_ptr<const ModelSet> extends{};
+  std::size_t former_runs{0};
   std::string software;
   std::int64_t created_ns{0};
 };
@@ -113,6 +131,8 @@ struct Onboarding {
   std::vector<ChannelFit> channels;
   std::vector<std::string> unread;  ///< Channels of DropUnreadChannels().
   std::optional<CoverageTable> coverage;
+  std::optional<CoverageTable>
+      coverage_before;     ///< Of OnboardingOptions::extends
   SignalMask signals{0};   ///< That the valve measures.
   double hours{0.0};       ///< Of healthy data.
   double left_out_s{0.0};  ///< Of them at a stop, or just after (WithoutStops).

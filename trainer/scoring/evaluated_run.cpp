@@ -4,18 +4,11 @@
 #include <set>
 #include <string>
 
+#include "base/text.h"
 #include "diagnosis/fault_catalogue.h"
 
 namespace fdi::trainer {
 namespace {
-
-std::string Listed(const std::vector<int>& faults, const char* separator) {
-  std::string text;
-  for (const int fault : faults) {
-    text += (text.empty() ? "" : separator) + FaultName(fault);
-  }
-  return text;
-}
 
 std::size_t IndexIn(const std::set<FaultGroup>& sorted,
                     const FaultGroup& group) {
@@ -35,19 +28,18 @@ FaultGroup GroupOf(int fault, const std::vector<FaultGroup>& groups) {
 }
 
 std::string SetText(const std::vector<int>& set) {
-  return Listed(set, "|");
+  return JoinText(set, "|", FaultName);
 }
 
 std::string GroupsText(const ModelSet& models) {
-  std::string text;
-  for (const FaultGroup& group : models.groups) {
-    text += (text.empty() ? "" : ", ") + SetText(group);
-  }
-  return text.empty() ? "none" : text;
+  return models.groups.empty()
+             ? "none"
+             : JoinText(models.groups, ", ",
+                        [](const FaultGroup& group) { return SetText(group); });
 }
 
 std::string FaultsText(const std::vector<int>& faults) {
-  return faults.empty() ? "none" : Listed(faults, ", ");
+  return faults.empty() ? "none" : JoinText(faults, ", ", FaultName);
 }
 
 bool IsDetected(const EvaluatedRun& run) {

@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "base/csv_cells.h"
+#include "base/text.h"
 #include "diagnosis/fault_catalogue.h"
 #include "report/text_table.h"
 #include "trainer/statistics.h"
@@ -298,11 +299,7 @@ report::Report EvaluationReport(const Detector& detector,
 }
 
 std::string SetText(const Json& set) {
-  std::string text;
-  for (const Json& fault : set) {
-    text += (text.empty() ? "" : "|") + fault.get<std::string>();
-  }
-  return text;
+  return JoinText(set.get<std::vector<std::string>>(), "|");
 }
 
 std::string TruthText(const EvaluatedRun& run) {

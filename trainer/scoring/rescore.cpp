@@ -133,7 +133,7 @@ std::vector<Indication> Rescore(const std::shared_ptr<const ModelSet>& models,
     all.push_back(
         {static_cast<double>(stored.sample.stamp_ns - start_ns) * kSecondsPerNs,
          TruthOf(stored), settled, verdict.detected,
-         FaultsIn(*models, verdict.isolated)});
+         FaultsIn(*models, verdict.isolated), IsWithdrawn(*models, verdict)});
     BackdateDetections(verdict, start_ns, all);
   }
   return all;

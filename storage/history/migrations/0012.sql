@@ -1,6 +1,12 @@
 -- Version 12: the view says what a fault is in words, in which state its alarm is,
 -- and when and with which comment it was acknowledged.
 
+-- Files of version 11 that were made before its index have none.
+CREATE INDEX IF NOT EXISTS episode_returned ON episode (detected_ns, valve_id)
+  WHERE acked_by IS NULL AND ended_ns IS NOT NULL AND unconfirmed_ns IS NULL
+    AND (cleared_ns IS NOT NULL OR
+         end_reason NOT IN ('stream_ended', 'stale_timeout', 'unknown'));
+
 -- Plain names of faults and, as number 0, of "unknown", from the catalogue of the
 -- monitor that started last.
 CREATE TABLE fault_name (
@@ -74,7 +80,7 @@ SELECT
    FROM shelf s, (SELECT CAST(
      (julianday('now') - 2440587.5) * 86400000 AS INTEGER) * 1000000 AS ns) now
    WHERE s.valve_id = e.valve_id AND s.until_ns > now.ns
-     AND (s.ended_ns IS NULL OR s.ended_ns > now.ns)
+     AND s.ended_ns IS NULL
      AND (s.fault IS NULL OR s.fault = e.fault)) AS shelved_until_utc
 FROM episode e
 ORDER BY detected_utc, valve_id;

@@ -4,6 +4,7 @@
 #include <iostream>
 #include <limits>
 #include <numbers>
+#include <random>
 #include <utility>
 
 #include <gtest/gtest.h>
@@ -113,6 +114,37 @@ TEST(AuditTest, ReadsStictionOffThePosition) {
   EXPECT_NEAR(audit.evidence.fit->band, band, 0.05 * (*high - *low));
   window.x.assign(window.x.size(), 40.0);
   EXPECT_EQ(AuditWindow(window).verdict, Verdict::kNoResponse);
+}
+
+// With the noise of its reading; a position of the wrong sense moves.
+TEST(AuditTest, SeesThatThePositionStands) {
+  ClosedLoop loop;
+  loop.state = LoopState::kExternalSine;
+  loop.steps = true;
+  Window window = Simulate(loop, 3);
+  std::mt19937_64 random(1);
+  std::normal_distribution<double> noise(40.0, 0.3);
+  window.x.resize(window.op.size());
+  for (std::size_t k = 0; k < window.x.size(); ++k) {
+    window.x[k] = 100.0 - window.op[k] + noise(random);
+  }
+  EXPECT_EQ(AuditValve(window).verdict, Verdict::kUndetermined);
+  std::ranges::generate(window.x, [&] { return noise(random); });
+  const Audit audit = AuditValve(window);
+  ASSERT_GT(audit.evidence.op_range, 5.0);
+  EXPECT_EQ(audit.verdict, Verdict::kNoResponse);
+  EXPECT_TRUE(audit.sure);
+}
+
+// A blocked valve leaves its controller at the end of its range.
+TEST(AuditTest, SeesThatOpStaysAtAnEndThoughThePositionFollowed) {
+  ClosedLoop loop;
+  Window window = Simulate(loop, 3);
+  window.x = window.op;
+  const auto late = static_cast<std::ptrdiff_t>(window.op.size() / 2);
+  std::fill(window.op.begin() + late, window.op.end(), 100.0);
+  std::fill(window.x.begin() + late, window.x.end(), window.x[0]);
+  EXPECT_EQ(AuditWindow(window).verdict, Verdict::kSaturated);
 }
 
 Window Ramp() {

@@ -195,6 +195,22 @@ TEST_F(FdiStoreHistoryTest, AFilterAcknowledgesAllItFindsIfAskedTo) {
   EXPECT_EQ(Store("history ack last ffff").code, 5);
 }
 
+TEST_F(FdiStoreHistoryTest, AWindowIsPlannedBeforeAnyMonitorHasRun) {
+  const std::int64_t from_ns = NowNs() / kSecond * kSecond + 3600 * kSecond;
+  const std::string from = FormatTime(from_ns, true);
+  std::filesystem::remove(path_);
+  const json planned = StoreJson("--utc history shelve FV-9 --for 2h --from '" +
+                                 from + "'")["shelf"][0];
+  EXPECT_EQ(ParseTime(planned["from_utc"].get<std::string>(), true), from_ns);
+  EXPECT_EQ(ParseTime(planned["until_utc"].get<std::string>(), true),
+            from_ns + 7200 * kSecond);
+  EXPECT_FALSE(planned["planned_utc"].is_null());
+  EXPECT_EQ(StoreJson("history shelf")["shelf"].size(), 1U);
+  EXPECT_EQ(StoreJson("history unshelve --valve FV-9")["shelf"].size(), 1U);
+  EXPECT_THAT(Store("--utc history shelve FV-9 --from 2026-01-01").err,
+              HasSubstr("planned from a time after now"));
+}
+
 TEST_F(FdiStoreHistoryTest, AShelvedAlarmSaysSoUntilItIsTakenOff) {
   const json shelf =
       StoreJson("history shelve LV-1 --for 1h --by anna --comment ordered");
@@ -402,7 +418,7 @@ TEST_F(FdiStoreHistoryTest, DoctorFindsASoundDirectorySound) {
   EXPECT_EQ(report["sound"], true);
   ASSERT_EQ(report["databases"].size(), 3U);
   EXPECT_EQ(report["databases"][0]["present"], false);
-  EXPECT_EQ(report["databases"][2]["version"], 12);
+  EXPECT_EQ(report["databases"][2]["version"], 13);
   EXPECT_EQ(report["databases"][2]["figures"]["open_episodes"], 1);
   EXPECT_EQ(report["databases"][2]["figures"]["unsent_events"], 2);
 }

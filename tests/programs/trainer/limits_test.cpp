@@ -92,11 +92,7 @@ ModelSet TwoHourSet() {
           {length, -20.0, 20.0, 3.0, 0.0, 0.0, {49.9, 50.1}});
     }
   }
-  models = WithLimitsOf(models, PlantRun(kTwoHours, 1, kMadeNs - kNsPerDay));
-  for (ChannelSpec& channel : models.channels) {
-    channel.drift = {-1.0, 1.0, 0.5};
-  }
-  return models;
+  return WithLimitsOf(models, PlantRun(kTwoHours, 1, kMadeNs - kNsPerDay));
 }
 
 class AppLimitsTest : public TrainerProgram {
@@ -394,18 +390,6 @@ TEST(LimitsTest, FaultsThatWouldNotBeSeenAnyMoreAreNamed) {
   limit_f(25.0);
   EXPECT_FALSE(f6().after.has_value());
   EXPECT_THROW(RequireVisible({f6()}), DataError);
-}
-
-// Half of what a fault passes a limit by is left to the drift: m = L + 2 d.
-TEST(LimitsTest, DriftLeavesHalfOfWhatAFaultPassesTheNewLimitBy) {
-  const ModelSet before = TwoHourSet();
-  const ModelSet after =
-      WithLimitsOf(before, PlantRun(8 * kTwoHours, 2, kMadeNs));
-  const double from = before.channels[1].windows[1].upper_mean;
-  const double to = after.channels[1].windows[1].upper_mean;
-  ASSERT_LT(to, from);
-  EXPECT_DOUBLE_EQ(after.channels[1].drift.upper_mean,
-                   std::min(0.5 * (from + 2.0 - to), 3.0 * to));
 }
 
 // The rod is off by some % for 10 s, outside of what any window covers.

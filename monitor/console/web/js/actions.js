@@ -5,6 +5,7 @@
 import {path, post, token} from './api.js';
 import {button, field, h, replace, select, showDialog} from './dom.js';
 import {faultTitle, members} from './faults.js';
+import {fromInput} from './format.js';
 import {settings} from './settings.js';
 import {store} from './store.js';
 
@@ -87,6 +88,7 @@ const kShelfTimes = [
 
 export function shelve(row) {
   const minutes = select(kShelfTimes, '480');
+  const from = h('input', {type: 'datetime-local'});
   const own = row.fault && row.fault !== 'unknown' ? row.fault : null;
   const scope = select([
     ...(own ? [[own, `Only ${faultTitle(own)}`]] : []),
@@ -94,10 +96,11 @@ export function shelve(row) {
   ], own ?? '');
   return ask({
     title: 'Shelve', verb: 'Shelve', subject: row.valve, commentNeeded: true,
-    fields: [field('For', minutes), field('What', scope)],
+    fields: [field('From (empty: now)', from), field('For', minutes),
+      field('What', scope)],
     send: (body) => post('/shelf', {
       valve: row.valve, fault: scope.value || null,
-      minutes: Number(minutes.value), ...body,
+      minutes: Number(minutes.value), from_ms: fromInput(from.value), ...body,
     }),
   });
 }

@@ -79,12 +79,19 @@ export function compareAlarms(a, b) {
 export const unconfirmedText = ({unconfirmed_ms: since}) =>
   since ? `not confirmed since ${timeText(since)}` : '';
 
+/** Of the alarm of a valve that is not judged now. */
+export const openText = (tile) => `${faultTitle(tile.fault)}: ` +
+    (unconfirmedText(tile) || 'not judged now');
+
 /** NE 107 class in words. */
 export const namurText = (name) => name ? plain(name) : '–';
 
 /** Whether a fault is detected; a valve that is not judged is in none. */
 export const inAlarm = ({state}) =>
   state === 'DETECTED' || state === 'ISOLATED';
+
+/** Whether a fault is there as far as anybody knows, judged now or not. */
+export const isAlarm = (tile) => inAlarm(tile) || Boolean(tile.active);
 
 /** What a tile is named after: "f19|f3", "unknown", or empty. */
 export const faultOfTile = (tile) => !inAlarm(tile) ? tile.fault :
@@ -128,8 +135,9 @@ function refusalText({reason, signals, flow_unit: unit}) {
 }
 
 // "no P1; F not judged"
-function lackText({quality, missing, unjudged, refused}) {
+function lackText({quality, missing, unjudged, refused, blind}) {
   return [
+    blind ? 'limits too wide to see a fault' : '',
     missing?.length ? `no ${missing.join(', ')}` : '',
     unjudged?.length ? `${unjudged.join(', ')} not judged` : '',
     refused && quality !== 'LIVE' ? refusalText(refused) : '',

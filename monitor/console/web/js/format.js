@@ -109,6 +109,13 @@ export const compareNames = (a, b) => collator.compare(a, b);
 export const groupOfId = (id) =>
   id.replace(/[-_./ ]*\d+[^-_./ \d]*$/, '') || id;
 
+/** Whether a text matches a pattern with * ? [...]. */
+export function globTest(pattern) {
+  const test = new RegExp('^' + pattern.replace(/[.+^${}()|\\]/g, '\\$&')
+      .replaceAll('*', '.*').replaceAll('?', '.') + '$', 's');
+  return (text) => test.test(text);
+}
+
 /** A datetime-local value and back, in the zone that was chosen. */
 export function toInput(ms) {
   return ms === null || ms === undefined || Number.isNaN(ms) ? '' :

@@ -5,6 +5,7 @@
 // plant, 'plant' each second.
 
 import {get, getOptional} from './api.js';
+import {globTest, groupOfId} from './format.js';
 import {Stream} from './stream.js';
 
 const kSparkLength = 60;
@@ -14,6 +15,7 @@ class Store extends EventTarget {
   tiles = new Map();
   alarms = new Map();
   faults = new Map();
+  groups = [];  // Of the file of groups: {name, has(id)}.
   status = null;
   hasWorklist = false;
   offsetMs = 0;  // Clock of the monitor minus ours.
@@ -31,7 +33,19 @@ class Store extends EventTarget {
     this.refreshStatus();
     this.#resync();
     this.#probeWorklist();
+    this.#loadGroups();
     return this.#loadCatalogue();
+  }
+
+  /** Names of the groups of valves that a person made. */
+  groupsOf(id) {
+    return this.groups.filter(({has}) => has(id)).map(({name}) => name);
+  }
+
+  /** The same; of a valve that is in none, the beginning of its id. */
+  areasOf(id) {
+    const names = this.groupsOf(id);
+    return names.length > 0 ? names : [groupOfId(id)];
   }
 
   /** Samples of this valve come with the stream from now on; null: none. */
@@ -78,6 +92,16 @@ class Store extends EventTarget {
     } catch {
       // Fault numbers have to do until the next start.
     }
+  }
+
+  #loadGroups() {
+    return this.#fetch('/groups', ({groups}) => {
+      this.groups = groups.map(({name, valves}) => {
+        const tests = valves.map(globTest);
+        return {name, has: (id) => tests.some((test) => test(id))};
+      });
+      this.#emit('tiles', null);
+    });
   }
 
   async #probeWorklist() {

@@ -151,14 +151,26 @@ class Panel {
   showValues(index) {
     const {table} = this.scene;
     const at = index ?? table.t.length - 1;
-    for (const {line, value} of this.#entries) {
+    for (const {line, value, button} of this.#entries) {
       const number = table[line.column]?.[at];
       const missing = number === null || number === undefined;
-      setText(value, this.panel.key === 'decision' ?
-        (missing || index === null || index === undefined ? '' :
-          number.toFixed(2)) :
-        missing ? '–' : `${numberText(number)} ${line.unit}`.trim());
+      if (this.panel.key === 'decision') {
+        const fits = missing ? '' : this.#fits(number);
+        setText(value, fits);
+        value.title = missing ? '' : number.toFixed(2);
+        button.classList.toggle('quiet', fits === 'excluded');
+      } else {
+        setText(value, missing ? '–' :
+          `${numberText(number)} ${line.unit}`.trim());
+      }
     }
+  }
+
+  // The rivals of a name are those that are not excluded.
+  #fits(d) {
+    const {threshold: T} = this.panel;
+    return T === null ? '' : d >= T ? 'explains it' :
+      d >= T / 2 ? 'not excluded' : 'excluded';
   }
 
   /** Draws the scene anew; the scale of time is the caller's. */
@@ -170,11 +182,11 @@ class Panel {
 
   // What explains the data now stands out.
   #emphasise() {
-    const {threshold, lines} = this.panel;
-    lines.forEach(({column}, i) => {
-      const d = this.scene.table[column]?.at(-1);
-      this.u.series[i + 1].width = d >= threshold ? 2 : 1.25;
-      this.#entries[i].button.classList.toggle('strong', d >= threshold);
+    const {threshold} = this.panel;
+    this.panel.lines.forEach(({column}, i) => {
+      const strong = this.scene.table[column]?.at(-1) >= threshold;
+      this.u.series[i + 1].width = strong ? 2 : 1.25;
+      this.#entries[i].button.classList.toggle('strong', strong);
     });
   }
 

@@ -21,7 +21,7 @@ import {View} from './view.js';
 const kEndWords = {
   cleared: 'normal again', stream_ended: 'the publisher ended its stream',
   stale_timeout: 'no samples for too long', model_changed: 'model set changed',
-  superseded: 'superseded', unknown: 'the monitor was down meanwhile',
+  superseded: 'another episode took over', unknown: 'the monitor was down meanwhile',
 };
 
 function facts({episode: row, model_hash: hash}) {

@@ -2,8 +2,8 @@
 // document, only what changed is touched, a few milliseconds of it a frame.
 
 import {button, cssColor, h, replace, select, setText} from '../dom.js';
-import {faultOfTile, faultTitle, inAlarm} from '../faults.js';
-import {compareNames, groupOfId} from '../format.js';
+import {faultOfTile, faultTitle, isAlarm} from '../faults.js';
+import {compareNames} from '../format.js';
 import {rememberQuery} from '../route.js';
 import {settings} from '../settings.js';
 import {store} from '../store.js';
@@ -17,7 +17,7 @@ const kRowsBeyond = 3;  // Above and below what is in sight.
 
 const kFilters = [
   {key: 'all', text: 'All', test: () => true},
-  {key: 'alarm', text: 'In alarm', test: inAlarm},
+  {key: 'alarm', text: 'In alarm', test: isAlarm},
   {key: 'unack', text: 'Unacknowledged', test: (t) => t.unacked},
   {key: 'silent', text: 'Not or partly judged', test: (t) =>
     t.quality !== 'LIVE' || t.state === 'PARTLY_JUDGED'},
@@ -25,9 +25,9 @@ const kFilters = [
 
 function matches(tile, words) {
   if (words.length === 0) return true;
-  const fault = inAlarm(tile) ? faultTitle(faultOfTile(tile)) : '';
-  const text = [tile.id, fault, tile.quality, tile.model_set, tile.monitor]
-      .join(' ').toLowerCase();
+  const fault = isAlarm(tile) ? faultTitle(faultOfTile(tile)) : '';
+  const text = [tile.id, fault, tile.quality, tile.model_set, tile.monitor,
+    ...store.groupsOf(tile.id)].join(' ').toLowerCase();
   return words.every((word) => text.includes(word));
 }
 
@@ -45,7 +45,7 @@ class Plant extends View {
   #words;
   #order;
   #search;
-  #group;  // Only valves of this beginning; empty: all.
+  #group;  // Only its valves; empty: all.
   #groupBox = h('select', {'aria-label': 'Group', 'onchange': () => {
     this.#group = this.#groupBox.value;
     this.#refilter();
@@ -195,7 +195,7 @@ class Plant extends View {
   #shows(tile) {
     const filter = kFilters.find((f) => f.key === this.#filter) ?? kFilters[0];
     return (this.#monitor === '' || tile.monitor === this.#monitor) &&
-        (this.#group === '' || groupOfId(tile.id) === this.#group) &&
+        (this.#group === '' || store.areasOf(tile.id).includes(this.#group)) &&
         filter.test(tile) && matches(tile, this.#words);
   }
 
@@ -227,11 +227,12 @@ class Plant extends View {
   #showGroups(tiles) {
     const groups = new Map();
     for (const tile of tiles) {
-      const name = groupOfId(tile.id);
-      const counts = groups.get(name) ?? {all: 0, alarms: 0};
-      groups.set(name, counts);
-      ++counts.all;
-      if (inAlarm(tile)) ++counts.alarms;
+      for (const name of store.areasOf(tile.id)) {
+        const counts = groups.get(name) ?? {all: 0, alarms: 0};
+        groups.set(name, counts);
+        ++counts.all;
+        if (isAlarm(tile)) ++counts.alarms;
+      }
     }
     const options = [['', `All groups (${groups.size})`],
       ...[...groups].sort(([a], [b]) => compareNames(a, b))

@@ -3,8 +3,8 @@
 import {drawSparkline} from '../charts/sparkline.js';
 import {h, setText} from '../dom.js';
 import {certaintyText, factorTitle, faultName, faultOfTile, faultTitle,
-  inAlarm, priorityNames, priorityOf, prioritySign, qualityText, stateWord,
-  unconfirmedText} from '../faults.js';
+  inAlarm, isAlarm, priorityNames, priorityOf, prioritySign, qualityText,
+  stateWord, unconfirmedText} from '../faults.js';
 import {clockText, percentText, strengthText, timeText} from '../format.js';
 import {link} from '../route.js';
 import {store} from '../store.js';
@@ -12,9 +12,6 @@ import {labelText} from './table.js';
 
 const kIdTail = 6;
 const kDeviation = 0.3;  // Of 1 - d_0.
-
-// A fault, or one that was there when the data ended.
-const isAlarm = (tile) => inAlarm(tile) || Boolean(tile.unconfirmed_ms);
 
 /** How bad it is: [class, priority]; smaller is worse. */
 export function rankOf(tile) {
@@ -26,12 +23,10 @@ export function rankOf(tile) {
 }
 
 function whatText(tile) {
-  if (inAlarm(tile)) {
+  if (isAlarm(tile)) {
     const name = faultName(faultOfTile(tile));
-    return name[0].toUpperCase() + name.slice(1);
-  }
-  if (tile.unconfirmed_ms) {
-    return `${faultName(tile.fault)}, ${unconfirmedText(tile)}`;
+    return [name[0].toUpperCase() + name.slice(1), unconfirmedText(tile)]
+        .filter(Boolean).join(', ');
   }
   if (tile.unacked) return 'Returned, unacknowledged';
   return {NOT_JUDGED: 'Not judged', PARTLY_JUDGED: 'Partly judged'}[
@@ -39,8 +34,10 @@ function whatText(tile) {
 }
 
 // "strong, since 12:03"
-function howText({strength, since_ms: since}) {
-  return [strengthText(strength), since && `since ${timeText(since)}`]
+function howText(tile) {
+  const {strength, since_ms: since, unconfirmed_ms: unconfirmed} = tile;
+  return [strengthText(strength), !inAlarm(tile) && !unconfirmed ?
+    'not judged now' : since && `since ${timeText(since)}`]
       .filter(Boolean).join(', ');
 }
 
@@ -77,8 +74,12 @@ export class Tile {
     const [rank, priority] = rankOf(tile);
     const what = whatText(tile);
     const label = store.alarms.get(tile.episode)?.label;
-    const quality = [qualityText(tile), label && `label: ${labelText(label)}`]
-        .filter(Boolean).join('; ') || (tile.monitor ?? '');
+    const said = tile.shelved_until_ms !== null ?
+      `shelved until ${clockText(tile.shelved_until_ms)}` :
+      [qualityText(tile), label && `label: ${labelText(label)}`]
+          .filter(Boolean).join('; ');
+    const quality = said ||
+      [tile.monitor, ...store.groupsOf(tile.id)].filter(Boolean).join(', ');
     this.element.className = 'tile' + (alarm ? ` alarm p${priority}` : '') +
         ` rank${rank}` + (tile.quality !== 'LIVE' ||
         tile.state === 'PARTLY_JUDGED' ? ' not-live' : '');
@@ -90,15 +91,16 @@ export class Tile {
       `strength ${percentText(tile.strength)}` : '';
     this.#certainty.title = alarm && tile.factor !== null ?
       factorTitle(tile.factor) : '';
-    setText(this.#quality, tile.shelved_until_ms === null ? quality :
-      `shelved until ${clockText(tile.shelved_until_ms)}`);
+    setText(this.#quality, quality);
+    this.#quality.title = quality;
     setText(this.#spoken, alarm ? `, ${priorityNames[priority]}, ` +
       stateWord(tile.state) + (tile.unacked ? ', unacknowledged' : '') :
       what ? '' : ', normal');
     this.#what.title = alarm ? faultTitle(faultOfTile(tile)) : '';
-    // A calm valve draws no line: a line is a deviation, and says so.
+    // A calm valve draws no line: a line is a deviation, and says so. Words need
+    // its room.
     const spark = tile.spark ?? [];
-    this.#canvas.hidden = !spark.some((v) => v > kDeviation);
+    this.#canvas.hidden = said !== '' || !spark.some((v) => v > kDeviation);
     if (!this.#canvas.hidden) drawSparkline(this.#canvas, spark, this.color);
   }
 

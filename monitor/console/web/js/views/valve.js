@@ -4,15 +4,14 @@ import {getOptional, path} from '../api.js';
 import {Timeline} from '../charts/timeline.js';
 import {TrendData} from '../charts/trend_data.js';
 import {button, h, replace, setText} from '../dom.js';
-import {driftLines} from '../drift.js';
 import {certaintyNode, factorTitle, faultName, faultOfTile, faultTitle, inAlarm,
-  priorityNames, priorityOf, prioritySign, qualityText, stateWord,
-  unconfirmedText} from '../faults.js';
-import {durationText, numberText, percentText, strengthText, timeText,
-  unitText} from '../format.js';
+  openText, priorityNames, priorityOf, prioritySign, qualityText,
+  stateWord} from '../faults.js';
+import {durationText, numberText, percentText, strengthText,
+  timeText, unitText} from '../format.js';
 import {link} from '../route.js';
 import {store} from '../store.js';
-import {actionButtons} from '../actions.js';
+import {actionButtons, canAct, shelve} from '../actions.js';
 import {exportPng} from '../charts/export.js';
 import {HealthSection} from './health.js';
 import {dataTable, labelText} from './table.js';
@@ -25,11 +24,15 @@ function stateLine(tile) {
   if (!tile) return ['not heard of yet'];
   const reason = qualityText(tile);
   const quality = [reason && h('span', {class: 'tag dashed'}, reason),
+    tile.shelved_until_ms && h('span', {class: 'tag'},
+        `shelved until ${timeText(tile.shelved_until_ms)}`),
+    tile.shelf_planned_ms && h('span', {class: 'tag'},
+        `shelf planned from ${timeText(tile.shelf_planned_ms)}`),
     tile.monitor && h('span', {class: 'tag'}, `monitor ${tile.monitor}`)];
   if (!inAlarm(tile)) {
     return [h('span', {class: 'tag'}, stateWord(tile.state)), quality,
-      tile.unconfirmed_ms ? h('a', {href: link('episode', tile.episode)},
-          `${faultTitle(tile.fault)}: ${unconfirmedText(tile)}`) : null];
+      tile.active ? h('a', {href: link('episode', tile.episode)},
+          openText(tile)) : null];
   }
   const priority = priorityOf(tile);
   const label = store.alarms.get(tile.episode)?.label;
@@ -57,11 +60,11 @@ function judged({residual, low, high}) {
 }
 
 const kResidualColumns = [
-  {text: 'Channel', header: true, cell: (row) => row.name},
+  {text: 'Channel', header: true, cell: ({name, unit}) =>
+    unit ? `${name} [${unitText(unit)}]` : name},
   {text: 'Residual', class: 'num', cell: (row) => numberText(row.residual)},
   {text: 'Thresholds', class: 'num', cell: ({low, high}) =>
     `${numberText(low)} … ${numberText(high)}`},
-  {text: 'Unit', cell: (row) => unitText(row.unit)},
   {text: 'Judged', cell: judged},
 ];
 const kFitColumns = [
@@ -76,10 +79,13 @@ function scopeText({model_set: set, missing}) {
   if (!models) return '';
   const unseen = [...store.faults.values()].filter(({fault, label}) =>
     label && !models.faults.includes(fault)).map(({name}) => name);
+  const normal = (models.undetectable ?? []).map(faultName);
   return `Judged by model set ${set}` +
       (missing?.length ? `, without ${missing.join(', ')}` : '') +
       (unseen.length === 0 ? ', which knows every fault.' :
-        `. Faults that it cannot name: ${unseen.join('; ')}.`);
+        `. Faults that it cannot name: ${unseen.join('; ')}.`) +
+      (normal.length === 0 ? '' :
+        ` Faults that look normal to it: ${normal.join('; ')}.`);
 }
 
 /**
@@ -123,7 +129,6 @@ class ValvePage extends View {
   #data = new TrendData();
   #state = h('div', {class: 'state-line'});
   #words = h('p', {class: 'words'});
-  #drift = h('p', {class: 'note'});
   #now = h('div', {class: 'now-tables'});
   #scope = h('p', {class: 'hint scope'});
   #actions = h('div', {class: 'actions'});
@@ -150,7 +155,7 @@ class ValvePage extends View {
     this.element = h('article', {class: 'valve'},
         h('div', {class: 'controls'}, h('h1', {}, id), this.#state,
             this.#actions),
-        h('div', {class: 'live'}, this.#words, this.#checks, this.#drift,
+        h('div', {class: 'live'}, this.#words, this.#checks,
             this.#now, this.#scope),
         this.#note,
         h('div', {class: 'row-end'}, button('Save as PNG', () =>
@@ -199,7 +204,6 @@ class ValvePage extends View {
       if (trend && !this.gone) {
         this.#data.words = trend.words ?? '';
         setText(this.#words, this.#data.words);
-        this.#showDrift(trend);
       }
     } catch {
       // Asked again soon.
@@ -238,7 +242,6 @@ class ValvePage extends View {
     if (same && this.#timeline.panels.length > 0) this.#timeline.update();
     else this.#timeline.rebuild();
     this.#showNow();
-    this.#showDrift(trend);
   }
 
   #take(samples) {
@@ -288,13 +291,6 @@ class ValvePage extends View {
     if (this.#data.size > 0) replace(this.#now, nowTables(this.#data));
   }
 
-  #showDrift({drift}) {
-    const lines = driftLines((drift ?? []).map((channel) =>
-      ({...channel, unit: unitText(channel.unit)})));
-    this.#drift.hidden = lines.length === 0;
-    replace(this.#drift, lines.map((line) => h('div', {}, line)));
-  }
-
   #showState() {
     const tile = store.tiles.get(this.id);
     replace(this.#state, stateLine(tile));
@@ -303,7 +299,10 @@ class ValvePage extends View {
     const key = JSON.stringify([row, tile?.faults, store.status?.write]);
     if (key === this.#shownState) return;
     this.#shownState = key;
-    replace(this.#actions, row ? actionButtons(row) : null);
+    // Work can be planned on a healthy valve, too.
+    replace(this.#actions, row ? actionButtons(row) :
+      canAct() && button('Shelve', () => shelve({valve: this.id}),
+          {'aria-label': `Shelve ${this.id}`}));
     const checks = (tile?.faults ?? [])
         .map((fault) => store.faults.get(fault)).filter((f) => f?.check);
     this.#checks.hidden = checks.length === 0;

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <cstddef>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include "diagnosis/model_set.h"
+
+namespace fdi {
+
+/// Extrapolation excuses a residual of some deviations, not any: an observer
+/// far from where it was trained cannot be said to fit. In variances.
+inline constexpr double kMaxFitVariance = 10.0;
+
+/// The set says how faults that act fit (FitBounds).
+bool JudgesFit(const ModelSet& models);
+
+/// How an explanation fits, over the last t_k samples: the mean m and the mean
+/// square q of z = r/√S by channel, |z| bounded at 5. A reading of which
+/// nothing is known, or that is beyond a limit of its transmitter as predicted,
+/// has no z; a channel with a z in less than half of the samples says nothing.
+class FitWindow {
+ public:
+  FitWindow(int length, std::size_t channels);
+
+  void Restart();
+
+  /// @param z by channel; NaN abstains.
+  void Push(std::span<const double> z);
+
+  bool full() const { return filled_ == length_; }
+
+  /// How far beyond its limits m or q of a channel is: 1 at a limit, 0 where
+  /// nothing is known. Of fewer than t_k samples the limits are wider.
+  double Excess(std::size_t channel, const FitBounds& limits) const;
+
+  /// m; NaN where the channel says nothing.
+  double mean(std::size_t channel) const;
+  double square(std::size_t channel) const;
+
+ private:
+  struct Sums {
+    double mean{0.0};
+    double square{0.0};
+    int count{0};
+  };
+
+  int length_;
+  std::size_t channels_;
+  int filled_{0};
+  int next_{0};
+  std::vector<float> ring_;  // by sample and channel
+  std::vector<Sums> sums_;
+};
+
+}  // namespace fdi

@@ -1,0 +1,174 @@
+#include "diagnosis/fit_window.h"
+
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "tests/diagnosis/engine_run.h"
+
+namespace fdi {
+namespace {
+
+using tests::AddF6;
+using tests::Noise;
+using tests::Seen;
+using tests::StepRange;
+
+constexpr double kNoReading = std::numeric_limits<double>::quiet_NaN();
+constexpr FitBounds kLimits{-1.0, 2.0, 4.0};
+
+FitWindow Filled(const std::vector<double>& values, int length) {
+  FitWindow window(length, 1);
+  for (const double z : values) {
+    window.Push({&z, 1});
+  }
+  return window;
+}
+
+TEST(FitWindowTest, MeanAndMeanSquareAreOfTheLastSamples) {
+  const FitWindow window = Filled({9.0, 1.0, -1.0, 2.0, 2.0}, 4);
+  EXPECT_TRUE(window.full());
+  EXPECT_DOUBLE_EQ(window.mean(0), 1.0);
+  EXPECT_DOUBLE_EQ(window.square(0), 2.5);
+  // 2.5 of 4 is more than 1 of 2.
+  EXPECT_DOUBLE_EQ(window.Excess(0, kLimits), 0.625);
+  EXPECT_DOUBLE_EQ(Filled({-2.0, -2.0}, 2).Excess(0, kLimits), 2.0);
+}
+
+TEST(FitWindowTest, OutliersCountAsFive) {
+  EXPECT_DOUBLE_EQ(Filled({-80.0, 5.0}, 2).mean(0), 0.0);
+  EXPECT_DOUBLE_EQ(Filled({-80.0, 5.0}, 2).square(0), 25.0);
+}
+
+TEST(FitWindowTest, AChannelThatSaysTooLittleIsNotJudged) {
+  EXPECT_GT(Filled({kNoReading, 5.0, 5.0, kNoReading}, 4).Excess(0, kLimits),
+            1.0);
+  EXPECT_EQ(
+      Filled({kNoReading, 5.0, kNoReading, kNoReading}, 4).Excess(0, kLimits),
+      0.0);
+  EXPECT_EQ(Filled({5.0, 5.0}, 2).Excess(0, {}), 0.0);
+}
+
+// f6 at 1, and the position 1.3 deviations up in the mean: within each
+// single reading's membership, and not what f6 does.
+void Strange(Sample& sample) {
+  AddF6(sample, 1.0);
+  sample.values[Index(Signal::kX)] += 1.3 * tests::kNoise;
+}
+
+ModelSet Fitted() {
+  ModelSet models = tests::LinearPlant();
+  models.decision.isolation_samples = 20;
+  for (Observer& observer : models.observers) {
+    for (ChannelObserver& channel : observer.channels) {
+      channel.fit = {-0.8, 0.8, 2.0};
+    }
+  }
+  return models;
+}
+
+Seen FollowChange(const ModelSet& models, void (*change)(Sample&)) {
+  ValveEngine engine(std::make_shared<const ModelSet>(models));
+  Noise noise(5);
+  StepRange(engine, 0, 50, [&](Sample& s) { noise.Add(s); });
+  return StepRange(engine, 50, 250, [&](Sample& s) {
+    noise.Add(s);
+    change(s);
+  });
+}
+
+TEST(FitWindowTest, AFaultThatIsBestButDoesNotFitIsNotNamed) {
+  const Seen before = FollowChange(tests::LinearPlant(), Strange);
+  EXPECT_EQ(before.last.state, State::kIsolated);
+  const Seen seen = FollowChange(Fitted(), Strange);
+  EXPECT_EQ(seen.last.state, State::kDetected);
+  EXPECT_EQ(seen.last.unknown, Unknown::kOutsideKnown);
+  for (const Transition& transition : seen.transitions) {
+    EXPECT_EQ(transition.faults, 0U);
+  }
+}
+
+TEST(FitWindowTest, AFaultThatFitsKeepsItsName) {
+  const Seen seen = FollowChange(Fitted(), tests::FullF6);
+  EXPECT_EQ(seen.last.state, State::kIsolated);
+  EXPECT_EQ(seen.last.isolated, 4U);
+}
+
+TEST(FitWindowTest, ANameBeforeTkFitsSoFar) {
+  const auto stranger = [](Sample& sample) {
+    AddF6(sample, 1.0);
+    sample.values[Index(Signal::kX)] += 2.5 * tests::kNoise;
+  };
+  ModelSet judged = Fitted();
+  judged.decision.early_error = 1e-3;
+  ModelSet older = tests::LinearPlant();
+  older.decision = judged.decision;
+  EXPECT_NE(FollowChange(older, stranger).transitions.at(1).faults, 0U);
+  const Seen seen = FollowChange(judged, stranger);
+  for (const Transition& transition : seen.transitions) {
+    EXPECT_EQ(transition.faults, 0U);
+  }
+}
+
+// As a valve without air, whose X and F are those of evaporation.
+TEST(FitWindowTest, AFaultThatMovesAnInputIsNotNamedWhereTheInputIsAsUsual) {
+  ModelSet judged = Fitted();
+  judged.decision.early_error = 1e-3;
+  for (Observer& observer : judged.observers) {
+    observer.moved = observer.fault == 6 ? MaskOf(Signal::kT1) : SignalMask{0};
+  }
+  const Seen seen = FollowChange(judged, [](Sample& sample) {
+    AddF6(sample, 1.0);
+    sample.Set(Signal::kT1, 20.0);
+  });
+  for (const Transition& transition : seen.transitions) {
+    EXPECT_EQ(transition.faults, 0U);
+  }
+  EXPECT_EQ(seen.last.unknown, Unknown::kOutsideKnown);
+}
+
+// The name is taken back once the readings have left what the fault does.
+TEST(FitWindowTest, ANameThatFitsNoMoreIsTakenBack) {
+  ValveEngine engine(std::make_shared<const ModelSet>(Fitted()));
+  Noise noise(5);
+  StepRange(engine, 0, 50, [&](Sample& s) { noise.Add(s); });
+  const Seen named = StepRange(engine, 50, 150, [&](Sample& s) {
+    noise.Add(s);
+    AddF6(s, 1.0);
+  });
+  ASSERT_EQ(named.last.isolated, 4U);
+  const Seen seen = StepRange(engine, 150, 300, [&](Sample& s) {
+    noise.Add(s);
+    Strange(s);
+  });
+  ASSERT_FALSE(seen.transitions.empty());
+  EXPECT_EQ(seen.transitions.front().kind, TransitionKind::kReisolated);
+  EXPECT_EQ(seen.transitions.front().faults, 0U);
+  EXPECT_EQ(seen.last.unknown, Unknown::kOutsideKnown);
+}
+
+// A fault that has gone fits no more, but what was named was there.
+TEST(FitWindowTest, AFaultThatHasGoneKeepsItsName) {
+  ModelSet models = Fitted();
+  models.decision.clearing_samples = 60;
+  ValveEngine engine(std::make_shared<const ModelSet>(models));
+  Noise noise(5);
+  StepRange(engine, 0, 50, [&](Sample& s) { noise.Add(s); });
+  StepRange(engine, 50, 150, [&](Sample& s) {
+    noise.Add(s);
+    AddF6(s, 1.0);
+  });
+  const Seen seen =
+      StepRange(engine, 150, 400, [&](Sample& s) { noise.Add(s); });
+  ASSERT_FALSE(seen.transitions.empty());
+  for (const Transition& transition : seen.transitions) {
+    EXPECT_EQ(transition.faults, 4U);
+  }
+  EXPECT_EQ(seen.transitions.back().kind, TransitionKind::kClosed);
+}
+
+}  // namespace
+}  // namespace fdi
