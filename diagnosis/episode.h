@@ -180,10 +180,9 @@ class Episode {
   int proven_run_{0};      // samples in a row
   bool early_{false};      // isolated before t_k
   FaultSet contender_{0};  // candidate to replace the isolated set
+  int contender_run_{0};   // samples that supported it and no other since
   FaultSet misfits_{0};    // do not fit the last t_k samples
-  int refuted_run_{
-      0};  // samples in which no fault of the name fits, less others
-  int contender_run_{0};  // samples that supported it and no other since
+  int refuted_run_{0};  // samples that no fault of the name fits, less others
 };
 
 }  // namespace fdi

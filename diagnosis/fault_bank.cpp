@@ -123,6 +123,9 @@ void FaultBank::Update(const ObserverBank& bank) {
 }
 
 void FaultBank::PushInputs(const Sample& sample) {
+  if (!plan_->judges_fit()) {
+    return;
+  }
   constexpr double kOdd = 5.0;
   const ValidityRegion& region = plan_->models().validity;
   const std::array ranges{region.p1, region.p2, region.t1};

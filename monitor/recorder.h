@@ -96,10 +96,10 @@ class Recorder : public ValveListener {
   BoundedQueue<ReceivedSample> queue_;
 
   Mutex missing_mutex_;
-  std::optional<DataGap> missing_
-      GUARDED_BY(missing_mutex_);  // Not yet reported.
-  bool missing_more_ GUARDED_BY(missing_mutex_){
-      false};  // Dropped since the last commit.
+  // Not yet reported.
+  std::optional<DataGap> missing_ GUARDED_BY(missing_mutex_);
+  // Dropped since the last commit.
+  bool missing_more_ GUARDED_BY(missing_mutex_){false};
 
   Worker worker_;
 };

@@ -247,10 +247,10 @@ double Level(const std::vector<double>& values, double share, int length,
 //   moves. Of a short record its mean is given 0.75 deviations.
 // @param commands CV at the samples of the residuals; empty: no slope.
 // @return Nothing if there are fewer than 100 full windows.
-std::optional<WindowLimits> FitWindow(const ResidualSeries& residuals,
-                                      const ResidualSeries& commands,
-                                      int length, double share,
-                                      bool commanded) {
+std::optional<WindowLimits> FitWindowLimits(const ResidualSeries& residuals,
+                                            const ResidualSeries& commands,
+                                            int length, double share,
+                                            bool commanded) {
   WindowHistory history = SlideWindow(residuals, commands, length);
   if (history.mean.size() < kMinValues) {
     return std::nullopt;
@@ -453,9 +453,9 @@ void FitThresholds(const std::vector<ResidualSeries>& residuals,
     channel.upper_threshold = level(1.0);
     channel.lower_threshold = -level(-1.0);
     for (const int length : windows[c]) {
-      auto limits = FitWindow(residuals[c],
-                              commands.empty() ? ResidualSeries() : commands[c],
-                              length, share, ReadsCommand(models, c));
+      auto limits = FitWindowLimits(
+          residuals[c], commands.empty() ? ResidualSeries() : commands[c],
+          length, share, ReadsCommand(models, c));
       if (limits) {
         const double least = IsInput(channel.output)
                                  ? kMinMeanOfInput * std::sqrt(Variance(joined))

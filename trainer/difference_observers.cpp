@@ -450,7 +450,7 @@ ModelSet TrainDifferenceSet(const std::vector<TrainingRun>& healthy,
   reporter.Report(kNormalShare + kObserverShare, "comparing faults");
   FitLimits(fitted, held_out, options, models);
   FitInterpolationErrors(compared, models);
-  FitFitLimits(compared, options.threads, models);
+  SetFitBounds(compared, options.threads, models);
   FindGroups(compared, options.threads, models);
   Validate(models);
   reporter.Report(1.0, "done");

@@ -403,7 +403,7 @@ std::vector<FitBlocks> BlocksOf(
       continue;
     }
     ObserverBank bank(plan);
-    fdi::FitWindow window(models.decision.isolation_samples, channels);
+    FitWindow window(models.decision.isolation_samples, channels);
     bank.Initialise(stretch.samples.front());
     for (std::size_t k = 0; k < stretch.samples.size(); ++k) {
       bank.Step(stretch.samples[k]);
@@ -495,7 +495,7 @@ SignalMask MovedIn(const Condition& condition, const ModelSet& models) {
 
 }  // namespace
 
-void FitFitLimits(const std::vector<Condition>& conditions, int threads,
+void SetFitBounds(const std::vector<Condition>& conditions, int threads,
                   ModelSet& models) {
   const double share =
       kMisfitShare / (3.0 * static_cast<double>(models.channels.size()));

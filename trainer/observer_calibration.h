@@ -74,7 +74,7 @@ void FitInterpolationErrors(const std::vector<Condition>& conditions,
 /// window.
 ///
 /// @param conditions parallel to models.observers.
-void FitFitLimits(const std::vector<Condition>& conditions, int threads,
+void SetFitBounds(const std::vector<Condition>& conditions, int threads,
                   ModelSet& models);
 
 /// Fills ModelSet::groups and ModelSet::undetectable by scoring the validation

@@ -107,7 +107,7 @@ ModelSet TrainModelSet(const std::vector<TrainingRun>& runs,
                 models, normal_data.commands);
   reporter.Report(0.9, "comparing faults");
   FitInterpolationErrors(conditions, models);
-  FitFitLimits(conditions, options.threads, models);
+  SetFitBounds(conditions, options.threads, models);
   FindGroups(conditions, options.threads, models);
   Validate(models);
   reporter.Report(1.0, "done");

@@ -121,7 +121,7 @@ Report ListEpisodes(const HistoryOptions& options, const Context& context) {
       alarm,
       {"severity", "severity", Format::kPlain, 0, 1},
       {"fault", "fault"},
-      {"which is", "fault_name", Format::kPlain, 0, 0, kLeastName},
+      {"meaning", "fault_name", Format::kPlain, 0, 0, kLeastName},
       {"how sure", "certainty", Format::kPlain, 0, 2},
       {"now [-]", "strength", Format::kPlain, 2, 3},
       {"worst [-]", "worst_strength", Format::kPlain, 2, 4},

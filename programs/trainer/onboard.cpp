@@ -8,6 +8,7 @@
 
 #include "base/csv_cells.h"
 #include "base/error.h"
+#include "base/text.h"
 #include "base/time_text.h"
 #include "diagnosis/fault_catalogue.h"
 #include "import/tag_map.h"
@@ -175,19 +176,18 @@ Json ExtendsJson(const ModelSet& before, const Onboarding& onboarding) {
 // Hours that a person vouches for are learnt, but not what they would hide
 // without that being said.
 void RequireAccepted(const Onboarding& onboarding) {
-  std::string lost;
+  std::vector<std::string> lost;
   for (const CoverageChange& change :
        ChangesOf(*onboarding.coverage_before, *onboarding.coverage)) {
     if (change.lost()) {
-      lost += (lost.empty() ? "" : ", ") + FaultName(change.fault) +
-              (change.negative ? " (-)" : "");
+      lost.push_back(FaultName(change.fault) + (change.negative ? " (-)" : ""));
     }
   }
   if (!lost.empty()) {
     throw DataError(
         "with these hours, faults that the present set detects would not be "
         "detected at any strength: " +
-        lost +
+        JoinText(lost) +
         ". Nothing was stored; --accept stores it all the same, if the valve "
         "was healthy");
   }
@@ -565,8 +565,8 @@ void AddOptions(CLI::App& verb, OnboardOptions& options) {
   verb.add_flag("!--no-coverage", options.assess,
                 "Leave out the table of faults that can be detected");
   verb.add_flag("--extend", options.extend,
-                "Make the models of the valve anew from what they were made "
-                "from and from these healthy hours")
+                "Train the models of the valve again, from their former record "
+                "and from these healthy hours")
       ->configurable(false);
   verb.add_flag("--accept", options.accept,
                 "Of --extend: store the models even if a fault is not detected "
