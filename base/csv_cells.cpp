@@ -280,7 +280,13 @@ char FindSeparator(std::span<const std::string_view> lines) {
       }
     }
   }
-  return best;
+  // Columns of fixed width, where nothing else cuts a line.
+  const bool cut = most.first > 0;
+  const bool blanks =
+      !cut && std::ranges::any_of(lines, [](std::string_view line) {
+        return line.find_first_not_of(' ') < line.find_last_of(' ');
+      });
+  return blanks ? ' ' : best;
 }
 
 std::optional<std::string> Ungrouped(std::string_view cell, char thousands) {
@@ -321,9 +327,10 @@ std::string PlainText(std::string_view text) {
       {"ê", "e"}, {"à", "a"}, {"â", "a"}, {"ç", "c"},  {"ô", "o"}, {"î", "i"},
       {"á", "a"}, {"í", "i"}, {"ó", "o"}, {"ú", "u"},  {"ñ", "n"}, {"ą", "a"},
       {"ć", "c"}, {"ę", "e"}, {"ł", "l"}, {"ń", "n"},  {"ś", "s"}, {"ź", "z"},
-      {"ż", "z"}, {"Ä", "a"}, {"Ö", "o"}, {"Ü", "u"},  {"É", "e"}, {"È", "e"},
-      {"À", "a"}, {"Ç", "c"}, {"Ó", "o"}, {"Ł", "l"},  {"Ś", "s"}, {"Ż", "z"},
-      {"Ź", "z"}, {"Ć", "c"}, {"Ę", "e"}, {"Ą", "a"},  {"Á", "a"}, {"Í", "i"}};
+      {"ż", "z"}, {"û", "u"}, {"ù", "u"}, {"ò", "o"},  {"ì", "i"}, {"ë", "e"},
+      {"Ä", "a"}, {"Ö", "o"}, {"Ü", "u"}, {"É", "e"},  {"È", "e"}, {"À", "a"},
+      {"Ç", "c"}, {"Ó", "o"}, {"Ł", "l"}, {"Ś", "s"},  {"Ż", "z"}, {"Ź", "z"},
+      {"Ć", "c"}, {"Ę", "e"}, {"Ą", "a"}, {"Á", "a"},  {"Í", "i"}};
   std::string plain;
   for (std::size_t i = 0; i < text.size(); ++i) {
     const auto c = static_cast<unsigned char>(text[i]);

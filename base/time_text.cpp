@@ -12,6 +12,7 @@
 #include <optional>
 #include <regex>
 
+#include "base/csv_cells.h"
 #include "base/error.h"
 #include "base/text.h"
 #include "base/time_units.h"
@@ -34,12 +35,19 @@ constexpr const char* kTimeForms =
 // A cursor over the text of a time.
 // The grammar is:
 //
-//     time    = date [("T" / "t" / " ") clock] [offset]
+//     time    = [weekday] date [[","] ("T" / "t" / " ") clock] [offset]
+//             / [weekday] month " " day " " clock [" " zone] " " YYYY
 //     date    = YYYY s month s day / day s month s (YYYY / YY)   one s per date
-//             / "Jan" ... "Dec" " " day ", " YYYY [","]
-//     month   = number / "Jan" ... "Dec"
-//     clock   = hh ":" mm [":" ss [("." / ",") 1*DIGIT]] [[" "] ("AM" / "PM")]
-//     offset  = [" "] ("Z" / "UTC" / "GMT" / ("+" / "-") hh [[":"] mm])
+//             / YYYY "-W" week "-" day / YYYY "-" day of the year   3DIGIT
+//             / month " " day [","] " " YYYY
+//     month   = number / a name in one of six languages, or its beginning
+//     clock   = hh ":" mm [":" ss [("." / "," / ":") 1*DIGIT]]
+//               [[" "] ("AM" / "PM" / "a. m." / "p. m.")]
+//     offset  = [" "] (zone [hours] / hours)
+//     hours   = ("+" / "-") hh [[":"] mm]
+//
+// "20260310T090000" and "20260310090000" are those without signs, and
+// "+01:00[Europe/Berlin]" and "(CET)" behind an offset add nothing to it.
 //
 // A year of two digits, 1970 to 2069, is accepted beside the name of a month,
 // behind points ("10.03.26") and where the order is said: in "01-02-03" nothing
@@ -98,13 +106,26 @@ class Scanner {
   std::string_view rest_;
 };
 
-// 1..12 for "Oct" etc., in English, which historians use.
+// 1..12 by the first letters, without accents, of the names in English, German,
+// French, Spanish, Italian and Polish: no two months share any. "Juin" and
+// "juillet" need a fourth.
 std::optional<int> MonthOf(std::string_view word) {
-  constexpr std::string_view kMonths = "janfebmaraprmayjunjulaugsepoctnovdec";
-  const std::size_t at = kMonths.find(Lower(word));
-  return word.size() == 3 && at % 3 == 0
-             ? std::optional(static_cast<int>(at / 3) + 1)
-             : std::nullopt;
+  static constexpr std::string_view kMonths[] = {
+      "|jan|ene|gen|sty|",  "|feb|fev|lut|",     "|mar|mrz|mae|",
+      "|apr|avr|abr|kwi|",  "|may|mai|mag|maj|", "|jun|juin|giu|cze|",
+      "|jul|juil|lug|lip|", "|aug|aou|ago|sie|", "|sep|set|wrz|",
+      "|oct|okt|ott|paz|",  "|nov|lis|",         "|dec|dez|dic|gru|"};
+  const std::string name = Lower(word);
+  for (const std::size_t letters : {4U, 3U}) {
+    for (std::size_t i = 0; i < std::size(kMonths) && name.size() >= letters;
+         ++i) {
+      if (kMonths[i].find('|' + name.substr(0, letters) + '|') !=
+          std::string_view::npos) {
+        return static_cast<int>(i) + 1;
+      }
+    }
+  }
+  return std::nullopt;
 }
 
 // mktime() and timegm() would turn 31 February into 3 March without an error.
@@ -118,22 +139,65 @@ bool TakeDate(int year, int month, int day, std::tm& fields) {
       .ok();
 }
 
+bool TakeDays(std::chrono::sys_days days, std::tm& fields) {
+  const std::chrono::year_month_day date(days);
+  return TakeDate(static_cast<int>(date.year()),
+                  static_cast<int>(static_cast<unsigned>(date.month())),
+                  static_cast<int>(static_cast<unsigned>(date.day())), fields);
+}
+
+// Behind "2026-": "W11-2", whose week 1 has 4 January in it.
+bool ScanWeek(Scanner& in, int year, std::tm& fields) {
+  in.Take("Ww");
+  const auto week = in.Number();
+  const auto day = in.Take("-") ? in.Number() : std::nullopt;
+  if (!week || !day || *week < 1 || *week > 53 || *day < 1 || *day > 7) {
+    return false;
+  }
+  const std::chrono::sys_days fourth = std::chrono::year(year) / 1 / 4;
+  const auto weekday = std::chrono::weekday(fourth).iso_encoding();
+  return TakeDays(fourth + std::chrono::days(7 * (*week - 1) + *day -
+                                             static_cast<int>(weekday)),
+                  fields);
+}
+
+// Behind "2026-": "069".
+bool TakeDayOfYear(int year, int day, std::tm& fields) {
+  const std::chrono::sys_days first = std::chrono::year(year) / 1 / 1;
+  return day >= 1 && TakeDays(first + std::chrono::days(day - 1), fields) &&
+         fields.tm_year == year - 1900;
+}
+
 // Nov 20, 2026
 bool ScanAmericanDate(Scanner& in, std::tm& fields) {
   const auto month = MonthOf(in.Word());
   const auto day = in.Take(" ") ? in.Number() : std::nullopt;
-  if (!month || !day || !in.Take(",") || !in.Take(" ")) {
+  in.Take(",");
+  if (!month || !day || !in.Take(" ")) {
     return false;
   }
   std::size_t digits = 0;
   const auto year = in.Number(&digits);
-  in.Take(",");
   return year && digits == 4 && TakeDate(*year, *month, *day, fields);
+}
+
+// "Tue, ", "Tue "
+void SkipWeekday(Scanner& in) {
+  Scanner ahead = in;
+  const std::string word = Lower(ahead.Word()).substr(0, 3);
+  constexpr std::string_view kDays = "|mon|tue|wed|thu|fri|sat|sun|";
+  if (word.size() == 3 &&
+      kDays.find('|' + word + '|') != std::string_view::npos) {
+    ahead.Take(",");
+    ahead.Take(" ");
+    in = ahead;
+  }
 }
 
 // 2026-11-20, 20.11.2026, 20-Nov-2026, 20-Nov-26, 20.11.26, Nov 20, 2026;
 // 20/11/2026 and 20/11/26 by `order`.
 bool ScanDate(Scanner& in, DateOrder order, std::tm& fields) {
+  SkipWeekday(in);
   if (std::isalpha(static_cast<unsigned char>(in.next())) != 0) {
     return ScanAmericanDate(in, fields);
   }
@@ -142,15 +206,28 @@ bool ScanDate(Scanner& in, DateOrder order, std::tm& fields) {
   const bool iso =
       digits == 4 || (digits <= 2 && order == DateOrder::kYearFirst);
   const char separator = in.next();
-  if (!first || !in.Take(iso ? "-/." : "./-")) {
-    return false;
-  }
-  const bool named = std::isalpha(static_cast<unsigned char>(in.next())) != 0;
-  auto month = named ? MonthOf(in.Word()) : in.Number();
-  if (!month || !in.Take(std::string_view(&separator, 1))) {
+  if (!first || !in.Take(iso ? "-/." : "./- ")) {
     return false;
   }
   const std::size_t first_digits = digits;
+  if (first_digits == 4 && separator == '-' &&
+      (in.next() == 'W' || in.next() == 'w')) {
+    return ScanWeek(in, *first, fields);
+  }
+  in.Take(separator == '.' ? " " : "");  // "10. Nov. 2026"
+  const bool named = std::isalpha(static_cast<unsigned char>(in.next())) != 0;
+  auto month = named ? MonthOf(in.Word()) : in.Number(&digits);
+  if (month && !named && first_digits == 4 && digits == 3 && separator == '-') {
+    return TakeDayOfYear(*first, *month, fields);
+  }
+  const bool dot = named && in.Take(".");
+  const bool next =
+      in.Take(named && separator == '.' ? std::string_view(" ")
+                                        : std::string_view(&separator, 1));
+  if (!month || (separator == ' ' && !named) ||
+      !(next || (dot && separator == '.'))) {
+    return false;
+  }
   auto last = in.Number(&digits);
   if (!last) {
     return false;
@@ -176,6 +253,25 @@ bool ScanDate(Scanner& in, DateOrder order, std::tm& fields) {
   return TakeDate(*year, *month, *day, fields);
 }
 
+// "AM", " p. m.": whether it is the afternoon. A copy looks ahead, because the
+// blank may belong to an offset: "14:56 UTC".
+std::optional<bool> ScanHalf(Scanner& in) {
+  Scanner ahead = in;
+  ahead.Take(" ");
+  std::string half = Lower(ahead.Word());
+  if (half == "a" || half == "p") {
+    ahead.Take(".");
+    ahead.Take(" ");
+    half += Lower(ahead.Word());
+    ahead.Take(".");
+  }
+  if (half != "am" && half != "pm") {
+    return std::nullopt;
+  }
+  in = ahead;
+  return half == "pm";
+}
+
 // " 14:56", "T14:56:11.5", "14:56:11,5 PM"
 bool ScanClock(Scanner& in, CivilTime& time) {
   const auto hour = in.Number();
@@ -191,36 +287,55 @@ bool ScanClock(Scanner& in, CivilTime& time) {
       return false;
     }
     time.fields.tm_sec = *second;
-    if (in.Take(".,")) {
+    // Some write "09:00:00:250", with all three digits.
+    Scanner fraction = in;
+    std::size_t digits = 0;
+    const bool colon =
+        fraction.Take(":") && fraction.Number(&digits) && digits == 3;
+    if (in.Take(colon ? ":" : ".,")) {
       if (std::isdigit(static_cast<unsigned char>(in.next())) == 0) {
         return false;
       }
       time.fraction_ns = in.Fraction();
     }
   }
-  // A copy looks ahead, because the blank may belong to an offset: "14:56 UTC".
-  Scanner ahead = in;
-  ahead.Take(" ");
-  const std::string half = Lower(ahead.Word());
-  if (half == "am" || half == "pm") {
-    in = ahead;
+  if (const auto noon = ScanHalf(in)) {
     if (*hour < 1 || *hour > 12) {
       return false;
     }
     // 12 AM is midnight and 12 PM is noon.
-    time.fields.tm_hour = *hour % 12 + (half == "pm" ? 12 : 0);
+    time.fields.tm_hour = *hour % 12 + (*noon ? 12 : 0);
   }
   // A leap second has number 60.
   return time.fields.tm_hour <= 23 && *minute <= 59 && time.fields.tm_sec <= 60;
 }
 
-// "Z", " UTC", "+01:00", "+0100", "+01"
+// Minutes from UTC. Names that several countries use for different times (CST,
+// MST, IST, BST) are none.
+std::optional<int> ZoneOf(std::string_view name) {
+  static constexpr std::pair<std::string_view, int> kZones[] = {
+      {"z", 0},      {"utc", 0},    {"gmt", 0},    {"wet", 0},    {"west", 60},
+      {"cet", 60},   {"mez", 60},   {"cest", 120}, {"mesz", 120}, {"eet", 120},
+      {"eest", 180}, {"est", -300}, {"edt", -240}, {"cdt", -300}, {"mdt", -360},
+      {"pst", -480}, {"pdt", -420}};
+  const std::string lower = Lower(name);
+  for (const auto& [zone, minutes] : kZones) {
+    if (zone == lower) {
+      return minutes;
+    }
+  }
+  return std::nullopt;
+}
+
+// "Z", " UTC", " CEST", "+01:00", "+0100", "+01", "GMT+0100"
 bool ScanOffset(Scanner& in, CivilTime& time) {
   in.Take(" ");
   if (std::isalpha(static_cast<unsigned char>(in.next())) != 0) {
-    const std::string name = Lower(in.Word());
-    time.offset_s = 0;
-    return in.done() && (name == "z" || name == "utc" || name == "gmt");
+    const auto zone = ZoneOf(in.Word());
+    time.offset_s = 60 * zone.value_or(0);
+    if (!zone || in.done() || *zone != 0) {
+      return zone && in.done();
+    }
   }
   const int sign = in.next() == '-' ? -1 : 1;
   std::size_t digits = 0;
@@ -240,6 +355,79 @@ bool ScanOffset(Scanner& in, CivilTime& time) {
   }
   time.offset_s = sign * 60 * (60 * *hours + *minutes);
   return true;
+}
+
+// "Mar 10 05:00:00 EDT 2026", as ctime() and date(1) write it.
+std::optional<CivilTime> ScanCtime(Scanner in) {
+  CivilTime time;
+  SkipWeekday(in);
+  const auto month = MonthOf(in.Word());
+  in.Take(" ");
+  in.Take(" ");
+  const auto day = in.Number();
+  if (!month || !day || !in.Take(" ") || !ScanClock(in, time) ||
+      !in.Take(" ")) {
+    return std::nullopt;
+  }
+  if (const std::string_view name = in.Word(); !name.empty()) {
+    const auto zone = ZoneOf(name);
+    if (!zone || !in.Take(" ")) {
+      return std::nullopt;
+    }
+    time.offset_s = 60 * *zone;
+  }
+  std::size_t digits = 0;
+  const auto year = in.Number(&digits);
+  return year && digits == 4 && in.done() &&
+                 TakeDate(*year, *month, *day, time.fields)
+             ? std::optional(time)
+             : std::nullopt;
+}
+
+// Whether a time begins with eight or fourteen digits, of this century or the
+// last: "20260310T0900", "20260310090000".
+bool IsBasic(std::string_view text) {
+  const std::size_t digits =
+      std::min(text.find_first_not_of("0123456789"), text.size());
+  return (text.starts_with("19") || text.starts_with("20")) &&
+         (digits == 14 || digits == 17 ||
+          (digits == 8 && text.size() > 9 &&
+           std::string_view("Tt ").find(text[8]) != std::string_view::npos));
+}
+
+// With plain letters and blanks, with signs, and without a comment at the end.
+std::string Rewritten(std::string_view text) {
+  std::string plain(text);
+  for (const std::string_view blank : {"\xC2\xA0", "\xE2\x80\xAF"}) {
+    for (std::size_t at = plain.find(blank); at != std::string::npos;
+         at = plain.find(blank)) {
+      plain.replace(at, blank.size(), " ");
+    }
+  }
+  plain = PlainText(plain);
+  const std::size_t note = plain.find_first_of("[(");
+  if (note != std::string::npos && note > 10) {
+    plain.resize(plain[note - 1] == ' ' ? note - 1 : note);
+  }
+  if (!IsBasic(plain)) {
+    return plain;
+  }
+  const auto part = [&](std::size_t from, std::size_t count) {
+    return plain.substr(from, count);
+  };
+  const std::string date = part(0, 4) + '-' + part(4, 2) + '-' + part(6, 2);
+  const std::size_t begin =
+      std::isdigit(static_cast<unsigned char>(plain[8])) != 0 ? 8 : 9;
+  const std::size_t digits =
+      std::min(plain.find_first_not_of("0123456789", begin), plain.size()) -
+      begin;
+  if (digits < 4) {
+    return date + ' ' + part(begin, std::string::npos);
+  }
+  return date + ' ' + part(begin, 2) + ':' + part(begin + 2, 2) +
+         (digits >= 6 ? ':' + part(begin + 4, 2) : std::string()) +
+         (digits > 6 ? "." : "") +
+         part(begin + std::min<std::size_t>(digits, 6), std::string::npos);
 }
 
 struct Unit {
@@ -292,11 +480,23 @@ std::string FormatTime(std::int64_t stamp_ns, bool utc) {
 }
 
 std::optional<CivilTime> ScanTime(std::string_view text, DateOrder order) {
+  // Nearly all times are plain.
+  std::string rewritten;
+  if (text.size() > 10 &&
+      (std::ranges::any_of(text, [](char c) { return (c & 0x80) != 0; }) ||
+       text.ends_with(']') || text.ends_with(')') || IsBasic(text))) {
+    rewritten = Rewritten(text);
+    text = rewritten;
+  }
   CivilTime time;
   Scanner in(text);
-  if (text.size() > kMaxTimeLength || !ScanDate(in, order, time.fields)) {
+  if (text.size() > kMaxTimeLength) {
     return std::nullopt;
   }
+  if (!ScanDate(in, order, time.fields)) {
+    return ScanCtime(Scanner(text));
+  }
+  in.Take(",");
   const bool clock = in.Take("Tt ");
   if ((clock && !ScanClock(in, time)) ||
       (!in.done() && !ScanOffset(in, time))) {
@@ -310,7 +510,9 @@ std::optional<CivilTime> ScanTime(std::string_view text, DateOrder order) {
 LocalClock::LocalClock(std::string zone) : zone_(std::move(zone)) {
   CivilTime offset;
   Scanner scanner(zone_);
-  if (!zone_.empty() && ScanOffset(scanner, offset)) {
+  // "CET" is a file with summer time, and a fixed offset only behind a time.
+  if (!zone_.empty() && ZoneOf(zone_).value_or(0) == 0 &&
+      ScanOffset(scanner, offset)) {
     fixed_s_ = offset.offset_s;
   } else if (!zone_.empty() && (zone_.find("..") != std::string::npos ||
                                 !std::filesystem::is_regular_file(

@@ -117,7 +117,8 @@ awk -F, '
   >"$work/distances"
 
 "$bin/fdi-trainer" evaluate --model-set "$set_name" "${files[@]}" --csv \
-  2>"$work/log" | tail -n +2 >"$work/answers"
+  2>"$work/log" | tail -n +2 |
+  sed -E ':again; s/("[^",]*),([^"]*")/\1|\2/; t again; s/"//g' >"$work/answers"
 awk -F, '
   NR == FNR { nearest[$1] = $2; distance[$1] = $3; next }
   { run = $1; sub(/.*\//, "", run); sub(/\.csv.*/, "", run)

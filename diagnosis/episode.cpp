@@ -194,7 +194,9 @@ Episode::Episode(std::shared_ptr<const FaultPlan> plan)
       floor_names_(FindingsOf(*models_)),
       faults_(std::move(plan)),
       isolation_(models_->decision, models_->faults.size()),
-      clearing_(*models_) {}
+      recognition_(models_->decision, models_->faults.size()),
+      clearing_(*models_),
+      misfit_counts_(models_->faults.size()) {}
 
 void Episode::Score(const ObserverBank& bank, Verdict& verdict) const {
   faults_.Score(bank, verdict);
@@ -219,6 +221,8 @@ void Episode::Step(const Sample& sample, const ObserverBank& bank,
   if (findings.settled && !begun_) {
     faults_.Restart();
     isolation_.Restart();
+    recognition_.Restart();
+    recognised_ = 0;
     begun_ = true;
   }
   if (begun_ && findings.settled) {
@@ -296,8 +300,10 @@ void Episode::Open(std::int64_t stamp_ns, Verdict& verdict) {
   contender_run_ = 0;
   proven_run_ = 0;
   early_ = false;
-  refuted_run_ = 0;
   misfits_ = 0;
+  refuted_ = 0;
+  std::ranges::fill(misfit_counts_, 0);
+  stood_ = 0;
   Emit(TransitionKind::kDetected, detection_stamp_ns_, verdict);
 }
 
@@ -376,21 +382,51 @@ FaultSet Episode::Proven(const Verdict& verdict) {
 void Episode::Name(FaultSet faults, Verdict& verdict) {
   const bool first = verdict.state == State::kDetected;
   verdict.state = State::kIsolated;
+  stood_ = 0;
   verdict.isolated = faults;
   verdict.unknown = Unknown::kNone;
   Emit(first ? TransitionKind::kIsolated : TransitionKind::kReisolated,
        verdict.stamp_ns, verdict);
 }
 
+// What was seen on this valve before, and was named by a person then, stands
+// for the faults that look like it: of all explanations that the data leave, it
+// is the one that has happened here. It has to fit, and to be as good an
+// explanation as any, in nearly all of t_k samples; once it is recognised, it
+// stays so until the evidence refutes it.
+void Episode::Recognise() {
+  const DecisionParameters& decision = models_->decision;
+  recognition_.Push(faults_.Recognised(decision.evidence_core, true));
+  recognised_ =
+      recognition_.Supported() |
+      (recognised_ & faults_.Recognised(decision.evidence_support, false));
+}
+
+FaultSet Episode::Recognised(FaultSet set) const {
+  const FaultSet taught = set & recognised_;
+  return taught != 0 ? taught : set;
+}
+
+// A line that is lost is lost within minutes. A fault that was the name, and
+// fitted, for half the memory of the evidence before the flow was found too low
+// has grown, or meets a command that shows it: it explains the loss.
+bool Episode::ExplainsLoss(FaultSet set, const Verdict& verdict) const {
+  const FaultSet known = set & ~floor_names_;
+  return faults_.judges_fit() && known != 0 &&
+         (known & ~verdict.isolated) == 0 &&
+         (verdict.isolated & floor_names_) == 0 &&
+         stood_ >= 0.5 * models_->decision.evidence_window;
+}
+
 // Too little flow behind a rod that follows is more likely lost in the line
 // than in the valve, so it stands beside a fault of valve or sensor. A flow
 // transmitter stands alone while the command stays where it was: the loop would
 // answer a loss of flow.
-FaultSet Episode::LossBeside(FaultSet set, FaultSet floor,
-                             const Sample& sample) const {
+FaultSet Episode::LossBeside(FaultSet set, FaultSet floor, const Sample& sample,
+                             const Verdict& verdict) const {
   const int index = FaultIndex(*models_, kLowFlow);
   const FaultSet loss = index < 0 ? 0 : floor & FaultSet{1} << index;
-  if (loss == 0) {
+  if (loss == 0 || ExplainsLoss(set, verdict)) {
     return 0;
   }
   bool of_process = true;
@@ -406,24 +442,43 @@ FaultSet Episode::LossBeside(FaultSet set, FaultSet floor,
   return of_process || of_meter ? 0 : loss;
 }
 
-// Fit does not choose among faults, evidence does. But where none of a name
-// fits any more, the name is taken back: what the episode shows is outside all
-// that is known. Samples that normal operation explains refute nothing: the
-// fault may have gone, and the episode keeps the name until it is cleared.
-void Episode::Withdraw(FaultSet misfits, Verdict& verdict) {
+// A fault that fits only some of the time, at another strength each time, is
+// not the one that acts: the command swings, a strength does not. So a misfit
+// counts twice as much as a fit, and what is refuted stays so until it has
+// fitted for long. A single disturbance, which stays in the window for t_k
+// samples, refutes nothing, and samples that normal operation explains count
+// neither way.
+void Episode::CountMisfits(FaultSet misfits, const Verdict& verdict) {
+  constexpr int kWeight = 2;
+  const int refuted =
+      kWeight * std::max(models_->decision.isolation_samples * 3 / 2,
+                         models_->decision.reisolation_samples);
+  misfits_ = misfits | refuted_;
   if (verdict.normal_factor >= models_->decision.isolation_threshold) {
     return;
   }
-  const int most = std::max(models_->decision.isolation_samples,
-                            models_->decision.reisolation_samples);
-  refuted_run_ =
-      std::max(0, refuted_run_ + (IsAllOf(verdict.isolated, misfits) ? 1 : -1));
-  if (refuted_run_ < most) {
+  for (std::size_t i = 0; i < misfit_counts_.size(); ++i) {
+    int& count = misfit_counts_[i];
+    count =
+        std::clamp(count + (Has(misfits, i) ? kWeight : -1), 0, 2 * refuted);
+    const FaultSet fault = FaultSet{1} << i;
+    refuted_ |= count >= refuted ? fault : 0;
+    refuted_ &= count == 0 ? ~fault : ~FaultSet{0};
+  }
+  misfits_ |= refuted_;
+  stood_ += IsAllOf(verdict.isolated, misfits_) ? 0 : 1;
+}
+
+// Fit does not choose among faults, evidence does. But where all of a name are
+// refuted, the name is taken back: what the episode shows is outside all that
+// is known.
+void Episode::Withdraw(Verdict& verdict) {
+  if (!IsAllOf(verdict.isolated, refuted_)) {
     return;
   }
-  refuted_run_ = 0;
   early_ = false;
-  without_fault_ = most;
+  stood_ = 0;
+  without_fault_ = models_->decision.isolation_samples;
   verdict.isolated = floor_;
   verdict.state = floor_ != 0 ? State::kIsolated : State::kDetected;
   verdict.unknown = floor_ != 0 ? Unknown::kNone : Unknown::kOutsideKnown;
@@ -453,8 +508,9 @@ void Episode::NameEarly(const Sample& sample, FaultSet beginning,
                         Verdict& verdict) {
   const FaultSet proven = Proven(verdict);
   const bool early = (proven & ~verdict.isolated) != 0;
-  const FaultSet name = early ? WithGroups(proven, verdict) : verdict.isolated;
-  const FaultSet loss = LossBeside(name, floor_ | beginning, sample);
+  const FaultSet name =
+      early ? Recognised(WithGroups(proven, verdict)) : verdict.isolated;
+  const FaultSet loss = LossBeside(name, floor_ | beginning, sample, verdict);
   if ((early && (loss & ~floor_) == 0) || (loss & floor_ & ~name) != 0) {
     early_ = early_ || early;
     Name(name | loss, verdict);
@@ -467,13 +523,16 @@ void Episode::Isolate(const Sample& sample, const Findings& findings,
   // Before any return, so that the window is full when a hold ends or the valve
   // no longer looks normal.
   isolation_.Push(FactorsFrom(threshold, verdict));
+  Recognise();
   // A stuck transmitter is certain, whatever its observers say.
-  misfits_ = findings.stuck != 0 ? 0 : faults_.misfits();
-  Withdraw(misfits_, verdict);
+  CountMisfits(findings.stuck != 0 ? 0 : faults_.misfits(), verdict);
+  Withdraw(verdict);
   FaultSet supported = isolation_.Supported();
   if (IsAllOf(supported, misfits_)) {
     supported = 0;
   }
+  // What is recognised fits over t_k samples, be single ones rare for it.
+  supported = supported == 0 ? recognised_ : supported;
   if (isolation_held_ || verdict.normal_factor >= threshold) {
     contender_run_ = 0;
     proven_run_ = 0;
@@ -483,13 +542,13 @@ void Episode::Isolate(const Sample& sample, const Findings& findings,
     NameEarly(sample, findings.beginning, verdict);
     return;
   }
-  supported = WithGroups(supported, verdict);
+  supported = Recognised(WithGroups(supported, verdict));
   // A set this large is no diagnosis: its faults remain candidates. Older model
   // sets have no floor and keep their answers.
   if (models_->floor && std::popcount(supported) > kMaxFaultSetSize) {
     supported = floor_;
   }
-  supported |= LossBeside(supported, floor_, sample);
+  supported |= LossBeside(supported, floor_, sample, verdict);
   // The first fault replaces findings of the floor at once, and the first set
   // of equation (6) a name that came before it.
   const bool early = std::exchange(early_, false);
@@ -507,6 +566,7 @@ void Episode::Isolate(const Sample& sample, const Findings& findings,
   contender_ = supported;
   if (supported != verdict.isolated &&
       contender_run_ >= models_->decision.reisolation_samples) {
+    stood_ = 0;
     verdict.isolated = supported;
     verdict.state = supported != 0 ? State::kIsolated : State::kDetected;
     // More than four faults explain it, so it is not outside what is known.

@@ -147,8 +147,13 @@ class Episode {
   void ApplyEvidence(Verdict& verdict) const;
   void Open(std::int64_t stamp_ns, Verdict& verdict);
   FaultSet Proven(const Verdict& verdict);
-  FaultSet LossBeside(FaultSet set, FaultSet floor, const Sample& sample) const;
-  void Withdraw(FaultSet misfits, Verdict& verdict);
+  void Recognise();
+  FaultSet Recognised(FaultSet set) const;
+  FaultSet LossBeside(FaultSet set, FaultSet floor, const Sample& sample,
+                      const Verdict& verdict) const;
+  void CountMisfits(FaultSet misfits, const Verdict& verdict);
+  void Withdraw(Verdict& verdict);
+  bool ExplainsLoss(FaultSet set, const Verdict& verdict) const;
   bool IsAllOf(FaultSet faults, FaultSet misfits) const;
   void ApplyMisfits(Verdict& verdict) const;
   void NameEarly(const Sample& sample, FaultSet beginning, Verdict& verdict);
@@ -169,6 +174,8 @@ class Episode {
   FaultSet floor_names_;  // bits of the findings
   FaultBank faults_;
   IsolationWindow isolation_;
+  IsolationWindow recognition_;  // of what labels have taught
+  FaultSet recognised_{0};
   ClearingWindow clearing_;
   bool isolation_held_{false};
   std::int64_t detection_stamp_ns_{0};
@@ -181,8 +188,10 @@ class Episode {
   bool early_{false};      // isolated before t_k
   FaultSet contender_{0};  // candidate to replace the isolated set
   int contender_run_{0};   // samples that supported it and no other since
-  FaultSet misfits_{0};    // do not fit the last t_k samples
-  int refuted_run_{0};  // samples that no fault of the name fits, less others
+  FaultSet misfits_{0};    // do not fit the last t_k samples, or refuted
+  FaultSet refuted_{0};    // have not fitted for too long
+  std::vector<int> misfit_counts_;  // by fault; a misfit counts twice
+  int stood_{0};  // samples that a fault of the present name fitted
 };
 
 }  // namespace fdi

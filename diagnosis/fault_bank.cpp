@@ -101,7 +101,7 @@ void FaultBank::Update(const ObserverBank& bank) {
   for (StrengthTracker& tracker : trackers_) {
     tracker.Step(bank);
     if (plan_->judges_fit()) {
-      tracker.PushFit(bank, trained_);
+      tracker.PushFit(bank, trained_, (odd_ & tracker.path().moved) != 0);
     }
   }
   misfits_ = 0;
@@ -205,6 +205,23 @@ FaultSet FaultBank::Unrefuted(double margin) const {
     }
   }
   return unrefuted;
+}
+
+FaultSet FaultBank::Recognised(double margin, bool fitting) const {
+  FaultSet recognised = 0;
+  const double best = BestEvidence();
+  if (EvidenceMembership(best - trained_.total(0)) == 1.0) {
+    return 0;
+  }
+  for (const StrengthTracker& tracker : trackers_) {
+    const StrengthPath& path = tracker.path();
+    if (path.taught && tracker.refutable() &&
+        best - tracker.evidence(trained_) <= margin &&
+        (!fitting || Fits(tracker))) {
+      recognised |= FaultSet{1} << path.fault_index;
+    }
+  }
+  return recognised;
 }
 
 }  // namespace fdi

@@ -59,8 +59,14 @@ class FaultBank {
   /// does not account for what is seen or does not fit it so far.
   FaultSet Unrefuted(double margin) const;
 
+  /// The faults that a taught observer explains, and within `margin` as well as
+  /// the best explanation; nothing while normal operation does.
+  /// @param fitting only those that fit the last t_k samples.
+  FaultSet Recognised(double margin, bool fitting) const;
+
   /// The faults that do not fit the last t_k samples at any strength or sign.
   FaultSet misfits() const { return misfits_; }
+  bool judges_fit() const { return plan_->judges_fit(); }
 
  private:
   double BestEvidence() const;

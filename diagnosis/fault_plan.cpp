@@ -6,6 +6,7 @@
 #include "base/median.h"
 #include "diagnosis/fault_catalogue.h"
 #include "diagnosis/fit_window.h"
+#include "diagnosis/taught.h"
 
 namespace fdi {
 namespace {
@@ -27,15 +28,16 @@ SignalMask InputsOf(int fault) {
 // which cannot show what strength does.
 constexpr double kReachBelow = 0.5;
 constexpr double kReachAbove = 1.5;
-constexpr double kLoneReachBelow = 0.75;
-constexpr double kLoneReachAbove = 1.25;
+constexpr double kLoneReachBelow = 1.0 - kTaughtReach;
+constexpr double kLoneReachAbove = 1.0 + kTaughtReach;
 
 std::vector<std::size_t> ObserversOf(const ModelSet& models, int fault,
                                      bool negative) {
   std::vector<std::size_t> found;
   for (std::size_t i = 1; i < models.observers.size(); ++i) {
     const Observer& observer = models.observers[i];
-    if (observer.fault == fault && (observer.strength < 0.0) == negative) {
+    if (observer.fault == fault && (observer.strength < 0.0) == negative &&
+        !IsTaught(observer)) {
       found.push_back(i);
     }
   }
@@ -49,7 +51,9 @@ std::vector<std::size_t> ObserversOf(const ModelSet& models, int fault,
 double ChannelTime(const ModelSet& models, std::size_t c) {
   std::vector<double> all;
   for (const Observer& observer : models.observers) {
-    all.push_back(std::max(observer.channels[c].correlation_time, 1.0));
+    if (!IsTaught(observer)) {
+      all.push_back(std::max(observer.channels[c].correlation_time, 1.0));
+    }
   }
   const auto same =
       std::count_if(models.channels.begin(), models.channels.end(),
@@ -138,6 +142,7 @@ StrengthPath MakeStrengthPath(const ObserverPlan& plan,
       static_cast<std::size_t>(FaultIndex(plan.models(), last.fault));
   path.inputs = InputsOf(last.fault);
   path.moved = MovedAlong(plan, path);
+  path.taught = IsTaught(last);
   SetReach(path);
   return path;
 }
@@ -159,6 +164,11 @@ FaultPlan::FaultPlan(std::shared_ptr<const ObserverPlan> observers)
       if (!found.empty()) {
         paths_.push_back(MakeStrengthPath(*observers_, found));
       }
+    }
+  }
+  for (std::size_t i = 1; i < models().observers.size(); ++i) {
+    if (IsTaught(models().observers[i])) {
+      paths_.push_back(MakeStrengthPath(*observers_, {i}));
     }
   }
 }

@@ -43,6 +43,7 @@ struct StrengthPath {
   double sign{1.0};
   SignalMask inputs{0};  ///< P1, P2, T1 that the fault acts on.
   SignalMask moved{0};   ///< Those that it moved at every trained strength.
+  bool taught{false};    ///< Of an observer that a label has taught, alone.
   double lowest{0.0};    ///< Range of |s|.
   double highest{0.0};
   std::vector<Node> nodes;
@@ -59,7 +60,8 @@ class FaultPlan {
 
   const ObserverPlan& observers() const { return *observers_; }
   const ModelSet& models() const { return observers_->models(); }
-  /// One per fault and direction.
+  /// One per fault and direction; behind them one per taught observer, which
+  /// leaves the others as they are.
   const std::vector<StrengthPath>& paths() const { return paths_; }
   /// Fault index of an observer other than the normal one.
   std::size_t fault_index(std::size_t observer) const {

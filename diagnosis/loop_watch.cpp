@@ -37,9 +37,10 @@ Estimate SizeOf(const loop::Audit& audit) {
   const loop::Evidence& e = audit.evidence;
   constexpr double kPerCent = 0.01;
   const auto share = [](double value) { return std::clamp(value, 0.0, 1.0); };
-  if (audit.verdict == loop::Verdict::kStiction && e.fit) {
-    return {share(kPerCent * e.fit->band), share(kPerCent * e.fit->band_low),
-            share(kPerCent * e.fit->band_high)};
+  const auto band = e.band();
+  if (audit.verdict == loop::Verdict::kStiction && band) {
+    return {share(kPerCent * band->width), share(kPerCent * band->low),
+            share(kPerCent * band->high)};
   }
   const double size = audit.verdict == loop::Verdict::kSaturated
                           ? share(e.at_limit)

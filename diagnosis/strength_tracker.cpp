@@ -13,9 +13,8 @@ constexpr int kSearchSamples = 40;  // initial samples with a grid search
 constexpr double kRateDeviation = 1.0 / 1500.0;
 // An effect on a channel counts from this share of the deviation on.
 constexpr double kMinEffect = 0.25;
-constexpr double kAccounted = 0.5;  // of the normal observer's residual
-// The effect of a fault may be off by this share, as in the second look.
-constexpr double kEffectError = 0.05;
+constexpr double kAccounted = 0.5;   // of the normal observer's residual
+constexpr double kOnsetError = 0.5;  // of the effect, while a fault begins
 
 double Lane(const std::vector<Quad>& quads, std::size_t slot) {
   return quads[slot / kLanes].lane[slot % kLanes];
@@ -346,26 +345,36 @@ void StrengthTracker::UpdateFactor(const ObserverBank& bank) {
 }
 
 void StrengthTracker::PushFit(const ObserverBank& bank,
-                              const ObserverEvidence& trained) {
+                              const ObserverEvidence& trained, bool shown) {
+  const bool begins =
+      shown && age_ <= plan_->models().decision.isolation_samples;
   const StrengthPath::Node& best = BestNode(trained);
   const bool is_trained = trained.total(best.observer) >= total_;
   const PathPlace place =
       path_->PlaceOf(is_trained ? best.strength : strength_);
   std::array<double, kMaxChannels> z;
   z.fill(std::numeric_limits<double>::quiet_NaN());
+  std::array<double, kMaxChannels> u{};
   for (std::size_t c = 0; c < channels_; ++c) {
     if (bank.active(static_cast<int>(c))) {
       const Prediction p =
           At(bank, c, SegmentOf(bank, c, place.segment), place);
       const double sd = path_->points[place.nearest * channels_ + c].sd;
-      const double most = kMaxFitVariance * sd * sd;
-      const double effect = bank.residual(0, static_cast<int>(c)) - p.residual;
-      const double off = std::isnan(effect) ? 0.0 : kEffectError * effect;
-      z[c] = p.residual /
-             std::sqrt(std::min(p.variance, most + p.error) + off * off);
+      const double normal = bank.residual(0, static_cast<int>(c));
+      // An error of interpolation excuses a part of an effect, not one that is
+      // not there: nearer to normal operation, there is none.
+      const bool apart = std::abs(normal) < std::abs(p.residual);
+      const double effect =
+          apart || std::isnan(normal) ? 0.0 : normal - p.residual;
+      const double early = begins ? kOnsetError * effect : 0.0;
+      const double spread =
+          std::sqrt(std::min(p.variance - p.error, kMaxFitVariance * sd * sd) +
+                    (apart ? 0.0 : p.error) + early * early);
+      z[c] = p.residual / spread;
+      u[c] = effect / spread;
     }
   }
-  fit_.Push({z.data(), channels_});
+  fit_.Push({z.data(), channels_}, {u.data(), channels_});
   misfit_ = 0.0;
   // Normal operation, the first node, has no limits.
   const std::size_t node = std::max<std::size_t>(place.nearest, 1);

@@ -71,7 +71,11 @@ class StrengthTracker {
 
   /// Takes the residuals of the best explanation, tracked or trained, into the
   /// window that fits() judges. Call after Step().
-  void PushFit(const ObserverBank& bank, const ObserverEvidence& trained);
+  /// @param shown an input has moved as the fault always moves it. In the first
+  ///   t_k samples, what it does elsewhere may then be off by half: the
+  ///   rod is on its way, and observers know faults that have acted for long.
+  void PushFit(const ObserverBank& bank, const ObserverEvidence& trained,
+               bool shown);
   /// False if the best explanations of the last t_k samples do not look like
   /// the fault's own validation data (FitBounds). True until there are so many.
   bool fits() const { return !fit_.full() || fits_so_far(); }

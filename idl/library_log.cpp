@@ -1,9 +1,15 @@
+#include "idl/library_log.h"
+
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cstdint>
 #include <cstring>
+#include <deque>
 #include <map>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -18,12 +24,15 @@ namespace {
 using eprosima::fastdds::dds::Log;
 using Clock = std::chrono::steady_clock;
 constexpr auto kQuietTime = std::chrono::seconds(10);
+constexpr std::size_t kMaxRefusals = 64;
 
 // Process-wide, like the library's log.
 struct Registry {
   Mutex mutex;
   bool installed GUARDED_BY(mutex){false};
   std::vector<const LogSink*> sinks GUARDED_BY(mutex);
+  std::uint64_t refusals GUARDED_BY(mutex){0};
+  std::deque<std::string> refused_guids GUARDED_BY(mutex);  // Newest first.
 };
 
 // Never destroyed: the library's log thread outlives our statics.
@@ -38,10 +47,67 @@ LogLevel LevelOf(Log::Kind kind) {
                                       : LogLevel::kDebug;
 }
 
+struct Refusal {
+  std::string_view of;  // participant, writer, reader
+  std::string guid;
+  std::string reason;
+};
+
+// What the library's access control says of others that have a key of our
+// authority without the right to what they do. Only its log tells: the listener
+// of a participant hears of keys that are none.
+std::optional<Refusal> RefusalIn(const Log::Entry& entry) {
+  constexpr std::array<std::pair<std::string_view, std::string_view>, 4>
+      kBegins{{{"Error checking create remote writer ", "writer"},
+               {"Error checking create remote reader ", "reader"},
+               {"Error validating remote permissions for ", "participant"},
+               {"Error checking remote participant  ", "participant"}}};
+  const std::string& text = entry.message;
+  const auto found = std::ranges::find_if(kBegins, [&](const auto& begin) {
+    return text.starts_with(begin.first);
+  });
+  // Behind it follows: GUID (REASON (FILE:LINE))
+  const std::size_t reason = text.find(" (");
+  if (found == kBegins.end() || reason == std::string::npos) {
+    return std::nullopt;
+  }
+  const std::size_t end = std::min(text.find(" (", reason + 2), text.size());
+  const std::size_t guid = found->first.size();
+  return Refusal{found->second, text.substr(guid, reason - guid),
+                 text.substr(reason + 2, end - reason - 2)};
+}
+
+// Whether it is the first refusal of that GUID, which counts: the library
+// repeats it for each of our participants and endpoints.
+bool CountOnce(const Refusal& refusal) {
+  Registry& registry = GlobalRegistry();
+  const MutexLock lock(registry.mutex);
+  std::deque<std::string>& known = registry.refused_guids;
+  if (std::ranges::find(known, refusal.guid) != known.end()) {
+    return false;
+  }
+  known.push_front(refusal.guid);
+  if (known.size() > kMaxRefusals) {
+    known.pop_back();
+  }
+  ++registry.refusals;
+  return true;
+}
+
+std::string Quoted(std::string text) {
+  std::ranges::replace(text, '\n', ' ');
+  std::ranges::replace(text, '"', '\'');
+  return '"' + text + '"';
+}
+
 // Called by the library's log thread.
 class Throttle : public eprosima::fastdds::dds::LogConsumer {
  public:
   void Consume(const Log::Entry& entry) override {
+    const std::optional<Refusal> refusal = RefusalIn(entry);
+    if (refusal && !CountOnce(*refusal)) {
+      return;
+    }
     const auto place = std::make_pair(
         std::string(entry.context.filename ? entry.context.filename : ""),
         entry.context.line);
@@ -51,12 +117,13 @@ class Throttle : public eprosima::fastdds::dds::LogConsumer {
       ++seen.suppressed;
       return;
     }
-    std::string text = entry.message;
-    std::ranges::replace(text, '\n', ' ');
-    std::ranges::replace(text, '"', '\'');
     std::string line =
-        "dds_library category=" + std::string(entry.context.category) +
-        " text=\"" + text + "\"";
+        refusal
+            ? "permission_refused of=" + std::string(refusal->of) +
+                  " guid=" + refusal->guid +
+                  " reason=" + Quoted(refusal->reason)
+            : "dds_library category=" + std::string(entry.context.category) +
+                  " text=" + Quoted(entry.message);
     if (seen.suppressed > 0) {
       line += " suppressed=" + std::to_string(seen.suppressed);
     }
@@ -64,7 +131,8 @@ class Throttle : public eprosima::fastdds::dds::LogConsumer {
     Registry& registry = GlobalRegistry();
     const MutexLock lock(registry.mutex);
     if (!registry.sinks.empty() && *registry.sinks.back()) {
-      (*registry.sinks.back())(LevelOf(entry.kind), line);
+      (*registry.sinks.back())(
+          refusal ? LogLevel::kWarning : LevelOf(entry.kind), line);
     }
   }
 
@@ -94,6 +162,12 @@ LibraryLog::~LibraryLog() {
   Registry& registry = GlobalRegistry();
   const MutexLock lock(registry.mutex);
   std::erase(registry.sinks, &sink_);
+}
+
+std::uint64_t RefusedPermissions() {
+  Registry& registry = GlobalRegistry();
+  const MutexLock lock(registry.mutex);
+  return registry.refusals;
 }
 
 }  // namespace fdi::idl

@@ -13,6 +13,7 @@
 #include <netinet/in.h>
 
 #include "base/error.h"
+#include "base/headroom.h"
 #include "base/passing_error.h"
 #include "base/time_units.h"
 #include "idl/interface_watch.h"
@@ -53,6 +54,11 @@ constexpr std::uint32_t kSendBufferBytes = 4U << 20U;
 // Shared memory is slow with the library's default of 512 kB.
 constexpr std::uint32_t kSegmentBytes = 64U << 20U;
 constexpr std::uint32_t kPortQueueCapacity = 8192;
+// More than what a participant with its endpoints takes at its start. Where a
+// thread or memory is refused half-way, 3.1 ends the process with an assertion
+// (UDPTransportInterface::clean), and 2.9 may throw in a destructor.
+constexpr int kThreads = 16;
+constexpr std::size_t kHeadroomBytes = 32U << 20U;
 // Bounds topics, remote endpoints per topic, and participants without a key.
 constexpr std::size_t kMaxRemembered = 64;
 
@@ -375,6 +381,7 @@ Participant::Impl::Impl(const DdsOptions& options, LogSink log,
   if (options_.transport != "shm") {
     interfaces_.emplace(options_.interfaces, log_);
   }
+  RequireHeadroom(kThreads, kHeadroomBytes);
   const dds::DomainParticipantQos qos =
       MakeQos(options_, profiles_, datagrams_, log_, name);
   // The participant is active at once: its callbacks may come before `handle_`

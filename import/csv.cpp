@@ -20,11 +20,12 @@ namespace {
 /// 100 years: later times would overflow nanoseconds since `start_ns`.
 constexpr double kMaxSeconds = 3.2e9;
 constexpr double kSecondsPerDay = 86400.0;
-/// 1970-01-01 as a spreadsheet day number.
-constexpr double kSerialOf1970 = 25569.0;
-/// 1970-01-01 in units of 100 ns since 1601, and 100 years.
+/// 1970-01-01 in units of 100 ns since 1601 and since year 1, and 100 years.
 constexpr std::int64_t kFileTimeOf1970 = 116'444'736'000'000'000;
+constexpr std::int64_t kTicksOf1970 = 621'355'968'000'000'000;
 constexpr std::int64_t kMaxFileTime = 32'000'000'000'000'000;
+/// 1970-01-01 in seconds since 1904.
+constexpr std::int64_t k1970Since1904 = 2'082'844'800;
 constexpr const char* kSniff =
     "; try: fdi-store runs sniff FILE --map-output tags.toml, then --map "
     "tags.toml";
@@ -33,6 +34,22 @@ bool IsOneOf(std::string_view cell,
              std::initializer_list<std::string_view> words) {
   return std::ranges::any_of(
       words, [cell](std::string_view word) { return SameName(cell, word); });
+}
+
+// 1970-01-01 in days of a form; 0 if it does not count days.
+double DaysOf1970(TimeForm form) {
+  switch (form) {
+    case TimeForm::kSerial:
+      return 25569.0;
+    case TimeForm::kDateNumber:
+      return 719529.0;
+    case TimeForm::kJulian:
+      return 2440587.5;
+    case TimeForm::kModifiedJulian:
+      return 40587.0;
+    default:
+      return 0.0;
+  }
 }
 
 /// The names that `signal` may have in a header: "F_m3_h or F_t_h".
@@ -115,22 +132,45 @@ std::vector<std::string> RowOf(const LabelledSample& labelled,
 
 }  // namespace
 
+std::optional<std::string> Unflagged(std::string_view cell) {
+  if (cell.size() < 2 || (cell.back() != '?' && cell.back() != '*')) {
+    return std::nullopt;
+  }
+  cell.remove_suffix(1);
+  const auto last = static_cast<unsigned char>(cell.back());
+  const auto [number, unit] = SplitUnit(cell);
+  return unit.empty() && std::isdigit(last) != 0
+             ? std::optional(std::string(number))
+             : std::nullopt;
+}
+
 // Told apart by name and size, e.g. 6e8 .. 4e9 s since 1970 are 1989 to 2096:
 //
 //     t_s           elapsed seconds
 //     6e8 .. 4e9    seconds since 1970, and thousandths to billionths of them
+//     3.5e9 .. 4.3e9    seconds since 1904, 2014 to 2040
 //     1.22e17 .. 1.6e17    100 ns since 1601, 1987 to 2107
+//     6.2e17 .. 6.7e17     100 ns since year 1, 1965 to 2124
 //     3e4 .. 7e4    days of a spreadsheet, 1982 to 2091
+//     7.2e5 .. 7.7e5       days of MATLAB, 1971 to 2108
+//     2.44e6 .. 2.5e6      Julian days, 1968 to 2132
 //     else          elapsed, in seconds or the unit at the end of the name
 //
-// A whole number between 3e4 and 7e4 is rather a count of seconds than a
-// midnight, and so is any number in a column whose name ends in that unit.
+// A whole number of days is rather a count of seconds than a midnight, and so
+// is any number in a column whose name ends in that unit. Nobody has readings
+// of 2080 yet: what would be seconds since 1970 then counts from 1904.
 TimeUnit TimeUnitOf(std::string_view name, double first) {
   if (SameName(name, kTimeColumn)) {
     return {TimeForm::kElapsed, 1.0};
   }
   if (first > 1.22e17 && first < 1.6e17) {
     return {TimeForm::kFileTime, 1e-7};
+  }
+  if (first > 6.2e17 && first < 6.7e17) {
+    return {TimeForm::kTicks, 1e-7};
+  }
+  if (first > 3.5e9 && first < 4.3e9) {
+    return {TimeForm::kSince1904, 1.0};
   }
   for (const double scale : {1.0, 1e-3, 1e-6, 1e-9}) {
     if (first * scale > 6e8 && first * scale < 4e9) {
@@ -146,9 +186,19 @@ TimeUnit TimeUnitOf(std::string_view name, double first) {
       return {TimeForm::kElapsed, scale};
     }
   }
-  return {first > 3e4 && first < 7e4 && first != std::floor(first)
-              ? TimeForm::kSerial
-              : TimeForm::kElapsed,
+  const bool midnight = first == std::floor(first);
+  if (HasWord(PlainText(name), "mjd|modified julian") && first > 4e4 &&
+      first < 8e4) {
+    return {TimeForm::kModifiedJulian, 1.0};
+  }
+  if (first > 2.44e6 && first < 2.5e6 &&
+      (!midnight || HasWord(PlainText(name), "jd|julian"))) {
+    return {TimeForm::kJulian, 1.0};
+  }
+  return {midnight                         ? TimeForm::kElapsed
+          : first > 3e4 && first < 7e4     ? TimeForm::kSerial
+          : first > 7.2e5 && first < 7.7e5 ? TimeForm::kDateNumber
+                                           : TimeForm::kElapsed,
           1.0};
 }
 
@@ -232,9 +282,16 @@ std::optional<CsvRow> CsvReader::TakeLine(std::string_view line,
     return std::nullopt;
   }
   if (!pending_.empty() && rows_ > 0) {
+    if (header_again_) {
+      Refuse(
+          "another table begins here, with a header of its own; expected one "
+          "table, with a column for each signal, or with the tag in a column "
+          "of its own; try to export it so");
+    }
     throw DataError(pending_);
   }
   pending_.clear();
+  header_again_ = false;
   sample.seq = rows_++;
   if (!tag_column_) {
     for (const Conversion& c : conversions_) {
@@ -300,6 +357,7 @@ bool CsvReader::BeginsHeader(std::string_view line) {
 bool CsvReader::IsMarker() {
   const std::vector<std::string>& cells = record_.cells();
   if (cells.front() == header_cells_.front() && cells == header_cells_) {
+    header_again_ = true;
     return true;
   }
   const auto is_full = [](const std::string& cell) { return !cell.empty(); };
@@ -319,7 +377,11 @@ bool CsvReader::IsMarker() {
              return Parsed(c).has_value();
            });
   }
-  if (std::string_view("$*#[").find(cell.front()) != std::string_view::npos) {
+  // "(2700 rows)", "-----" below the names.
+  if (std::string_view("$*#[(").find(cell.front()) != std::string_view::npos ||
+      std::ranges::none_of(cell, [](unsigned char c) {
+        return std::isalnum(c) != 0 || c >= 0x80;
+      })) {
     ++markers_;
     return true;
   }
@@ -336,8 +398,8 @@ bool CsvReader::IsMarker() {
 
 // The cell in the unit of the file. Numbers come first, because nearly all
 // cells are; words for "no reading" come before all other forms of a number.
-std::optional<double> CsvReader::Reading(const Conversion& c) {
-  const std::string& cell = Cell(c.column);
+std::optional<double> CsvReader::Reading(const Conversion& c,
+                                         const std::string& cell) {
   const char decimal = options_.map.decimal;
   auto value = ParseNumber(cell, decimal == '\0' ? '.' : decimal);
   if (!value ? IsNoReading(cell, options_.map.no_reading)
@@ -358,15 +420,15 @@ std::optional<double> CsvReader::Reading(const Conversion& c) {
     value = c.mapping.offset + c.mapping.scale * *value;
   }
   if (!value) {
-    value = WithOwnUnit(c);
+    value = WithOwnUnit(c, cell);
   }
   return value ? value : Number(c.column);
 }
 
 // "11.1 t/h": the unit of the cell, which a dashboard may change from row to
 // row, instead of that of the map.
-std::optional<double> CsvReader::WithOwnUnit(const Conversion& c) const {
-  const std::string& cell = Cell(c.column);
+std::optional<double> CsvReader::WithOwnUnit(const Conversion& c,
+                                             const std::string& cell) const {
   const auto [number, unit] = SplitUnit(cell);
   const auto value = Parsed(number);
   if (!value || !IsUnit(unit)) {
@@ -393,10 +455,16 @@ std::optional<double> CsvReader::WithOwnUnit(const Conversion& c) const {
 
 void CsvReader::Convert(const Conversion& c, Sample& sample) {
   const Signal signal = c.mapping.signal;
-  const SignalQuality quality =
+  SignalQuality quality =
       c.quality ? QualityAt(*c.quality) : SignalQuality::kGood;
-  std::optional<double> value =
-      quality == SignalQuality::kBad ? std::nullopt : Reading(c);
+  const std::string& cell = Cell(c.column);
+  const auto unflagged = Unflagged(cell);
+  if (unflagged && quality == SignalQuality::kGood) {
+    quality = SignalQuality::kUncertain;
+  }
+  std::optional<double> value = quality == SignalQuality::kBad
+                                    ? std::nullopt
+                                    : Reading(c, unflagged ? *unflagged : cell);
   if (!value) {
     sample.quality[Index(signal)] = SignalQuality::kBad;
     return;
@@ -473,30 +541,39 @@ void CsvReader::Finish() const {
   }
 }
 
-// All names are compared although the first match would do, because a second
-// column of the same name makes the choice arbitrary.
+// Repeated names have numbers, because a choice of one of them by its name
+// alone would be arbitrary.
 std::optional<std::size_t> CsvReader::Column(std::string_view name) {
   std::optional<std::size_t> found;
   for (std::size_t i = 0; i < names_.size(); ++i) {
     if (SameName(names_[i], name)) {
-      if (found) {
-        Refuse("column " + Quoted(name) +
-               " occurs twice; expected each name once");
-      }
       found = i;
       used_[i] = true;
     }
+  }
+  const auto count = std::ranges::count_if(
+      header_cells_,
+      [&](const std::string& cell) { return SameName(cell, name); });
+  if (!found && count > 1) {
+    Refuse("column " + Quoted(name) +
+           " occurs twice; expected each name once; try " +
+           Quoted(std::string(name) + " (1)") + " or (2) in --map");
   }
   return found;
 }
 
 void CsvReader::TakeHeader() {
-  names_ = record_.cells();
-  header_cells_ = names_;
+  header_cells_ = record_.cells();
+  names_ = header_cells_;
+  while (options_.map.width > 0 && names_.size() > options_.map.width) {
+    header_.ignored_columns.push_back(names_.back());
+    names_.pop_back();
+  }
   header_left_ = std::max(options_.map.header_rows - 1, 0);
   for (std::size_t i = 0; i < names_.size(); ++i) {
     names_[i] = UnnamedAs(names_[i], i);
   }
+  NumberRepeated(names_);
   used_.assign(names_.size(), false);
   const ColumnMap& map = options_.map;
   static const std::vector<std::string> kTimes = {"t_s", "time", "timestamp",
@@ -525,7 +602,7 @@ void CsvReader::TakeHeader() {
   // another meaning is then used already, and AddByContract() leaves it alone.
   AddMapped();
   for (std::size_t i = 0; i < names_.size(); ++i) {
-    if (!used_[i] && !AddByContract(i, names_[i]) &&
+    if (!used_[i] && !AddByContract(i, header_cells_[i]) &&
         !header_cells_[i].empty()) {
       header_.ignored_columns.push_back(names_[i]);
     }
@@ -579,7 +656,7 @@ void CsvReader::AddQualities() {
 
 void CsvReader::AddSignal(std::size_t column, const ColumnMapping& mapping) {
   if ((header_.signals & MaskOf(mapping.signal)) != 0) {
-    Refuse("column " + Quoted(names_[column]) + ": signal " +
+    Refuse("column " + Quoted(mapping.column) + ": signal " +
            std::string(SignalName(mapping.signal)) +
            " occurs twice; expected once");
   }
@@ -690,7 +767,11 @@ void CsvReader::CheckHeader() const {
   require(strength_column_ || !fault_column_, kStrengthColumn);
   if (!missing.empty()) {
     Refuse("missing column " + JoinText(missing) + "; the header is " +
-           Quoted(Listed(names_)) + kSniff);
+           Quoted(Listed(names_)) +
+           (map.columns.empty()
+                ? kSniff
+                : "; try the columns under [signal.CV], [signal.X] and "
+                  "[signal.F] of --map, by their names in the header"));
   }
 }
 
@@ -807,7 +888,8 @@ void CsvReader::FindTimeForm(const std::string& cell) {
   const std::string& name = names_[*time_column_];
   const auto number =
       ParseNumber(cell, map.decimal == '\0' ? '.' : map.decimal);
-  if (!number) {
+  // "20260310090000" is both.
+  if (!number || ScanTime(cell, map.date_order)) {
     time_form_ = TimeForm::kText;
     return;
   }
@@ -827,10 +909,17 @@ std::string CsvReader::NoTime(const std::string& cell) const {
     return ScanTime(cell, order).has_value();
   };
   const bool slashed = in(DateOrder::kDayFirst) || in(DateOrder::kMonthFirst);
+  const std::size_t word = cell.find_last_of(' ');
+  const bool zoned =
+      word != std::string::npos && word + 1 < cell.size() &&
+      std::isalpha(static_cast<unsigned char>(cell[word + 1])) != 0 &&
+      ScanTime(cell.substr(0, word)).has_value();
   return options_.source + ':' + std::to_string(line_) + ": column " +
          Quoted(names_[*time_column_]) + ": " + Quoted(cell) +
          (slashed ? " may be day/month or month/day; try date = \"d/m/y\" "
                     "or \"m/d/y\" under [time] of --map"
+          : zoned ? " has a zone that is not known, or that several countries "
+                    "use for different times; try to remove it, and --zone"
                   : " is not a time; expected 2026-11-20 14:56:11.5, "
                     "20.11.2026 14:56:11,5 or the like; try unit under "
                     "[time] of --map");
@@ -841,20 +930,27 @@ std::optional<std::int64_t> CsvReader::UtcOf(const std::string& cell) {
   std::optional<CivilTime> time;
   if (time_form_ == TimeForm::kText) {
     time = ScanTime(cell, options_.map.date_order);
-  } else if (const double days = Number(*time_column_);
-             days > 2.0 && days < 130000.0) {
+  } else if (const double days = Number(*time_column_) - DaysOf1970(time_form_);
+             days > -25567.0 && days < 104431.0) {
     // Excel shows times to the millisecond; further digits are rounding
     // errors.
-    const auto ms = std::llround((days - kSerialOf1970) * kSecondsPerDay * 1e3);
+    const auto ms = std::llround(days * kSecondsPerDay * 1e3);
     // Rounded towards minus infinity, so that the fraction is not negative
     // before 1970 either.
     const std::time_t seconds = (ms - ((ms % 1000) + 1000) % 1000) / 1000;
     time.emplace();
     gmtime_r(&seconds, &time->fields);
     time->fraction_ns = (ms - seconds * 1000) * 1'000'000;
+    if (time_form_ == TimeForm::kJulian ||
+        time_form_ == TimeForm::kModifiedJulian) {
+      time->offset_s = 0;
+    }
   }
   if (!time && options_.scan) {
     ++markers_;  // Perhaps of a tag that is not used.
+    if (rows_ == 0 && pending_.empty()) {
+      pending_ = NoTime(cell);
+    }
     return std::nullopt;
   }
   if (!time) {
@@ -897,15 +993,20 @@ bool CsvReader::TakeTime(CsvRow& row) {
   std::int64_t& stamp_ns = row.labelled.sample.stamp_ns;
   // Nanoseconds since 1970 have more digits than a double.
   const auto count = ParseWhole<std::int64_t>(cell);
-  if (time_form_ == TimeForm::kFileTime) {
-    if (!count || *count < kFileTimeOf1970 ||
-        *count - kFileTimeOf1970 > kMaxFileTime) {
+  if (time_form_ == TimeForm::kFileTime || time_form_ == TimeForm::kTicks) {
+    const std::int64_t begin =
+        time_form_ == TimeForm::kTicks ? kTicksOf1970 : kFileTimeOf1970;
+    if (!count || *count < begin || *count - begin > kMaxFileTime) {
       throw DataError(NoTime(cell));
     }
-    stamp_ns = (*count - kFileTimeOf1970) * 100;
+    stamp_ns = (*count - begin) * 100;
   } else if (time_form_ == TimeForm::kElapsed ||
-             time_form_ == TimeForm::kUnix) {
+             time_form_ == TimeForm::kUnix ||
+             time_form_ == TimeForm::kSince1904) {
     row.t_s = Number(*time_column_) * time_scale_;
+    if (time_form_ == TimeForm::kSince1904) {
+      row.t_s -= static_cast<double>(k1970Since1904);
+    }
     if (std::abs(row.t_s) > kMaxSeconds) {
       Refuse("column " + Quoted(names_[*time_column_]) + ": time " +
              NumberText(row.t_s) +

@@ -71,11 +71,16 @@ struct ColumnMapping {
 /// Format of the time column.
 enum class TimeForm {
   kFindOut,
-  kElapsed,   ///< Seconds (after scaling) from CsvOptions::start_ns.
-  kUnix,      ///< Seconds (after scaling) since 1970.
-  kFileTime,  ///< 100 ns since 1601-01-01.
-  kSerial,    ///< Days of a spreadsheet, 25569 being 1970-01-01, in local time.
-  kText,      ///< As ScanTime() reads it.
+  kElapsed,     ///< Seconds (after scaling) from CsvOptions::start_ns.
+  kUnix,        ///< Seconds (after scaling) since 1970.
+  kFileTime,    ///< 100 ns since 1601-01-01.
+  kTicks,       ///< 100 ns since 0001-01-01, as .NET counts.
+  kSince1904,   ///< Seconds since 1904-01-01, as LabVIEW counts.
+  kSerial,      ///< Days of a spreadsheet, 25569 being 1970-01-01, local time.
+  kDateNumber,  ///< Days of MATLAB, 719529 being 1970-01-01, local time.
+  kJulian,      ///< Julian days, 2440587.5 being 1970-01-01, UTC.
+  kModifiedJulian,  ///< Julian days less 2400000.5, UTC.
+  kText,            ///< As ScanTime() reads it.
 };
 
 /// Form of a time column, and the unit of its numbers [s].
@@ -111,7 +116,9 @@ struct ColumnMap {
   char decimal{'\0'};    ///< NUL: detected.
   /// Groups digits, beside blanks and '; NUL: detected.
   char thousands{'\0'};
-  int skip{0};         ///< Lines in front of the names; 0: detected.
+  int skip{0};  ///< Lines in front of the names; 0: detected.
+  /// Found by FindLayout(): cells of the rows, if the header has more.
+  std::size_t width{0};
   int header_rows{0};  ///< Names, then units, ...; 0: detected.
   std::vector<std::string> no_reading;  ///< Words beside the usual ones.
   std::string time_column;   ///< Empty: t_s, time, timestamp or datetime.
@@ -271,8 +278,10 @@ class CsvReader {
     return record_.cells()[column];
   }
   /// The value in the unit of the file; nothing if there is no reading.
-  std::optional<double> Reading(const Conversion& conversion);
-  std::optional<double> WithOwnUnit(const Conversion& conversion) const;
+  std::optional<double> Reading(const Conversion& conversion,
+                                const std::string& cell);
+  std::optional<double> WithOwnUnit(const Conversion& conversion,
+                                    const std::string& cell) const;
   std::optional<double> Parsed(std::string_view cell) const;
   double Number(std::size_t column) const;
   void Convert(const Conversion& conversion, Sample& sample);
@@ -312,6 +321,7 @@ class CsvReader {
   std::uint64_t rows_{0};
   std::int64_t line_{0};
   int header_left_{0};
+  bool header_again_{false};  // Behind the row of pending_.
   // Marker rows that were left out, and what is wrong with the last of them if
   // more rows follow.
   std::size_t markers_{0};
@@ -336,6 +346,10 @@ CsvTable ReadCsvFile(const std::filesystem::path& path,
 
 /// The form of a time column, by its name and its first cell, a number.
 TimeUnit TimeUnitOf(std::string_view name, double first);
+
+/// "12.3" of "12.3?" and "12.3*", which historians write for a reading that is
+/// questionable or substituted; nothing for other cells.
+std::optional<std::string> Unflagged(std::string_view cell);
 
 /// Lines of `text`, without their breaks.
 std::vector<std::string_view> LinesOf(std::string_view text);

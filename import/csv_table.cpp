@@ -13,6 +13,7 @@
 #include "base/usual_period.h"
 #include "import/csv.h"
 #include "import/layout.h"
+#include "import/local_sense.h"
 
 // Whole tables: properties that only all rows reveal, i.e. the form (layout.h),
 // the time grid, and what the readings are like.
@@ -81,6 +82,13 @@ double MedianStep(const std::vector<double>& times_s) {
 }
 
 namespace {
+
+bool Repeats(const CsvRow& a, const CsvRow& b) {
+  const Sample& before = a.labelled.sample;
+  const Sample& after = b.labelled.sample;
+  return before.present == after.present && before.values == after.values &&
+         before.quality == after.quality && before.mode == after.mode;
+}
 
 void Drop(Signal signal, Sample& sample) {
   sample.present = static_cast<SignalMask>(sample.present & ~MaskOf(signal));
@@ -203,8 +211,10 @@ CsvTable TableReader::Read() {
 void TableReader::TakeRows() {
   std::size_t repeated = 0;
   ForEachRow(lines_, reader_, [&](CsvRow&& row) {
-    if (options().skip_repeats && !rows_.empty() &&
-        rows_.back().labelled.sample.stamp_ns == row.labelled.sample.stamp_ns) {
+    if (!rows_.empty() &&
+        rows_.back().labelled.sample.stamp_ns == row.labelled.sample.stamp_ns &&
+        (options().skip_repeats ||
+         (!options().map.long_table && Repeats(rows_.back(), row)))) {
       ++repeated;
     } else {
       rows_.push_back(std::move(row));
@@ -664,20 +674,20 @@ void TableReader::CheckValues() {
 // A flow that falls as the valve opens, or that runs against the pressure,
 // indicates a wrong sense or swapped columns.
 void TableReader::CheckPair(Signal signal) {
-  CorrelationSums sums;
+  LocalSense sense;
   std::size_t count = 0;
   std::size_t against = 0;
   for (const CsvRow& row : rows_) {
     const Sample& s = row.labelled.sample;
     if (s.Has(Signal::kX) && s.Has(Signal::kF)) {
-      sums.Add(s[Signal::kX], s[Signal::kF]);
+      sense.Add(s[Signal::kX], s[Signal::kF]);
     }
     if (s.Has(Signal::kP1) && s.Has(Signal::kP2)) {
       ++count;
       against += s[Signal::kP2] > s[Signal::kP1] ? 1U : 0U;
     }
   }
-  if (signal == Signal::kX && rows_.size() > 20 && sums.Correlation() > 0.5) {
+  if (signal == Signal::kX && rows_.size() > 20 && sense.Value() > 0.5) {
     table_.notes.push_back(
         "F rises with X, which counts in % of closing: is it % of opening? "
         "sense = \"opening\" under [signal.X] and [signal.CV] of --map says "

@@ -12,6 +12,7 @@ namespace fdi::importer {
 namespace {
 
 using Cells = std::vector<std::string>;
+using WordCounts = std::map<std::string, std::size_t>;
 
 /// Rows that the form of a table is found from; signs and words come from all.
 constexpr std::size_t kSampleRows = 200;
@@ -59,6 +60,8 @@ bool IsClock(std::string_view cell) {
 
 // Before the decimal sign is known: with either sign, and with a unit behind.
 std::optional<double> AnyNumber(std::string_view cell) {
+  const auto unflagged = Unflagged(cell);
+  cell = unflagged ? std::string_view(*unflagged) : cell;
   for (const char decimal : {'.', ','}) {
     if (const auto value = ParseNumber(cell, decimal)) {
       return value;
@@ -112,6 +115,7 @@ struct RowShape {
   explicit RowShape(const std::vector<Record>& records);
   bool IsData(const Record& record) const;
   bool IsHeader(const Record& record) const;
+  bool NamesColumns(const Cells& cells) const;
 
   std::size_t width{0};  ///< Of most rows.
   std::vector<bool> holds_values;
@@ -172,6 +176,7 @@ class LayoutFinder {
   void TakeNames(std::span<const Record> header, std::size_t at);
   void TakeSampleRow(const Record& record);
   void FindTimeColumn();
+  void CheckTimeColumns() const;
   void CountWords();
   void FindDecimal();
   Signs FindSigns() const;
@@ -180,6 +185,8 @@ class LayoutFinder {
                                const std::string& reason) const;
   void FindTags();
   void FindQualities();
+  bool HoldsWords(const std::string& name) const;
+  void ChooseGood(const std::string& name, const WordCounts& words);
   void FindDateOrder();
   void FindDirection();
   template <typename Take>
@@ -267,12 +274,41 @@ bool RowShape::IsData(const Record& record) const {
   return full > 0 && 2 * fits > full;
 }
 
+// A name above every column of values but one, which the time may be, most of
+// them no values themselves, and of three or more not mostly the same:
+// "Delta_X;1.0;1.0" and "X_Dimension;Time;Time;Time" name no columns.
+bool RowShape::NamesColumns(const Cells& cells) const {
+  std::size_t columns = 0;
+  std::size_t named = 0;
+  std::size_t values = 0;
+  std::size_t full = 0;
+  std::map<std::string, std::size_t> same;
+  for (std::size_t c = 0; c < width; ++c) {
+    const std::string cell = c < cells.size() ? cells[c] : std::string();
+    columns += holds_values[c] ? 1U : 0U;
+    if (!cell.empty()) {
+      named += holds_values[c] ? 1U : 0U;
+      values += holds_values[c] && IsValue(cell) ? 1U : 0U;
+      ++same[cell];
+      ++full;
+    }
+  }
+  const std::size_t most =
+      same.empty() ? 0
+                   : std::ranges::max_element(same, {}, [](const auto& entry) {
+                       return entry.second;
+                     })->second;
+  return named + 1 >= columns && 2 * values < std::max<std::size_t>(named, 1) &&
+         (most < 3 || 2 * most <= full);
+}
+
 bool RowShape::IsHeader(const Record& record) const {
   const auto full = static_cast<std::size_t>(std::ranges::count_if(
       record.cells, [](const auto& cell) { return !cell.empty(); }));
   const auto units =
       static_cast<std::size_t>(std::ranges::count_if(record.cells, IsUnitCell));
-  return 2 * full >= width && record.cells.size() <= width && 2 * units < full;
+  return 2 * full >= width && 2 * units < full &&
+         (width == 1 || record.cells.size() > 1) && NamesColumns(record.cells);
 }
 
 // The header ends where the values begin: in the columns that hold numbers and
@@ -321,6 +357,10 @@ bool LayoutFinder::FindHeader() {
            std::min<std::ptrdiff_t>(map().header_rows, records.end() - names);
   }
   map().header_rows = static_cast<int>(data - names);
+  if (names->cells.size() > shape.width) {
+    map().width = shape.width;
+    names->cells.resize(shape.width);
+  }
   const auto at = static_cast<std::size_t>(names - records.begin());
   const auto rows = static_cast<std::size_t>(data - records.begin());
   TakeNames(std::span(records).first(rows), at);
@@ -342,10 +382,19 @@ void LayoutFinder::TakeNames(std::span<const Record> header, std::size_t at) {
   layout_.about.resize(width);
   for (std::size_t c = 0; c < width; ++c) {
     layout_.names.push_back(UnnamedAs(header[at].cells[c], c));
-    for (std::size_t row = 0; row < header.size(); ++row) {
-      if (row != at && header[row].cells.size() == width) {
-        layout_.about[c] += '\n' + header[row].cells[c];
-      }
+  }
+  NumberRepeated(layout_.names);
+  for (std::size_t row = 0; row < header.size(); ++row) {
+    if (row == at || header[row].cells.size() != width) {
+      continue;
+    }
+    // A cell above the names that spans several columns is written in the first
+    // of them.
+    std::string cell;
+    for (std::size_t c = 0; c < width; ++c) {
+      const std::string& own = header[row].cells[c];
+      cell = row < at && own.empty() ? cell : own;
+      layout_.about[c] += '\n' + cell;
     }
   }
 }
@@ -380,6 +429,7 @@ void LayoutFinder::FindTimeColumn() {
   time_ = At(map().time_column);
   if (!time_ && map().time_column.empty()) {
     time_ = At(std::string(kTimeColumn));
+    map().time_column = time_ ? Name(*time_) : map().time_column;
   }
   int best = 0;
   for (std::size_t c = 0; c < columns_.size() && !time_; ++c) {
@@ -403,8 +453,10 @@ void LayoutFinder::FindTimeColumn() {
           column.values.size() > 1 &&
           (backwards == 0 || backwards + 1 == column.values.size());
       score =
-          form == TimeForm::kUnix || form == TimeForm::kFileTime ? 30
-          : named                                                ? 20
+          form == TimeForm::kUnix || form == TimeForm::kFileTime ||
+                  form == TimeForm::kTicks || form == TimeForm::kSince1904
+              ? 30
+          : named ? 20
           : grows && c == 0 &&
                   std::adjacent_find(column.values.begin(),
                                      column.values.end()) == column.values.end()
@@ -419,6 +471,7 @@ void LayoutFinder::FindTimeColumn() {
     }
   }
   time_ = time_ ? time_ : At(map().time_column);
+  CheckTimeColumns();
   clock_ = At(map().clock_column);
   if (!time_ || clock_ || !map().clock_column.empty() || rows_.empty() ||
       rows_.front().cells[*time_].find(':') != std::string::npos ||
@@ -430,6 +483,32 @@ void LayoutFinder::FindTimeColumn() {
       clock_ = c;
       map().clock_column = Name(c);
     }
+  }
+}
+
+// Trends have a column of times beside each value. If they differ, the rows are
+// no samples.
+void LayoutFinder::CheckTimeColumns() const {
+  const auto stem = [](const std::string& name) {
+    return name.substr(0, name.find(" ("));
+  };
+  for (std::size_t c = 0; time_ && c < columns_.size(); ++c) {
+    if (c == *time_ || !columns_[c].Mostly(columns_[c].dates) ||
+        !columns_[*time_].Mostly(columns_[*time_].dates) ||
+        !SameName(stem(Name(c)), stem(Name(*time_)))) {
+      continue;
+    }
+    ForEachRow([&](std::size_t line, const Cells& cells) {
+      if (!cells[c].empty() && cells[c] != cells[*time_]) {
+        throw DataError(
+            source_ + ":" + std::to_string(line) + ": column " +
+            Quoted(Name(c)) + " is at " + Quoted(cells[c]) + " and column " +
+            Quoted(Name(*time_)) + " at " + Quoted(cells[*time_]) +
+            ": each value has a time of its own; expected one time for a row; "
+            "try to export sampled (interpolated) values, or one reading in a "
+            "row: time,tag,value");
+      }
+    });
   }
 }
 
@@ -558,8 +637,14 @@ void LayoutFinder::FindQualities() {
     QualityCode code = QualityCodeOf(Name(c), words);
     map().quality_codes[Name(c)] = code;
     if (map().long_table) {
-      if (map().long_table->quality.empty()) {
-        map().long_table->quality = Name(c);
+      // One whose meaning is known comes before one that needs a choice.
+      std::string& chosen = map().long_table->quality;
+      const auto known = map().quality_codes.find(chosen);
+      if (chosen.empty() ||
+          (!stated && code != QualityCode::kUnknown &&
+           known != map().quality_codes.end() &&
+           known->second == QualityCode::kUnknown && !HoldsWords(chosen))) {
+        chosen = Name(c);
       }
     } else {
       for (const std::string& name : values) {
@@ -570,17 +655,36 @@ void LayoutFinder::FindQualities() {
     // Numbers that two systems read differently: most readings of a plant are
     // good.
     if (choose_ && code == QualityCode::kUnknown &&
-        map().quality.good.empty()) {
-      const auto usual = std::ranges::max_element(
-          words, {}, [](const auto& word) { return word.second; });
-      if (usual != words.end() && !usual->first.empty() &&
-          !QualityOf(usual->first, {}, code)) {
-        map().quality.good = {usual->first};
-        layout_.choices["good"] =
-            Quoted(usual->first) + " of column " + Name(c) +
-            " is the most usual; the numbers may also mean the opposite";
-      }
+        map().quality.good.empty() && !map().long_table) {
+      ChooseGood(Name(c), words);
     }
+  }
+  if (choose_ && map().long_table && map().quality.good.empty()) {
+    if (const auto c = At(map().long_table->quality);
+        c && map().quality_codes[Name(*c)] == QualityCode::kUnknown) {
+      ChooseGood(Name(*c), columns_[*c].words);
+    }
+  }
+}
+
+// Whether a column of quality has a word that is known.
+bool LayoutFinder::HoldsWords(const std::string& name) const {
+  const auto c = At(name);
+  return c && std::ranges::any_of(columns_[*c].words, [](const auto& word) {
+           return QualityOf(word.first, {}, QualityCode::kUnknown).has_value();
+         });
+}
+
+void LayoutFinder::ChooseGood(const std::string& name,
+                              const WordCounts& words) {
+  const auto usual = std::ranges::max_element(
+      words, {}, [](const auto& word) { return word.second; });
+  if (usual != words.end() && !usual->first.empty() &&
+      !QualityOf(usual->first, {}, QualityCode::kUnknown)) {
+    map().quality.good = {usual->first};
+    layout_.choices["good"] =
+        Quoted(usual->first) + " of column " + name +
+        " is the most usual; the numbers may also mean the opposite";
   }
 }
 
@@ -713,6 +817,7 @@ void LayoutFinder::FindDateOrder() {
     }
     ++rows;
     american = american || HasWord(PlainText(cell), "am|pm") ||
+               (clock_ && HasWord(PlainText(cells[*clock_]), "am|pm")) ||
                (cell.size() > 1 && cell[1] == '/');
     for (std::size_t i = 0; i < 3; ++i) {
       if (const auto time = ScanTime(cell, kOrders[i])) {
@@ -778,6 +883,21 @@ void LayoutFinder::FindDirection() {
 }
 
 }  // namespace
+
+void NumberRepeated(std::vector<std::string>& names) {
+  const std::vector<std::string> before = names;
+  for (std::size_t c = 0; c < names.size(); ++c) {
+    const auto same = [&](const std::string& name) {
+      return SameName(name, before[c]);
+    };
+    const auto self = before.begin() + static_cast<std::ptrdiff_t>(c);
+    const auto number = std::count_if(before.begin(), self, same) + 1;
+    if (number > 1 ||
+        std::find_if(self + 1, before.end(), same) != before.end()) {
+      names[c] += " (" + std::to_string(number) + ")";
+    }
+  }
+}
 
 std::string UnnamedAs(const std::string& cell, std::size_t index) {
   return cell.empty() ? "column " + std::to_string(index + 1) : cell;

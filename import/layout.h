@@ -32,6 +32,9 @@ struct Layout {
 Layout FindLayout(std::span<const std::string_view> lines, ColumnMap map,
                   const std::string& source, bool choose);
 
+/// Names that occur more than once get numbers: "Value (1)", "Value (2)".
+void NumberRepeated(std::vector<std::string>& names);
+
 /// The name of column `index` if its cell in the header is empty: "column 3".
 std::string UnnamedAs(const std::string& cell, std::size_t index);
 

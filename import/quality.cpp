@@ -1,6 +1,7 @@
 #include "import/quality.h"
 
 #include <algorithm>
+#include <cctype>
 #include <cstdint>
 
 #include "base/csv_cells.h"
@@ -10,28 +11,33 @@ namespace fdi::importer {
 namespace {
 
 // Whole cells, in plain text (PlainText()); a bar before and behind each.
+constexpr std::string_view kConfidenceWords = "confid|konfid|confianza";
 constexpr std::string_view kGoodWords =
     "|g|ok|okay|raw|valid|normal|gut|bon|bueno|dobry|0x00000000|";
 constexpr std::string_view kUncertainWords =
-    "|u|questionable|substituted|interpolated|suspect|estimated|doubtful|"
-    "fraglich|unsicher|douteux|dudoso|niepewny|";
+    "|u|questionable|substituted|interpolated|suspect|estimated|doubtful|fair|"
+    "poor|fraglich|unsicher|ersatzwert|douteux|dudoso|dubbio|niepewny|";
 constexpr std::string_view kBadWords =
     "|b|failed|failure|not connected|not good|stale|out of service|"
-    "schlecht|ungultig|mauvais|malo|zly|";
+    "schlecht|ungultig|gestort|mauvais|invalide|malo|cattivo|zly|";
 // What historians, OPC clients and spreadsheets write where there is no value.
-// The words are complete cells, and "-" and "*" are no numbers, so no reading
-// is lost.
+// The words are complete cells, as Bare() leaves them, so no reading is lost.
 constexpr std::string_view kNoReading =
-    "|nan|-nan|n/a|na|#n/a|#na|#value!|#ref!|#div/0!|#name?|#num!|#null!|"
-    "null|none|nil|bad|bad input|bad value|bad quality|bad data|i/o timeout|"
-    "io timeout|timeout|no data|no value|no sample|not connect|no result|"
-    "pt created|shutdown|comm fail|comm error|configure|scan off|"
+    "|nan|-nan|nan(ind)|-nan(ind)|"
+    "n/a|na|#n/a|#na|#value!|#ref!|#div/0!|#name?|#num!|#null!|n/v|nv|"
+    "null|none|nil|nat|\\n|bad|i/o timeout|io timeout|timeout|no data|nodata|"
+    "no value|no sample|not connect|no result|no reading|empty|unknown|"
+    "pt created|shutdown|comm fail|comm error|comm loss|configure|scan off|"
     "scan timeout|calc failed|under range|over range|underrange|overrange|"
-    "intf shut|offline|invalid|error|fault|missing|-|--|---|?|*|...|"
-    "1.#qnan|-1.#ind|inp outrange|inpoutrange|out of range|outofrange|"
-    "set to bad|calc off|calc timeout|trace off|digital set|arc off-line|"
-    "intf shutdown|not available|unavailable|no good data|no good data for "
-    "calculation|coercion failed|undefined|<null>|(null)|n.a.|k.a.|";
+    "intf shut|offline|invalid|invalid float|error|err|fault|missing|undef|"
+    "1.#qnan|-1.#qnan|1.#ind|-1.#ind|inp outrange|inpoutrange|"
+    "out of range|outofrange|set to bad|calc off|calc timeout|trace off|"
+    "digital set|digital state|arc off-line|intf shutdown|not available|"
+    "unavailable|disconnected|device failure|sensor failure|equip fail|"
+    "access denied|no good data|no good data for calculation|snap|"
+    "coercion failed|undefined|n.a.|k.a.|kein wert|keine daten|storung|fehler|"
+    "pas de donnees|erreur|defaut|sin datos|fallo|nessun dato|errore|guasto|"
+    "brak|brak danych|blad|awaria|";
 
 bool IsOneOf(const std::string& plain, std::string_view words) {
   // A text with a bar of its own could match across two words.
@@ -39,13 +45,37 @@ bool IsOneOf(const std::string& plain, std::string_view words) {
          words.find('|' + plain + '|') != std::string_view::npos;
 }
 
+// The words of a cell: "No Data" of "<No_Data>", "No Good Data" of
+// "[-11059] No Good Data".
+std::string Bare(std::string_view cell) {
+  std::string plain = PlainText(cell);
+  std::ranges::replace(plain, '_', ' ');
+  if (plain.starts_with('[') && plain.find(']') + 1 < plain.size()) {
+    plain.erase(0, plain.find(']') + 1);
+  }
+  constexpr std::string_view kAround = "<>[]{}\"' ";
+  const std::size_t begin = plain.find_first_not_of(kAround);
+  if (begin == std::string::npos) {
+    return {};
+  }
+  plain = plain.substr(begin, plain.find_last_not_of(kAround) + 1 - begin);
+  return plain.size() > 2 && plain.front() == '(' && plain.back() == ')'
+             ? plain.substr(1, plain.size() - 2)
+             : plain;
+}
+
 bool IsListed(std::string_view cell, const std::vector<std::string>& words) {
   return std::ranges::any_of(
       words, [&](const std::string& word) { return SameName(word, cell); });
 }
 
-// 0, 192, 0x80000000; nothing for other text.
+// 0, 192, 192.0, 0x80000000; nothing for other text.
 std::optional<std::uint32_t> CodeOf(std::string_view cell) {
+  if (const std::size_t point = cell.find('.');
+      point != std::string_view::npos && point + 1 < cell.size() &&
+      cell.find_first_not_of('0', point + 1) == std::string_view::npos) {
+    cell = cell.substr(0, point);
+  }
   const bool hex = cell.starts_with("0x") || cell.starts_with("0X");
   cell.remove_prefix(hex ? 2 : 0);
   return ParseWhole<std::uint32_t>(cell, hex ? 16 : 10);
@@ -65,8 +95,18 @@ bool HasWord(std::string_view text, std::string_view words) {
 }
 
 bool IsNoReading(std::string_view cell, const std::vector<std::string>& more) {
-  return cell.empty() || IsOneOf(PlainText(cell), kNoReading) ||
-         IsListed(cell, more);
+  if (cell.empty() || IsListed(cell, more)) {
+    return true;
+  }
+  const std::string bare = Bare(cell);
+  // "---", "*****", "--.-"; not "%", which may be a unit below a name.
+  const bool signs =
+      cell.find_first_not_of("-*?.#_=~!") == std::string_view::npos;
+  return signs || IsOneOf(bare, kNoReading) || IsOneOf(bare, kUncertainWords) ||
+         IsOneOf(bare, kBadWords) ||
+         (bare.starts_with("bad") && bare.size() > 3 &&
+          std::isalpha(static_cast<unsigned char>(bare[3])) == 0) ||
+         bare.starts_with("bad input");
 }
 
 // What the map lists comes first. "Good, Non-specific", "GoodNonCascade" and
@@ -91,7 +131,7 @@ std::optional<SignalQuality> QualityOf(std::string_view cell,
     return SignalQuality::kUncertain;
   }
   if (plain.starts_with("bad") || IsOneOf(plain, kBadWords) ||
-      (!cell.empty() && IsOneOf(plain, kNoReading))) {
+      (!cell.empty() && IsOneOf(Bare(cell), kNoReading))) {
     return SignalQuality::kBad;
   }
   auto number = CodeOf(cell);
@@ -119,6 +159,11 @@ std::optional<SignalQuality> QualityOf(std::string_view cell,
                              : SignalQuality::kBad;
     case QualityCode::kOpcUa:
       return kGrade[std::min(*number >> 30U, 2U)];
+    case QualityCode::kConfidence:
+      return *number > 100    ? std::nullopt
+             : *number == 100 ? std::optional(SignalQuality::kGood)
+             : *number > 0    ? std::optional(SignalQuality::kUncertain)
+                              : std::optional(SignalQuality::kBad);
     case QualityCode::kGrades:
       return *number % 4 < 3 && *number < 7 ? std::optional(kGrade[*number % 4])
                                             : std::nullopt;
@@ -141,6 +186,9 @@ QualityCode QualityCodeOf(std::string_view column,
   const bool ill = HasWord(
       plain, "quest|bad|invalid|ungultig|subst|err|fail|fault|suspect|stale");
   const bool well = !ill && HasWord(plain, "valid|good|ok|gultig|gut");
+  if (HasWord(plain, kConfidenceWords)) {
+    return QualityCode::kConfidence;
+  }
   bool all_grades = true;
   bool beyond_one = false;
   std::uint32_t highest = 0;
@@ -168,6 +216,8 @@ bool IsQualityColumn(std::string_view column,
                      const std::map<std::string, std::size_t>& cells) {
   std::size_t words = 0;
   std::size_t codes = 0;
+  std::size_t unknown = 0;
+  std::size_t filled = 0;
   for (const auto& [cell, count] : cells) {
     const std::string plain = PlainText(cell);
     if (CodeOf(cell) || plain == "true" || plain == "false") {
@@ -176,18 +226,26 @@ bool IsQualityColumn(std::string_view column,
       // A word that may also stand for a value tells nothing by itself.
       words += !IsNoReading(cell) || plain.starts_with("bad") ? 1U : 0U;
     } else if (!cell.empty()) {
-      return HasWord(PlainText(column), "qual|validity");
+      unknown += count;
     }
+    filled += cell.empty() ? 0 : count;
   }
+  // A rare word that is not known is refused later, by its name.
   const std::string plain = PlainText(column);
+  if (unknown > 0) {
+    return HasWord(plain, "qual|validity") ||
+           (words > 0 && 10 * unknown <= filled);
+  }
   const bool named =
       HasWord(
           plain,
           "qual|status|valid|good|quest|subst|isbad|gultig|jakosc|calidad") ||
-      plain.ends_with(".st") || plain.ends_with("_st") ||
-      plain.ends_with(" st");
-  return words > 0 ? codes == 0 || named
-                   : codes > 0 && named && cells.size() <= 16;
+      HasWord(plain, kConfidenceWords) || plain.ends_with(".st") ||
+      plain.ends_with("_st") || plain.ends_with(" st");
+  return words > 0
+             ? codes == 0 || named
+             : codes > 0 && named &&
+                   (cells.size() <= 16 || HasWord(plain, kConfidenceWords));
 }
 
 }  // namespace fdi::importer

@@ -26,6 +26,7 @@ enum class QualityCode {
   kGrades,      ///< 0 good, 1 suspect, 2 bad; 4..6 the same, but edited.
   kOneIsGood,   ///< 1 or true good, 0 or false bad: "Validity", "IsGood".
   kZeroIsGood,  ///< 0 or false good, 1 or true bad: "Questionable", "IsBad".
+  kConfidence,  ///< 100 good, 0 bad, uncertain between: "Confidence".
 };
 
 /// The quality that `cell` states; nothing if that is not known.
@@ -44,8 +45,8 @@ QualityCode QualityCodeOf(std::string_view column,
 bool IsQualityColumn(std::string_view column,
                      const std::map<std::string, std::size_t>& cells);
 
-/// Whether a cell means "no reading": empty, NaN, Bad, #N/A, ..., or one of
-/// `more`.
+/// Whether a cell means "no reading": empty, NaN, Bad, #N/A, "<No Data>", signs
+/// alone, ..., or one of `more`.
 bool IsNoReading(std::string_view cell,
                  const std::vector<std::string>& more = {});
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdio>
 #include <map>
+#include <set>
 #include <sstream>
 #include <utility>
 
@@ -14,6 +15,7 @@
 #include "base/text.h"
 #include "base/usual_period.h"
 #include "import/layout.h"
+#include "import/local_sense.h"
 #include "import/tag_map.h"
 
 namespace fdi::importer {
@@ -33,6 +35,7 @@ enum class Role {
   kSetpoint,
   kLevel,
   kValve,
+  kOther,  ///< No signal: a pressure difference, a speed, a limit of an alarm.
 };
 
 struct RoleWords {
@@ -41,41 +44,61 @@ struct RoleWords {
   std::string_view tokens;  ///< Whole parts of it, with or without the number.
 };
 
-// English, German, French, Spanish, Polish. The order settles names with
-// several words: a "flow setpoint" is a setpoint, a "position output" a
+// English, German, French, Spanish, Italian, Polish. The order settles names
+// with several words: a "flow setpoint" is a setpoint, a "position output" a
 // command, a "supply pressure" no P1.
 constexpr RoleWords kRoleWords[] = {
+    {Role::kOther,
+     "differential|delta p|differenzdruck|druckdifferenz|perte de charge|"
+     "roznica cisn|speed|drehzahl|predkosc|obroty|vibrat|schwing|torque|"
+     "drehmoment|totali|counter|zahlerstand|licznik|alarm|deviation|abweichung|"
+     "density|dichte|viscos|conductiv|leitfahigkeit|motorstrom|motor current|"
+     "leistung",
+     "|dp|pdt|pdi|pdic|dpt|st|si|sic|jt|vt|power|dev|err|hi|hh|lo|ll|hihi|lolo|"
+     "hlim|llim|alm|"},
     {Role::kSetpoint,
      "setpoint|set point|sollwert|consigne|consigna|zadan|fuhrungsgr",
-     "|sp|spt|w|lsp|rsp|"},
-    {Role::kPosition, "realiment|retroaliment", ""},
+     "|sp|spt|sv|w|lsp|rsp|"},
+    {Role::kPosition, "realiment|retroaliment|retroazion", ""},
     {Role::kSupply,
-     "supply|instrument air|zuluft|steuerluft|air comprim|alimentation|"
-     "alimentacion|zasilan",
+     "supply|instrument air|zuluft|steuerluft|air comprim|aria strument|"
+     "alimentation|alimentacion|alimentazion|zasilan",
      "|air|"},
     {Role::kCommand,
-     "command|demand|output|stellgr|stellwert|stellsig|ansteuer|sortie|salida|"
-     "mando|sterow|sterujac|wyjsci|setpos|manipul",
-     "|op|out|co|cv|mv|cmd|ao|lmn|mn|yout|wyj|"},
+     "command|demand|output|stellgr|stellwert|stellsig|stellbefehl|ansteuer|"
+     "reglerausgang|sortie|salida|uscita|mando|sterow|sterujac|wyjsci|setpos|"
+     "manipul|writevalue",
+     "|op|out|co|cv|mv|cmd|dem|ao|lmn|mn|yout|wyj|"},
     {Role::kPosition,
-     "position|travel|stem|opening|stellung|ruckmeld|rueckmeld|feedback|"
-     "readback|recopie|ouverture|posicion|apertura|carrera|polozen|"
-     "pozycj|otwarci|hub|lift|skok|course",
-     "|x|pos|zt|zi|zit|gt|gi|zso|zsc|fb|fbk|rb|rbv|"},
-    {Role::kLevel, "level|fullstand|niveau|nivel|poziom", "|lt|li|lit|"},
+     "position|posizion|travel|stem|opening|offnung|oeffnung|stellung|"
+     "ruckmeld|rueckmeld|ruckfuhr|rueckfuehr|feedback|readback|readvalue|"
+     "recopie|ouverture|posicion|apertura|corsa|carrera|polozen|pozycj|"
+     "otwarci|hub|lift|skok|course",
+     "|x|pos|zt|zi|zit|gt|gi|zso|zsc|fb|fbk|rb|rbv|lmnr|"},
+    {Role::kLevel, "level|fullstand|niveau|nivel|livello|poziom",
+     "|lt|li|lit|"},
     {Role::kTemperature, "temp", "|t1|"},
     {Role::kUpstream,
-     "upstream|inlet|vordruck|eingangsdruck|vor ventil|amont|aguas arriba|"
-     "przed zaw",
+     "upstream|inlet|vordruck|eingangsdruck|vor ventil|amont|monte|"
+     "aguas arriba|przed zaw",
      "|p1|"},
     {Role::kDownstream,
      "downstream|outlet|nachdruck|hinterdruck|ausgangsdruck|nach ventil|aval|"
-     "aguas abajo|za zaw",
+     "valle|aguas abajo|za zaw",
      "|p2|"},
     {Role::kPressure, "press|druck|presion|cisnien", ""},
     {Role::kFlow,
-     "flow|durchfl|menge|strom|debit|caudal|flujo|przeplyw|strumien", ""},
+     "flow|durchfl|menge|strom|debit|caudal|flujo|portata|przeplyw|natezeni|"
+     "strumien",
+     ""},
 };
+/// What a valve is called, and a valve that flow has given its name to.
+constexpr std::string_view kValveWords =
+    "valve|ventil|armatur|vanne|valvula|valvola|zawor";
+constexpr std::string_view kFlowValves =
+    "flow valve|flow control valve|flow ctrl valve|durchflussregel|"
+    "durchflussventil|mengenregel|vanne de debit|vanne debit|"
+    "valvula de caudal|valvola di portata|zawor przeplyw|regulacji przeplyw";
 
 /// Units of quantities that no signal has.
 constexpr std::string_view kOtherUnits =
@@ -153,37 +176,63 @@ NamedUnit UnitIn(const std::string& name) {
   return {name, {}};
 }
 
-// The role that letters of ISA 5.1 (Z position; Y relay or converter) and DIN
-// 19227 (G position) give a tag, from its last part to its first: "fic" of
-// "20.FIC101.PV", "fv" of "AO_FV17".
+bool HasDigit(const std::string& token) {
+  return std::ranges::any_of(
+      token, [](unsigned char c) { return std::isdigit(c) != 0; });
+}
+
+// The role of the letters of a tag by ISA 5.1 (Z position; Y relay or
+// converter) and DIN 19227 (G position).
+std::optional<Role> RoleOfLetters(const std::string& letters) {
+  if (letters.ends_with('v') || letters == "ven" || letters == "rv") {
+    return Role::kValve;
+  }
+  // The position of a valve in a loop of flow: FZT.
+  if (letters.size() > 1 && letters[1] == 'z') {
+    return Role::kPosition;
+  }
+  if (letters.ends_with('y') &&
+      std::string_view("fptl").find(letters.front()) !=
+          std::string_view::npos) {
+    return Role::kCommand;
+  }
+  switch (letters.front()) {
+    case 'f':
+      return Role::kFlow;
+    case 'p':
+      return letters.starts_with("pd") ? Role::kOther : Role::kPressure;
+    case 't':
+      return Role::kTemperature;
+    case 'l':
+      return Role::kLevel;
+    case 'z':
+    case 'g':
+      return Role::kPosition;
+    default:
+      return std::nullopt;
+  }
+}
+
+// Of a tag, from its last part to its first: "fic" of "20.FIC101.PV", "fv" of
+// "AO_FV17". The part with the number of the loop comes first.
 std::optional<Role> RoleOfTag(const std::vector<std::string>& tokens) {
-  for (std::size_t i = tokens.size(); i-- > 0;) {
-    const std::string letters = Letters(tokens[i]);
-    // "pv" without a number is the process value of the tag before it, and
-    // "pid1" a block of it.
-    if (letters.empty() || letters.size() > 4 ||
-        (tokens.size() > 1 && IsToken(letters, "|pid|ai|ao|di|do|fb|")) ||
-        (letters == tokens[i] && tokens.size() > 1 &&
-         IsToken(letters, "|pv|iv|val|value|i|a|b|no|st|db|"))) {
-      continue;
-    }
-    if (letters.ends_with('v') || letters == "ven" || letters == "rv") {
-      return Role::kValve;
-    }
-    switch (letters.front()) {
-      case 'f':
-        return letters.ends_with('y') ? Role::kCommand : Role::kFlow;
-      case 'p':
-        return letters.ends_with('y') ? Role::kCommand : Role::kPressure;
-      case 't':
-        return letters.ends_with('y') ? Role::kCommand : Role::kTemperature;
-      case 'l':
-        return letters.ends_with('y') ? Role::kCommand : Role::kLevel;
-      case 'z':
-      case 'g':
-        return Role::kPosition;
-      default:
-        break;
+  for (const bool numbered : {true, false}) {
+    for (std::size_t i = tokens.size(); i-- > 0;) {
+      const std::string letters = Letters(tokens[i]);
+      // "pv" without a number is the process value of the tag before it or of
+      // an unknown one, and "pid1" a block of it.
+      if (HasDigit(tokens[i]) != numbered || letters.empty() ||
+          letters.size() > 4 || letters.starts_with("pid") ||
+          IsToken(letters, "|ai|ao|di|do|fb|daca|daci|") ||
+          (letters == tokens[i] &&
+           (IsToken(letters, "|pv|sv|") ||
+            (tokens.size() > 1 &&
+             IsToken(letters, "|iv|val|value|i|a|b|no|st|db|"))))) {
+        continue;
+      }
+      if (const auto role = RoleOfLetters(letters)) {
+        return role;
+      }
     }
   }
   return std::nullopt;
@@ -200,14 +249,32 @@ bool HasWordOf(const std::string& plain, Role role) {
   });
 }
 
-// Two words that say one thing: the set point of a position is the command, and
-// "pression sortie", which begins with what is measured, no output.
+bool HasToken(const std::vector<std::string>& tokens, std::string_view any) {
+  return std::ranges::any_of(
+      tokens, [&](const std::string& token) { return IsToken(token, any); });
+}
+
+// Two words that say one thing: the set point of a position or of a valve is
+// the command, and "pression sortie", which begins with what is measured, no
+// output.
 std::optional<Role> RoleOfTwoWords(const std::string& plain,
                                    const std::vector<std::string>& tokens) {
   const bool wanted = HasWordOf(plain, Role::kSetpoint) ||
-                      std::ranges::find(tokens, "soll") != tokens.end();
-  if (wanted && HasWordOf(plain, Role::kPosition)) {
+                      HasToken(tokens, "|soll|sp|ref|req|target|");
+  const auto tag = RoleOfTag(tokens);
+  const bool measured =
+      !HasWord(plain, kFlowValves) &&
+      (HasWordOf(plain, Role::kFlow) || HasWordOf(plain, Role::kPressure) ||
+       HasWordOf(plain, Role::kTemperature) || HasWordOf(plain, Role::kLevel));
+  const bool valve =
+      !measured && (tag == Role::kValve || HasWord(plain, kValveWords));
+  if (wanted && (HasWordOf(plain, Role::kPosition) || valve)) {
     return Role::kCommand;
+  }
+  if (valve && !HasWordOf(plain, Role::kCommand) &&
+      (HasWord(plain, "istwert|actual|rzeczywist|mierzon|reelle|reale") ||
+       HasToken(tokens, "|ist|act|actual|"))) {
+    return Role::kPosition;
   }
   if (tokens.empty() || HasWordOf(plain, Role::kSupply)) {
     return std::nullopt;
@@ -215,19 +282,35 @@ std::optional<Role> RoleOfTwoWords(const std::string& plain,
   if (HasWordOf(tokens.front(), Role::kTemperature)) {
     return Role::kTemperature;
   }
-  if (HasWordOf(tokens.front(), Role::kPressure)) {
-    if (HasWord(plain, "entree|entrada|wlot|eingang")) {
+  if (HasWordOf(tokens.front(), Role::kPressure) &&
+      !HasWordOf(plain, Role::kOther)) {
+    if (HasWord(plain, "entree|entrada|ingresso|wlot|eingang")) {
       return Role::kUpstream;
     }
-    if (HasWord(plain, "sortie|salida|wylot|ausgang")) {
+    if (HasWord(plain, "sortie|salida|uscita|wylot|ausgang")) {
       return Role::kDownstream;
     }
   }
   return std::nullopt;
 }
 
-// Words first, then the attribute behind a tag (".OP"), then its letters. The
-// output of a transmitter ("FT17.OUT") is what it measures.
+// The output of a transmitter ("FT17.OUT") or of a block that takes a reading
+// in ("FIC-17/AI1/OUT") is what it measures.
+bool IsOutputOfReading(const std::vector<std::string>& tokens, std::size_t at,
+                       Role tag) {
+  return (tokens[at] == "out" || tokens[at] == "ao") &&
+         (tag == Role::kFlow || tag == Role::kPressure ||
+          tag == Role::kTemperature || tag == Role::kLevel ||
+          tag == Role::kPosition) &&
+         std::ranges::any_of(tokens, [&](const std::string& part) {
+           const std::string code = Letters(part);
+           return part != tokens[at] &&
+                  ((code.size() > 1 && code.ends_with('t')) || code == "ai");
+         });
+}
+
+// Words first, then the attribute behind a tag (".OP"), then its letters, and
+// last the word valve alone.
 NameGuess RoleOf(const std::string& name, const std::string& about) {
   const std::string plain = PlainText(name + ' ' + about);
   const std::vector<std::string> tokens = Tokens(PlainText(name));
@@ -236,7 +319,8 @@ NameGuess RoleOf(const std::string& name, const std::string& about) {
     return {role, true};
   }
   for (const RoleWords& known : kRoleWords) {
-    if (HasWord(plain, known.words)) {
+    if (HasWord(plain, known.words) &&
+        !(known.role == Role::kFlow && HasWord(plain, kFlowValves))) {
       return {known.role, true};
     }
   }
@@ -249,22 +333,19 @@ NameGuess RoleOf(const std::string& name, const std::string& about) {
         std::isalpha(static_cast<unsigned char>(token.front())) != 0 &&
         letters.ends_with('v');
     for (const RoleWords& known : kRoleWords) {
-      const bool hit = IsToken(token, known.tokens) ||
-                       (!numbered && IsToken(letters, known.tokens));
-      if (hit && known.role == Role::kCommand && tag &&
-          (token == "out" || token == "ao") &&
-          (*tag == Role::kFlow || *tag == Role::kPressure ||
-           *tag == Role::kTemperature || *tag == Role::kLevel) &&
-          std::ranges::any_of(tokens, [&](const std::string& part) {
-            const std::string code = Letters(part);
-            return part != token && code.size() > 1 && code.ends_with('t');
-          })) {
+      if (!IsToken(token, known.tokens) &&
+          (numbered || !IsToken(letters, known.tokens))) {
+        continue;
+      }
+      if (known.role == Role::kCommand && tag &&
+          IsOutputOfReading(tokens, i, *tag)) {
         return {tag, false};
       }
-      if (hit) {
-        return {known.role, true};
-      }
+      return {known.role, true};
     }
+  }
+  if (!tag && HasWord(plain, kValveWords)) {
+    return {Role::kValve, false};
   }
   return {tag, false};
 }
@@ -290,14 +371,24 @@ std::optional<Signal> SignalOf(Role role) {
     case Role::kSetpoint:
       return Signal::kSp;
     case Role::kLevel:
+    case Role::kOther:
       return std::nullopt;
   }
   return std::nullopt;
 }
 
+// "Value" of "Value (2)", the second of this name (layout.h).
+std::string WithoutNumber(const std::string& name) {
+  const std::size_t open = name.rfind(" (");
+  const bool numbered =
+      name.ends_with(')') && open != std::string::npos &&
+      name.find_first_not_of("0123456789", open + 2) == name.size() - 1;
+  return numbered ? name.substr(0, open) : name;
+}
+
 // The unit in the name of a column, or in the rows below it.
 std::string StatedUnit(const SniffedColumn& column) {
-  std::string unit = UnitIn(column.name).unit;
+  std::string unit = UnitIn(WithoutNumber(column.name)).unit;
   std::istringstream about(column.about);
   for (std::string cell; unit.empty() && std::getline(about, cell);) {
     unit = UnitIn('[' + cell + ']').unit;
@@ -319,7 +410,7 @@ std::optional<Role> RoleByUnit(std::optional<Role> role,
       {Signal::kT1, Role::kTemperature}};
   for (const auto& [signal, by_unit] : kByUnit) {
     const auto named = role ? SignalOf(*role) : std::nullopt;
-    if (!unit.empty() && FindUnit(signal, unit) &&
+    if (!unit.empty() && role != Role::kOther && FindUnit(signal, unit) &&
         !(named && FindUnit(*named, unit))) {
       role = by_unit;
     }
@@ -333,7 +424,13 @@ std::vector<std::string> DistinctParts(
     const std::vector<SniffedColumn*>& columns) {
   std::vector<std::string> names;
   for (const SniffedColumn* column : columns) {
-    names.push_back(column->name);
+    // "Value (2)" is told apart by what is above it.
+    const bool numbered = WithoutNumber(column->name) != column->name;
+    const std::size_t line = column->about.find_first_not_of('\n');
+    names.push_back(
+        numbered && line != std::string::npos
+            ? column->about.substr(line, column->about.find('\n', line) - line)
+            : column->name);
   }
   constexpr std::string_view kCuts = "./\\:";
   const auto common = [&](const auto& part) {
@@ -345,7 +442,10 @@ std::vector<std::string> DistinctParts(
   };
   const auto ending = [&](const std::string& name) {
     const std::size_t at = name.find_last_of(kCuts);
-    return at == std::string::npos || at == 0 ? std::string() : name.substr(at);
+    const bool none = at == std::string::npos || at == 0;
+    // Of a block, which tells what comes out.
+    return none || SameName(name.substr(at + 1), "out") ? std::string()
+                                                        : name.substr(at);
   };
   const auto beginning = [&](const std::string& name) {
     const std::size_t at = name.find_first_of(kCuts);
@@ -358,9 +458,14 @@ std::vector<std::string> DistinctParts(
       name.resize(name.size() - ending(name).size());
     }
   }
+  // "PV" of a valve is told by the tag in front of it.
   if (common(beginning)) {
     for (std::string& name : names) {
-      name.erase(0, beginning(name).size());
+      const std::string tag = beginning(name);
+      if (!SameName(name.substr(tag.size()), "pv") ||
+          RoleOfTag(Tokens(PlainText(tag))) != Role::kValve) {
+        name.erase(0, tag.size());
+      }
     }
   }
   return names;
@@ -517,7 +622,7 @@ double Correlation(const SniffedColumn& a, const SniffedColumn& b) {
   }
   double strongest = 0.0;
   for (int lag = 0; lag <= 2; ++lag) {
-    CorrelationSums sums;
+    LocalSense sums;
     for (std::size_t k = static_cast<std::size_t>(lag); k < b.values.size();
          ++k) {
       // In a compressed table, the last reading remains valid.
@@ -528,10 +633,64 @@ double Correlation(const SniffedColumn& a, const SniffedColumn& b) {
         sums.Add(std::prev(after)->second, b.values[k]);
       }
     }
-    const double r = sums.Correlation();
+    const double r = sums.Value();
     strongest = std::abs(r) > std::abs(strongest) ? r : strongest;
   }
   return strongest;
+}
+
+// Whether the readings are those of a counter: a flow falls now and then.
+bool IsTotal(const SniffedColumn& column) {
+  constexpr std::size_t kEnough = 60;
+  return column.values.size() >= kEnough &&
+         std::ranges::is_sorted(column.values) &&
+         column.values.front() < column.values.back();
+}
+
+// Whether a set point is that of a flow, a pressure or a temperature, whose
+// unit is not per cent.
+bool IsOfOtherLoop(const std::string& name) {
+  const std::string plain = PlainText(name);
+  const auto tag = RoleOfTag(Tokens(plain));
+  const auto is = [&](Role role) {
+    return tag == role || HasWordOf(plain, role);
+  };
+  return is(Role::kFlow) || is(Role::kPressure) || is(Role::kTemperature);
+}
+
+bool IsSwitch(const SniffedColumn& column) {
+  return std::set<double>(column.values.begin(), column.values.end()).size() <=
+         2;
+}
+
+// "FC101", which may be all that a controller has.
+bool IsController(const std::string& name) {
+  return std::ranges::any_of(
+      Tokens(PlainText(name)), [](const std::string& token) {
+        return HasDigit(token) && IsToken(Letters(token), "|fc|fic|ffc|frc|");
+      });
+}
+
+// Whether b follows a rather than a b: what moves first is the command. 0 if
+// neither is seen.
+double Lead(const SniffedColumn& a, const SniffedColumn& b) {
+  const auto follows = [](const SniffedColumn& first,
+                          const SniffedColumn& second) {
+    std::map<double, double> at;
+    for (std::size_t k = 0; k < first.values.size(); ++k) {
+      at[first.times_s[k]] = first.values[k];
+    }
+    CorrelationSums sums;
+    for (std::size_t k = 1; k < second.values.size(); ++k) {
+      const auto then = at.find(second.times_s[k - 1]);
+      if (then != at.end() && then != at.begin()) {
+        sums.Add(then->second - std::prev(then)->second,
+                 second.values[k] - second.values[k - 1]);
+      }
+    }
+    return std::abs(sums.Correlation());
+  };
+  return follows(a, b) - follows(b, a);
 }
 
 class SignalGuess {
@@ -571,6 +730,7 @@ class SignalGuess {
   Sniffed& found_;
   std::vector<SniffedColumn*> valves_;  // Command or position.
   std::vector<SniffedColumn*> sure_;    // By a word or the contract.
+  std::vector<SniffedColumn*> sides_;   // In front of the valve, by a word.
 };
 
 void SignalGuess::GuessNames() {
@@ -599,6 +759,7 @@ bool SignalGuess::TakeKnown(SniffedColumn& column, const std::string& unit) {
                         ? "1"
                         : std::string(SignalUnit(known.signal));
       sure_.push_back(&column);
+      sides_.push_back(&column);
       return true;
     }
   }
@@ -609,6 +770,7 @@ bool SignalGuess::TakeKnown(SniffedColumn& column, const std::string& unit) {
     column.opening = given.sense == Sense::kOpening;
     Say(column, "given");
     sure_.push_back(&column);
+    sides_.push_back(&column);
   }
   return column.given.has_value();
 }
@@ -633,8 +795,16 @@ void SignalGuess::GuessName(SniffedColumn& column, const std::string& part) {
   if (!role || IsToken(PlainText(unit), kOtherUnits)) {
     return;
   }
-  if (role == Role::kLevel) {
-    Say(column, "a level");
+  if (role == Role::kLevel || role == Role::kOther) {
+    Say(column, role == Role::kLevel ? "a level" : "no signal of a valve");
+    return;
+  }
+  if (role == Role::kFlow && IsTotal(column)) {
+    Say(column, "a total: it only rises");
+    return;
+  }
+  if (role == Role::kSetpoint && unit.empty() && IsOfOtherLoop(part)) {
+    Say(column, "a set point in the unit of its loop");
     return;
   }
   const Signal signal = *SignalOf(*role);
@@ -646,6 +816,9 @@ void SignalGuess::GuessName(SniffedColumn& column, const std::string& part) {
     return;
   }
   column.signal = signal;
+  if (role == Role::kUpstream) {
+    sides_.push_back(&column);
+  }
   if (role == Role::kValve) {
     valves_.push_back(&column);
   } else if (guess.by_word) {
@@ -654,8 +827,21 @@ void SignalGuess::GuessName(SniffedColumn& column, const std::string& part) {
 }
 
 // The tag of a valve is its command or its position, whichever is not there
-// yet; alone it is the command, without which nothing can be judged.
+// yet; alone it is the command, without which nothing can be judged. Of two,
+// the command moves first.
 void SignalGuess::SettleValves() {
+  constexpr double kClear = 0.1;
+  if (valves_.size() == 2 && Of(Signal::kCv).empty() &&
+      Of(Signal::kX).size() == 2) {
+    const double lead = Lead(*valves_[0], *valves_[1]);
+    if (lead < 0.0) {
+      std::swap(valves_[0], valves_[1]);
+    }
+    Say(*valves_[0], std::abs(lead) > kClear
+                         ? "moves before " + valves_[1]->name
+                         : "neither of the two moves first: check which is the "
+                           "command");
+  }
   for (SniffedColumn* valve : valves_) {
     const bool has_command = !Of(Signal::kCv).empty();
     const bool has_position = Of(Signal::kX).size() > 1;
@@ -674,6 +860,10 @@ void SignalGuess::SettleValves() {
 // The pressure falls in the direction of flow. A column named P2 stays P2.
 void SignalGuess::SettlePressures() {
   const std::vector<SniffedColumn*> pressures = Of(Signal::kP1);
+  if (pressures.size() == 1 && Of(Signal::kP2).empty() &&
+      std::ranges::find(sides_, pressures[0]) == sides_.end()) {
+    Say(*pressures[0], "P1 or P2: no name says on which side of the valve");
+  }
   if (pressures.size() != 2 || !Of(Signal::kP2).empty()) {
     return;
   }
@@ -686,13 +876,22 @@ void SignalGuess::SettlePressures() {
   }
 }
 
-// Of several columns the one with a word for it, else the first.
+// Of several columns the one with a word for it, else the first; a switch comes
+// behind what has more than two values, and a controller of flow behind a flow.
 void SignalGuess::KeepFirst(Signal signal) {
-  const std::vector<SniffedColumn*> columns = Of(signal);
+  std::vector<SniffedColumn*> columns = Of(signal);
+  const auto comes_first = [&](const SniffedColumn* column) {
+    return !IsSwitch(*column) &&
+           !(signal == Signal::kF && IsController(column->name));
+  };
+  // Clang 14 knows no std::ranges::stable_partition of GCC's library.
+  std::stable_partition(columns.begin(), columns.end(), comes_first);
   const auto sure = [&](SniffedColumn* column) {
     return std::ranges::find(sure_, column) != sure_.end();
   };
-  const auto best = std::ranges::find_if(columns, sure);
+  const auto best = std::ranges::find_if(columns, [&](SniffedColumn* column) {
+    return sure(column) && IsSwitch(*column) == IsSwitch(*columns.front());
+  });
   const SniffedColumn* kept = best != columns.end() ? *best
                               : columns.empty()     ? nullptr
                                                     : columns.front();
@@ -768,8 +967,10 @@ void SignalGuess::NoteMissing() {
   }
 }
 
-void AddCell(const std::string& cell, double t_s, const ColumnMap& map,
+void AddCell(const std::string& whole, double t_s, const ColumnMap& map,
              SniffedColumn& column) {
+  const auto unflagged = Unflagged(whole);
+  const std::string& cell = unflagged ? *unflagged : whole;
   ++column.cells;
   auto value = ParseNumber(cell, map.decimal);
   if (!value && IsNoReading(cell, map.no_reading)) {
@@ -790,7 +991,7 @@ void AddCell(const std::string& cell, double t_s, const ColumnMap& map,
   if (value) {
     column.times_s.push_back(t_s);
     column.values.push_back(*value);
-  } else if (column.words.size() < 20 &&
+  } else if (column.words.size() < 200 &&
              std::ranges::find(column.words, cell) == column.words.end()) {
     column.words.push_back(cell);
   }
@@ -845,6 +1046,54 @@ void JudgeTiming(std::vector<double> times, Sniffed& found) {
   found.resample = NumberText(period) + "s:linear" + age;
 }
 
+/// The qualities of a row, as the importer takes them.
+class CellQuality {
+ public:
+  explicit CellQuality(const Layout& layout) : map_(layout.map) {
+    const auto at = [&](const std::string& name) {
+      return static_cast<std::size_t>(std::ranges::find(layout.names, name) -
+                                      layout.names.begin());
+    };
+    for (const auto& [column, quality] : map_.quality_of) {
+      of_[at(column)] = {at(quality), quality};
+    }
+    if (map_.long_table && !map_.long_table->quality.empty()) {
+      of_[at(map_.long_table->value)] = {at(map_.long_table->quality),
+                                         map_.long_table->quality};
+    }
+  }
+
+  bool IsBad(const std::vector<std::string>& cells, std::size_t column) const {
+    const auto found = of_.find(column);
+    if (found == of_.end() || found->second.first >= cells.size()) {
+      return false;
+    }
+    const auto code = map_.quality_codes.find(found->second.second);
+    return QualityOf(cells[found->second.first], map_.quality,
+                     code != map_.quality_codes.end()
+                         ? code->second
+                         : QualityCode::kUnknown) == SignalQuality::kBad;
+  }
+
+ private:
+  const ColumnMap& map_;
+  std::map<std::size_t, std::pair<std::size_t, std::string>> of_;
+};
+
+// Columns of a long table that hold the unit or the description of its tag.
+std::vector<std::size_t> AboutColumns(const Layout& layout) {
+  std::vector<std::size_t> columns;
+  for (std::size_t c = 0; c < layout.names.size(); ++c) {
+    const std::string plain = PlainText(layout.names[c]);
+    if (HasWord(plain,
+                "unit|einheit|unidad|jednostk|descr|beschreib|bezeich") ||
+        IsToken(plain, "|eu|uom|")) {
+      columns.push_back(c);
+    }
+  }
+  return columns;
+}
+
 // The columns of a wide table or the tags of a long one, through the reader of
 // the importer.
 void ReadColumns(const std::vector<std::string_view>& lines,
@@ -858,6 +1107,8 @@ void ReadColumns(const std::vector<std::string_view>& lines,
   std::size_t value = 0;
   const auto& names = layout.names;
   const auto& tall = layout.map.long_table;
+  const CellQuality quality(layout);
+  const std::vector<std::size_t> abouts = AboutColumns(layout);
   for (std::size_t c = 0; c < names.size(); ++c) {
     bool form = SameName(names[c], layout.map.time_column) ||
                 SameName(names[c], kTimeColumn) ||
@@ -877,11 +1128,16 @@ void ReadColumns(const std::vector<std::string_view>& lines,
     times.push_back(row.t_s);
     if (tall) {
       SniffedColumn& column = tags[cells[tag]];
+      for (const std::size_t c : abouts) {
+        column.about += column.cells == 0 ? '\n' + cells[c] : std::string();
+      }
       column.name = cells[tag];
-      AddCell(cells[value], row.t_s, layout.map, column);
+      AddCell(quality.IsBad(cells, value) ? "" : cells[value], row.t_s,
+              layout.map, column);
     }
     for (std::size_t i = 0; i < columns.size(); ++i) {
-      AddCell(cells[columns[i]], row.t_s, layout.map, found.columns[i]);
+      AddCell(quality.IsBad(cells, columns[i]) ? "" : cells[columns[i]],
+              row.t_s, layout.map, found.columns[i]);
     }
   });
   reader.Finish();

@@ -109,6 +109,9 @@ std::string Plain(std::string_view name) {
     if (name.substr(i).starts_with("³")) {
       plain += '3';
       ++i;
+    } else if (name.substr(i).starts_with("ü")) {
+      plain += 'u';
+      ++i;
     } else if (name.substr(i).starts_with("°")) {
       plain += "deg";
       ++i;
@@ -260,7 +263,12 @@ constexpr TimeName kTimeNames[] = {{"s", {TimeForm::kElapsed, 1.0}},
                                    {"unix us", {TimeForm::kUnix, 1e-6}},
                                    {"unix ns", {TimeForm::kUnix, 1e-9}},
                                    {"filetime", {TimeForm::kFileTime, 1e-7}},
+                                   {"ticks", {TimeForm::kTicks, 1e-7}},
+                                   {"since 1904", {TimeForm::kSince1904, 1.0}},
                                    {"serial", {TimeForm::kSerial, 1.0}},
+                                   {"datenum", {TimeForm::kDateNumber, 1.0}},
+                                   {"jd", {TimeForm::kJulian, 1.0}},
+                                   {"mjd", {TimeForm::kModifiedJulian, 1.0}},
                                    {"text", {TimeForm::kText, 1.0}},
                                    {"auto", {TimeForm::kFindOut, 1.0}}};
 
@@ -305,13 +313,13 @@ char ReadSign(TomlReader& table, std::string_view key,
       (!text.empty() && accepted.find(text) == std::string_view::npos)) {
     table.Refuse(key, "'" + text + "' is none of the signs " +
                           std::string(accepted) +
-                          (accepted.size() > 2 ? " and tab" : ""));
+                          (accepted.size() > 2 ? "blank and tab" : ""));
   }
   return text.empty() ? '\0' : text.front();
 }
 
 void ReadFile(TomlReader table, ColumnMap& map) {
-  map.separator = ReadSign(table, "separator", ",;|\t");
+  map.separator = ReadSign(table, "separator", ",;|\t ");
   map.decimal = ReadSign(table, "decimal", ".,");
   map.thousands = ReadSign(table, "thousands", ".,");
   map.skip = static_cast<int>(table.Number("skip", 0.0, 1e6).value_or(0.0));
@@ -345,14 +353,16 @@ std::optional<UnitConversion> FindUnit(Signal signal, std::string_view name) {
   // The whole name comes first, because "Pa" and "kPa" end with the a of
   // "absolute".
   auto found = find();
-  for (const std::string_view suffix : {"gauge", "abs", "g", "a"}) {
+  // Of gauge pressures, "bar(u)" stands for the German "bar(ü)".
+  for (const std::string_view suffix :
+       {"gauge", "abs", "uberdruck", "rel", "eff", "g", "u", "a"}) {
     if (!found && QuantityOf(signal) == Quantity::kPressure &&
         plain.size() > suffix.size() &&
         SameName(std::string_view(plain).substr(plain.size() - suffix.size()),
                  suffix)) {
       plain.resize(plain.size() - suffix.size());
       found = find();
-      if (found && suffix.front() == 'g') {
+      if (found && suffix.front() != 'a') {
         found->offset += kAtmosphereKpa;
       }
     }

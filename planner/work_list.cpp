@@ -53,6 +53,9 @@ std::string FaultText(const FaultReason& reason, const WorkOptions& options) {
   text += reason.ended_ns
               ? "ended " + SpanText(now_ns - *reason.ended_ns) + " ago"
               : "stands for " + SpanText(now_ns - reason.detected_ns);
+  if (reason.unconfirmed_ns) {
+    text += ", not confirmed for " + SpanText(now_ns - *reason.unconfirmed_ns);
+  }
   text += ", severity " + std::string(SeverityName(reason.words.severity));
   if (reason.strength != 0.0) {
     text += " at strength " + report::FormatNumber(reason.strength, 2);
@@ -168,7 +171,9 @@ void AddEpisode(const Episode& episode, const report::FaultTexts& texts,
   place->confirmed = place->confirmed || episode.label.has_value();
   place->episode_id = episode.episode_id;
   place->detected_ns = episode.detected_ns;
-  place->ended_ns = episode.ended_ns;
+  // The end of the data is no return to normal.
+  place->unconfirmed_ns = episode.unconfirmed_ns;
+  place->ended_ns = episode.unconfirmed_ns ? std::nullopt : episode.ended_ns;
   place->last_ns = episode.trace_end_ns.value_or(episode.detected_ns);
 }
 

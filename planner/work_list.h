@@ -29,6 +29,8 @@ struct FaultReason {
   std::string episode_id;       ///< Of the newest episode.
   std::int64_t detected_ns{0};  ///< Of that episode.
   std::optional<std::int64_t> ended_ns;
+  /// Since when nothing confirms it, where only its data ended.
+  std::optional<std::int64_t> unconfirmed_ns{};
   /// Time of the newest evidence, which may be ahead of this machine's clock.
   std::int64_t last_ns{0};
 };

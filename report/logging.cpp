@@ -1,6 +1,8 @@
 #include "report/logging.h"
 
 #include <algorithm>
+#include <cerrno>
+#include <climits>
 #include <cstdint>
 #include <memory>
 #include <mutex>
@@ -30,8 +32,6 @@ spdlog::level::level_enum ToSpdlog(LogLevel level) {
   return spdlog::level::err;
 }
 
-// Writes to stderr what it takes without waiting. A pipe and a terminal that
-// poll() calls writable take at least PIPE_BUF bytes.
 class NeverWaitingSink : public spdlog::sinks::base_sink<std::mutex> {
  protected:
   void sink_it_(const spdlog::details::log_msg& message) override {
@@ -54,28 +54,40 @@ class NeverWaitingSink : public spdlog::sinks::base_sink<std::mutex> {
   bool Write(const spdlog::details::log_msg& message) {
     spdlog::memory_buf_t line;
     formatter_->format(message, line);
-    const char* at = line.data();
-    std::size_t left = line.size();
-    while (left > 0) {
-      pollfd stream{STDERR_FILENO, POLLOUT, 0};
-      if (poll(&stream, 1, 0) != 1 || (stream.revents & POLLOUT) == 0) {
-        return false;
-      }
-      const ssize_t written =
-          write(STDERR_FILENO, at, std::min<std::size_t>(left, PIPE_BUF));
-      if (written <= 0) {
-        return false;
-      }
-      at += written;
-      left -= static_cast<std::size_t>(written);
-    }
-    return true;
+    return WriteToStderr({line.data(), line.size()},
+                         std::chrono::milliseconds(0));
   }
 
   std::uint64_t dropped_ = 0;
 };
 
 }  // namespace
+
+// A pipe and a terminal that poll() calls writable take at least PIPE_BUF
+// bytes.
+bool WriteToStderr(std::string_view text, std::chrono::milliseconds patience) {
+  const auto until = std::chrono::steady_clock::now() + patience;
+  while (!text.empty()) {
+    const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(
+        until - std::chrono::steady_clock::now());
+    pollfd stream{STDERR_FILENO, POLLOUT, 0};
+    const int ready = poll(
+        &stream, 1, static_cast<int>(std::max<std::int64_t>(left.count(), 0)));
+    if (ready < 0 && errno == EINTR) {
+      continue;
+    }
+    if (ready != 1 || (stream.revents & POLLOUT) == 0) {
+      return false;
+    }
+    const ssize_t written = write(STDERR_FILENO, text.data(),
+                                  std::min<std::size_t>(text.size(), PIPE_BUF));
+    if (written <= 0) {
+      return false;
+    }
+    text.remove_prefix(static_cast<std::size_t>(written));
+  }
+  return true;
+}
 
 LogSink MakeStderrSink(LogLevel minimum) {
   auto logger = std::make_shared<spdlog::logger>(

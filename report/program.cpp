@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <csignal>
-#include <cstdio>
 #include <cstdlib>
 #include <exception>
 #include <filesystem>
@@ -32,8 +31,10 @@ namespace {
 // in destructors: this ends with an error message, other terminations abort.
 [[noreturn]] void EndTerminated() {
   const auto end = [](const char* what) {
-    std::fprintf(stderr,
-                 "error: out of memory, address space or threads (%s)\n", what);
+    for (const char* part :
+         {"error: out of memory, address space or threads (", what, ")\n"}) {
+      WriteToStderr(part);
+    }
     std::_Exit(kExitFailure);
   };
   try {
@@ -366,8 +367,8 @@ int Program::ExitCodeOf(const std::exception& error) const {
 }
 
 void Program::PrintError(const std::string& message) const {
-  std::cerr << app_->get_name() << ": error: " << Printable(message, "\n")
-            << '\n';
+  WriteToStderr(app_->get_name() + ": error: " + Printable(message, "\n") +
+                "\n");
 }
 
 }  // namespace fdi::report

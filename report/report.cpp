@@ -105,7 +105,7 @@ constexpr std::string_view kPageStyle =
     R"(body{margin:1.5em auto;max-width:1240px;padding:0 1em;background:#fff;color:#222;font:14px/1.45 system-ui,"DejaVu Sans",sans-serif}
 h1{font-size:1.5em}h2{font-size:1.2em;margin-top:2em}h3{font-size:1em;margin:2em 0 .3em}
 a{color:#0072b2}
-p{white-space:pre-line}
+p{white-space:pre-line;overflow-wrap:anywhere}
 .scroll{overflow-x:auto}
 table{border-collapse:collapse;font-variant-numeric:tabular-nums;font-size:12px}
 th,td{padding:2px 7px;border-bottom:1px solid #ddd;text-align:left;white-space:nowrap}
@@ -119,6 +119,7 @@ dt{font-weight:600}dd{margin:0}
 .quiet{color:#767676}
 .good{background:#cce3f0}.warning{background:#fae7bf}.alarm{background:#f6d0bb;font-weight:600}
 svg{max-width:100%;height:auto;font-family:"DejaVu Sans",Verdana,sans-serif}
+@media screen and (max-width:45em){th{white-space:normal}}
 @media screen and (prefers-color-scheme:dark){body{background:#161616;color:#ddd}a{color:#56b4e9}th,td{border-color:#333}.quiet{color:#8c8c8c}.good{background:#123a52}.warning{background:#4d3a10}.alarm{background:#5c2a10}}
 @media print{:root{color-scheme:light}body{margin:0;padding:0;max-width:none;font-size:10pt;print-color-adjust:exact;-webkit-print-color-adjust:exact}
 table,dl{font-size:8pt}th,td{white-space:normal;padding:2px 5px}td.wrap{min-width:0}.scroll{overflow:visible}

@@ -72,7 +72,11 @@ void Wake() noexcept {
 
 extern "C" void FdiOnAlarm(int /*signal*/) {
   const char* words = g_last_words;
-  [[maybe_unused]] const auto written = write(2, words, std::strlen(words));
+  pollfd stream{STDERR_FILENO, POLLOUT, 0};
+  if (poll(&stream, 1, 0) == 1) {  // Its reader may have stopped reading.
+    [[maybe_unused]] const auto written =
+        write(STDERR_FILENO, words, std::strlen(words));
+  }
   _exit(1);
 }
 

@@ -207,7 +207,10 @@ Plausible ByCorrelation(const std::vector<double>& residuals, int length,
   const double z = NormalQuantile(share);
   const double samples = 2.0 * length;
   const double kappa = Variance(squares);
-  return {kMargin * z * sd * std::sqrt(CorrelationTime(residuals) / samples),
+  // A mean varies no more than what it is taken of, however slow that is.
+  const double share_of_mean =
+      std::min(1.0, CorrelationTime(residuals) / samples);
+  return {kMargin * z * sd * std::sqrt(share_of_mean),
           std::log(kMargin * sd) +
               0.5 * z * std::sqrt(kappa * CorrelationTime(squares) / samples)};
 }
@@ -231,7 +234,7 @@ double Level(const std::vector<double>& values, double share, int length,
 // that tail is mostly its own uncertainty; then what short-range correlation
 // makes of a window is an upper bound, and stands alone below 10,
 //
-//     |mean| ≤ 1.25 z σ √(τ/2N),   log rms ≤ ln 1.25 σ + z/2 √(κ τ₂/2N),
+//     |mean| ≤ 1.25 z σ √min(1, τ/2N),   log rms ≤ ln 1.25 σ + z/2 √(κ τ₂/2N),
 //
 // z the Gaussian quantile of `share`, τ and τ₂ the correlation times of the
 // residual and its square, κ the variance of r²/σ²; but never less than the

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "base/error.h"
+#include "diagnosis/fault_catalogue.h"
 #include "trainer/calibration.h"
 #include "trainer/channel_training.h"
 #include "trainer/model_set_description.h"
@@ -591,18 +592,16 @@ ModelSet TransferDifferenceSet(const ModelSet& of_type,
   Reporter reporter(progress);
   reporter.Report(0.0, "fitting the normal observer");
   const Healthy fitted = RefitHealthy(of_type, healthy, options);
-  std::vector<FaultCondition> faults;
-  for (const Observer& observer : of_type.observers) {
-    if (observer.fault != 0) {
-      faults.push_back({observer.fault, observer.strength});
-    }
-  }
-  ModelSet models = Describe(healthy, fitted.normal, faults, options);
+  ModelSet models = Describe(healthy, fitted.normal, {}, options);
+  models.faults = of_type.faults;
+  std::erase_if(models.faults, IsFinding);
+  AddFindings(models);
   reporter.Report(0.5, "setting the limits");
   FitLimits(fitted, CalibrateHealthy(fitted, options, models.observers.front()),
             options, models);
-  const Observer& normal = models.observers.front();
-  for (std::size_t i = 1; i < models.observers.size(); ++i) {
+  for (std::size_t i = 1; i < of_type.observers.size(); ++i) {
+    models.observers.push_back(of_type.observers[i]);
+    const Observer& normal = models.observers.front();
     for (std::size_t c = 0; c < models.channels.size(); ++c) {
       models.observers[i].channels[c] =
           Transfer(of_type.observers[i].channels[c],

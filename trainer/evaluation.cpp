@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/text.h"
 #include "diagnosis/fault_catalogue.h"
 #include "diagnosis/fit_window.h"
 #include "diagnosis/valve_engine.h"
@@ -83,9 +84,15 @@ void IndexFault(const std::vector<Indication>& all, Zone zone,
       result.final_set.clear();
     }
     if (set.empty()) {
+      if (result.final_set.empty() && all[k].detected) {
+        result.wording = all[k].wording;
+      }
       continue;
     }
-    result.final_set = set;
+    if (set != result.final_set) {
+      result.final_set = set;
+      result.wording = all[k].wording;
+    }
     if (result.t_exact < 0.0 && set.size() == 1 && set[0] == result.fault) {
       result.t_exact = all[k].time_s - start_s;
     }
@@ -121,6 +128,34 @@ bool IsWithdrawn(const ModelSet& models, const Verdict& verdict) {
   const bool by_floor = verdict.isolated != 0;
   return (by_floor || verdict.unknown == Unknown::kOutsideKnown) &&
          JudgesFit(models);
+}
+
+Wording WordingOf(const ModelSet& models, const Verdict& verdict,
+                  const std::vector<int>& faults, Layer layer) {
+  if (faults.empty()) {
+    const bool outside = verdict.unknown == Unknown::kOutsideKnown ||
+                         IsWithdrawn(models, verdict);
+    return {outside ? Certainty::kNotKnown : Certainty::kNotYet, {}};
+  }
+  double factor = 0.0;
+  double strength = 0.0;
+  for (const int fault : faults) {
+    const int found = FaultIndex(models, fault);
+    if (found >= 0) {
+      const auto bit = static_cast<std::size_t>(found);
+      factor = std::max(factor, verdict.fault_factors[bit]);
+      strength = verdict.strengths[bit];
+    }
+  }
+  std::vector<std::string> known(models.faults.size());
+  std::ranges::transform(models.faults, known.begin(), FaultName);
+  const std::string name = JoinText(faults, "|", FaultName);
+  const auto beside = LookAlikesBeside(name, layer, strength, known);
+  Wording wording{WithLookAlikes(CertaintyOf(name, layer, factor), beside), {}};
+  for (const std::string& fault : beside) {
+    wording.look_alikes.push_back(RequireFault(fault));
+  }
+  return wording;
 }
 
 RunIndices ComputeIndices(const std::vector<Indication>& all,
@@ -201,6 +236,11 @@ std::vector<Indication> ScoreRun(const std::shared_ptr<const ModelSet>& models,
     indication.detected = verdict.detected;
     indication.isolated = FaultsIn(*models, verdict.isolated);
     indication.withdrawn = IsWithdrawn(*models, verdict);
+    indication.wording = !all.empty() && !indication.isolated.empty() &&
+                                 indication.isolated == all.back().isolated
+                             ? all.back().wording
+                             : WordingOf(*models, verdict, indication.isolated,
+                                         Layer::kObservers);
     all.push_back(std::move(indication));
     // A detection takes several abnormal samples and carries the stamp of the
     // first. The samples since then are already stored, hence the way back.

@@ -6,10 +6,17 @@
 #include <vector>
 
 #include "diagnosis/model_set.h"
+#include "diagnosis/records/certainty.h"
 #include "diagnosis/verdict.h"
 #include "trainer/dataset.h"
 
 namespace fdi::trainer {
+
+/// What an operator reads beside a name.
+struct Wording {
+  Certainty certainty{Certainty::kNotYet};
+  std::vector<int> look_alikes;  ///< That the set does not know.
+};
 
 /// One instant of an evaluated run: what was the truth, what was indicated.
 struct Indication {
@@ -19,6 +26,7 @@ struct Indication {
   bool detected{false};       ///< DD: an episode is open.
   std::vector<int> isolated;  ///< Faults indicated.
   bool withdrawn{false};      ///< An earlier name was taken back: unknown.
+  Wording wording;            ///< Of `isolated`.
 };
 
 /// The indices of the DAMADICS benchmark for one run, times in s from the start
@@ -45,6 +53,7 @@ struct RunIndices {
   int wrong_isolations{0};  ///< Sets of one wrong fault, while one acts.
   /// Last set isolated while the fault acted, unless it was withdrawn.
   std::vector<int> final_set;
+  Wording wording;  ///< Of final_set when it was named.
 };
 
 /// Computes the indices. t_from is the first instant with a fault, t_on the
@@ -63,6 +72,12 @@ bool IsWithdrawn(const ModelSet& models, const Verdict& verdict);
 /// The numbers of the faults in `set`, ascending. Findings of the floor are not
 /// scored, but for a loss of flow that stands beside a fault as another answer.
 std::vector<int> FaultsIn(const ModelSet& models, FaultSet set);
+
+/// The wording of the name `faults` that an episode has, as the monitor's.
+///
+/// @param layer what gave the name.
+Wording WordingOf(const ModelSet& models, const Verdict& verdict,
+                  const std::vector<int>& faults, Layer layer);
 
 /// Called for every sample with what the engine said about it.
 using VerdictSink = std::function<void(const Sample&, const Verdict&)>;

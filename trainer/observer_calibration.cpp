@@ -89,7 +89,54 @@ constexpr int kFolds = 4;
 struct Fold {
   Condition rest;
   std::vector<Stretch> block;
+  std::vector<Stretch> beyond;  // As `block`, see MarkBeyond().
 };
+
+// What the rest of the record never did says nothing of models of that rest:
+// there they extrapolate, for which Detection makes an allowance of its own.
+// Samples whose model reads such a command, up to `lag` before, count in
+// `beyond`, all others in `block`, where they are few as in WithoutStops();
+// else they are how the valve works.
+void MarkBeyond(int lag, Fold& fold) {
+  constexpr double kMostBeyond = 0.05;
+  if (!fold.rest.training.front().samples.front().Has(Signal::kCv)) {
+    return;
+  }
+  SignalRange range{std::numeric_limits<double>::infinity(),
+                    -std::numeric_limits<double>::infinity()};
+  for (const Stretch& stretch : fold.rest.training) {
+    for (const Sample& sample : stretch.samples) {
+      range.minimum = std::min(range.minimum, sample[Signal::kCv]);
+      range.maximum = std::max(range.maximum, sample[Signal::kCv]);
+    }
+  }
+  std::vector<std::vector<bool>> outside;
+  double count = 0.0;
+  for (const Stretch& stretch : fold.block) {
+    outside.emplace_back();
+    int since = lag + 1;
+    for (const Sample& sample : stretch.samples) {
+      since = range.Contains(sample[Signal::kCv]) ? since + 1 : 0;
+      outside.back().push_back(since <= lag);
+    }
+    count += static_cast<double>(std::ranges::count(outside.back(), true));
+  }
+  if (count == 0.0 ||
+      count > kMostBeyond * static_cast<double>(CountSamples(fold.block))) {
+    return;
+  }
+  fold.beyond = fold.block;
+  for (std::size_t i = 0; i < fold.block.size(); ++i) {
+    for (std::size_t k = 0; k < outside[i].size(); ++k) {
+      Sample& left_out =
+          (outside[i][k] ? fold.block : fold.beyond)[i].samples[k];
+      for (const Signal output :
+           {Signal::kX, Signal::kF, Signal::kP1, Signal::kP2, Signal::kT1}) {
+        left_out.quality[Index(output)] = SignalQuality::kUncertain;
+      }
+    }
+  }
+}
 
 // Every kFolds-th stretch and the others; of few stretches block f of kFolds of
 // each, and the rest of it.
@@ -97,7 +144,7 @@ struct Fold {
 // reaches across it. FitChannel() needs validation data to choose the kind of
 // consequents, which is the block itself; it is not parallel to the training
 // stretches, so WholeStretch() does not work on `rest`.
-Fold MakeFold(const Condition& normal, int fold) {
+Fold MakeFold(const Condition& normal, int fold, int lag) {
   Fold result;
   const bool whole_stretches = normal.training.size() / 2 >= kFolds;
   for (std::size_t i = 0; i < normal.training.size(); ++i) {
@@ -120,7 +167,9 @@ Fold MakeFold(const Condition& normal, int fold) {
   }
   std::erase_if(result.rest.training,
                 [](const Stretch& s) { return s.samples.empty(); });
-  result.rest.validation = result.block;
+  std::vector<Stretch> whole = result.block;
+  MarkBeyond(lag, result);
+  result.rest.validation = std::move(whole);
   return result;
 }
 
@@ -148,19 +197,23 @@ NormalResiduals CrossValidate(const Condition& normal, const Observer& chosen,
   // residuals are those of a model of the same structure.
   ParallelFor(static_cast<int>(residuals.size()), threads, [&](int i) {
     const auto c = static_cast<std::size_t>(i / kFolds);
-    const Fold fold = MakeFold(normal, i % kFolds);
     const TsModel& model_of_all = chosen.channels[c].model;
+    const Fold fold = MakeFold(normal, i % kFolds, MaxLag(model_of_all));
     FitOptions fixed = options;
     fixed.rules.counts = {static_cast<int>(model_of_all.rules.size())};
     fixed.rules.min_rules = fixed.rules.counts.front();
     const TsModel model = FitChannel(plans[c], model_of_all.regressors,
                                      fold.rest, fixed, model_of_all.saturation);
-    for (const Stretch& stretch : fold.block) {
-      residuals[static_cast<std::size_t>(i)].push_back(
-          RunResiduals(model, stretch, options.settling));
-      commands[static_cast<std::size_t>(i)].push_back(
-          RunCommands(model, stretch, options.settling));
-    }
+    const auto run = [&](const TsModel& by, const std::vector<Stretch>& over) {
+      for (const Stretch& stretch : over) {
+        residuals[static_cast<std::size_t>(i)].push_back(
+            RunResiduals(by, stretch, options.settling));
+        commands[static_cast<std::size_t>(i)].push_back(
+            RunCommands(by, stretch, options.settling));
+      }
+    };
+    run(model, fold.block);
+    run(model_of_all, fold.beyond);
   });
   return {JoinedFolds(residuals), JoinedFolds(commands)};
 }
@@ -467,6 +520,8 @@ FitBounds AnotherDay(const ModelSet& models, std::size_t c) {
   return room;
 }
 
+}  // namespace
+
 // The inputs that are outside normal operation in all data of a condition but
 // what noise brings back.
 SignalMask MovedIn(const Condition& condition, const ModelSet& models) {
@@ -492,8 +547,6 @@ SignalMask MovedIn(const Condition& condition, const ModelSet& models) {
   }
   return moved;
 }
-
-}  // namespace
 
 void SetFitBounds(const std::vector<Condition>& conditions, int threads,
                   ModelSet& models) {

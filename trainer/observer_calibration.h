@@ -45,7 +45,9 @@ struct NormalResiduals {
 /// Residuals of normal operation that no model was fitted to: four folds, each
 /// predicted by models of the others with the regressors and as many rules as
 /// those of `chosen`. Folds are whole stretches where there are eight or more,
-/// else blocks of consecutive samples of each.
+/// else blocks of consecutive samples of each. Samples of a fold at commands
+/// that the others never had are predicted by `chosen`, where
+/// they are at most 5 %.
 ///
 /// @param chosen The normal observer fitted to all data.
 /// @param plans By channel.
@@ -76,6 +78,10 @@ void FitInterpolationErrors(const std::vector<Condition>& conditions,
 /// @param conditions parallel to models.observers.
 void SetFitBounds(const std::vector<Condition>& conditions, int threads,
                   ModelSet& models);
+
+/// Of P1, P2 and T1, those outside normal operation in 95 % of the validation
+/// samples: Observer::moved.
+SignalMask MovedIn(const Condition& condition, const ModelSet& models);
 
 /// Fills ModelSet::groups and ModelSet::undetectable by scoring the validation
 /// stretches of every fault condition: a fault is undetectable if under 5 % of

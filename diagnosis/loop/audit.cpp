@@ -18,7 +18,10 @@ namespace {
 // Thresholds of the method; set on simulation and public windows, not fitted.
 constexpr double kGap = 0.15;
 constexpr double kExplained = 0.3;
-constexpr double kPredictionGain = 3.0;   // LLR of a sure verdict.
+constexpr double kPredictionGain = 3.0;  // LLR of a sure verdict.
+// ln N of two hours in blocks of 30 s: by BIC, what width and start of a play
+// have to gain to be more than chance.
+constexpr double kChanceGain = 5.5;
 constexpr double kConvincingGain = 10.0;  // LLR that makes up for the gap.
 constexpr double kUnclearGain = 20.0;     // LLR that calls for a closer look.
 constexpr double kRegular = 1.0;
@@ -34,7 +37,11 @@ constexpr double kHalf = 0.5;     // G of a play between OP and X.
 constexpr double kMoves = 1.0;    // Of OP, which calls for an answer [%].
 constexpr double kWindsUp = 5.0;  // The same, whatever the noise of it [%].
 constexpr double kOftenAtLimit = 0.05;
-constexpr double kUnrelated = 0.05;  // r² of X over OP: it is all noise.
+// Samples further apart than the lag of a rod are alike by chance.
+constexpr double kFast_s = 2.0;
+constexpr std::size_t kOftenStands = 5;  // Of X: so often,
+constexpr double kLongStands = 0.01;     // and for such a share of the time.
+constexpr double kUnrelated = 0.05;      // r² of X over OP: it is all noise.
 constexpr std::size_t kFrozenSamples = 300;
 constexpr double kBlock_s = 30.0;  // Of the second witness.
 
@@ -87,18 +94,19 @@ ControllerFit FitController(const Window& window) {
   return fit;
 }
 
+double Spread(std::span<const double> values) {
+  const double mean = Mean(values);
+  double squares = 0.0;
+  for (const double v : values) {
+    squares += (v - mean) * (v - mean);
+  }
+  return std::sqrt(squares / static_cast<double>(values.size()));
+}
+
 // The distance of the means of two series, of the sum of their spreads.
 double Distance(std::span<const double> a, std::span<const double> b) {
-  const auto spread = [](std::span<const double> values) {
-    const double mean = Mean(values);
-    double squares = 0.0;
-    for (const double v : values) {
-      squares += (v - mean) * (v - mean);
-    }
-    return std::sqrt(squares / static_cast<double>(values.size()));
-  };
   const double off = std::abs(Mean(a) - Mean(b));
-  return off > 0.0 ? off / (spread(a) + spread(b)) : 0.0;
+  return off > 0.0 ? off / (Spread(a) + Spread(b)) : 0.0;
 }
 
 bool IsExchanged(const Window& window, double controller) {
@@ -209,7 +217,19 @@ bool IsPlay(const Evidence& e) {
          (explained > kOverwhelming && e.prediction_gain > kConvincingGain);
 }
 
+bool Sticks(const Standing& standing) {
+  return standing.times >= kOftenStands && standing.share > kLongStands;
+}
+
 }  // namespace
+
+std::optional<Band> Evidence::band() const {
+  if (Sticks(standing) && (!fit || fit->explained() <= kHalf)) {
+    return Band{standing.middle, standing.low, standing.high};
+  }
+  return fit ? std::optional(Band{fit->band, fit->band_low, fit->band_high})
+             : std::nullopt;
+}
 
 bool IsPercent(std::span<const double> op) {
   return std::ranges::all_of(op,
@@ -238,6 +258,10 @@ Finding JudgePosition(const Evidence& e) {
   if (e.fit && e.fit->band >= kGoodBand && e.fit->explained() > kHalf) {
     return {Verdict::kStiction, true, "the position follows OP through a play"};
   }
+  if (Sticks(e.standing)) {
+    return {Verdict::kStiction, true,
+            "the position stands again and again while OP moves"};
+  }
   if (e.at_limit > kOftenAtLimit) {
     return AtLimit();
   }
@@ -246,7 +270,11 @@ Finding JudgePosition(const Evidence& e) {
 }
 
 Finding JudgePlay(const Evidence& e) {
-  if (!IsPlay(e) || e.prediction_gain <= 0.0) {
+  // A play that leaves most of PV unexplained has to predict it all the more:
+  // where the load alone moves PV, the integral of the controller lags like
+  // one.
+  if (!IsPlay(e) ||
+      e.prediction_gain <= (e.fit->explained() > kHalf ? 0.0 : kChanceGain)) {
     return {};
   }
   return e.prediction_gain > kPredictionGain
@@ -368,9 +396,11 @@ void AddAnswer(const Window& window, Evidence& e) {
     return fit ? std::max(fit->linear, fit->play) : 1.0;
   };
   e.fit = FitPlay(op, means, window.x.empty() ? e.gain_sign : 1);
-  // Nor does it follow the other way round, as with a wrong sense.
+  // Nor does it follow the other way round, as with a wrong sense; and it does
+  // not move on its own, as where OP is restless and X a moment late.
   e.unrelated = explains(e.fit) < kUnrelated && !window.x.empty() &&
-                explains(FitPlay(op, means, -1)) < kUnrelated;
+                explains(FitPlay(op, means, -1)) < kUnrelated &&
+                Spread(means) < kHalf * Spread(op);
   e.increments = FitIncrements(op, BlockMeans(window.pv, block), e.gain_sign);
   e.integrates = window.integrating.value_or(
       e.fit && e.increments > kIntegral && e.increments > e.fit->linear);
@@ -380,11 +410,11 @@ void AddAnswer(const Window& window, Evidence& e) {
 }
 
 // The second witness.
-double PredictionGain(const Window& window) {
+double PredictionGain(const Window& window, const PlayFit& fit) {
   const auto block = static_cast<std::size_t>(
       std::max(1.0, std::round(kBlock_s / window.period_s)));
   return PlayPredictionGain(BlockMeans(window.op, block),
-                            BlockMeans(window.pv, block));
+                            BlockMeans(window.pv, block), fit);
 }
 
 // All but the second witness.
@@ -410,6 +440,9 @@ Evidence EvidenceOf(const Window& window) {
     sums.Add(window.op[k] - window.op[0], window.pv[k] - window.pv[0]);
   }
   e.correlation = e.gain_sign * sums.Correlation();
+  if (!window.x.empty() && window.period_s <= kFast_s) {
+    e.standing = FindStanding(window.op, window.x);
+  }
   AddAnswer(window, e);
   return e;
 }
@@ -420,8 +453,9 @@ Audit AuditWindow(const Window& window) {
   Check(window);
   Audit audit;
   audit.evidence = EvidenceOf(window);
-  if (window.op.size() >= kMinSamples) {
-    audit.evidence.prediction_gain = PredictionGain(window);
+  if (audit.evidence.fit) {
+    audit.evidence.prediction_gain =
+        PredictionGain(window, *audit.evidence.fit);
   }
   static_cast<Finding&>(audit) = Judge(window, audit.evidence);
   return audit;
@@ -435,7 +469,7 @@ Audit AuditValve(Window window) {
     Evidence& e = audit.evidence;
     // The second witness is heard where the first has something to say.
     if (window.x.empty() && e.fit && e.fit->explained() > kExplained) {
-      e.prediction_gain = PredictionGain(window);
+      e.prediction_gain = PredictionGain(window, *e.fit);
     }
     static_cast<Finding&>(audit) = Judge(window, e);
   };
@@ -446,6 +480,7 @@ Audit AuditValve(Window window) {
   }
   window.x.clear();
   Audit by_flow = by_x;
+  by_flow.evidence.standing = {};
   AddAnswer(window, by_flow.evidence);
   judge(by_flow);
   // A play that X does not show is none of the valve.

@@ -10,6 +10,7 @@
 
 #include "diagnosis/loop/oscillation.h"
 #include "diagnosis/loop/play_fit.h"
+#include "diagnosis/loop/standing.h"
 
 /// The audit of a control loop from its ordinary records: no model, no position
 /// needed. docs/loops.md says how to read its verdicts.
@@ -46,6 +47,13 @@ inline constexpr std::size_t kVerdictCount = 8;
 /// "undetermined", "stiction", "no_response", ...
 std::string_view VerdictName(Verdict verdict);
 
+/// A dead band [% of OP span], with its interval.
+struct Band {
+  double width{0.0};
+  double low{0.0};
+  double high{0.0};
+};
+
 /// What is known of a window. Shares are of its samples.
 struct Evidence {
   std::size_t samples{0};
@@ -60,14 +68,19 @@ struct Evidence {
   double unanswered{0.0};  ///< Longest one-way run of OP without answer [%].
   std::optional<Oscillation> oscillation;  ///< Of OP; period in samples.
   std::optional<PlayFit> fit;              ///< PV, or X, over OP.
-  bool unrelated{false};                   ///< X is noise, whatever OP does.
-  double prediction_gain{0.0};             ///< LLR, the second witness.
-  double increments{0.0};                  ///< r² of PV as the integral of OP.
-  double correlation{0.0};  ///< Of OP and PV, times the sign of the gain.
-  bool integrates{false};   ///< As known, else by the increments.
+  Standing standing;            ///< Of X, in samples of 2 s and less.
+  bool unrelated{false};        ///< X is noise, whatever OP does.
+  double prediction_gain{0.0};  ///< LLR, the second witness.
+  double increments{0.0};       ///< r² of PV as the integral of OP.
+  double correlation{0.0};      ///< Of OP and PV, times the sign of the gain.
+  bool integrates{false};       ///< As known, else by the increments.
   /// OP and PV seem exchanged: SP stays at OP and not at PV, and the
   /// controller's law fits better the other way round.
   bool exchanged{false};
+
+  /// Of the play, or, where it explains little of X, of the standing; nothing
+  /// if neither was found.
+  std::optional<Band> band() const;
 };
 
 /// What a window says.
@@ -88,9 +101,12 @@ bool IsPercent(std::span<const double> op);
 ///
 /// - stiction, if a play of at least 0.25 % explains PV much better than a
 ///   straight line (gap > 0.15 and G > 0.3, or G > 0.8 and LLR > 10;
-///   FitPlay()), no regular sinusoid does, and a play also predicts PV better
-///   (PlayPredictionGain(): LLR > 0 likely, LLR > 3 sure). Where X is measured,
-///   if a play explains half of what a straight line leaves of X over OP.
+///   FitPlay()), no regular sinusoid does, and the same play also predicts PV
+///   better (PlayPredictionGain(): LLR > 0 likely, LLR > 3 sure; where G is
+///   below a half, LLR > 5.5). Where X is measured,
+///   if a play explains half of what a straight line leaves of X over OP, or if
+///   X stands five times and 1 % of the time while OP moves (Standing): where
+///   OP is restless, friction holds X for seconds and is no play.
 /// - the other causes by what is left: see Verdict and docs/loops.md.
 ///
 /// Of an integrating loop a play is never concluded from PV, because the

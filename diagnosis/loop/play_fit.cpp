@@ -23,13 +23,15 @@ double WidthShare(int i) {
   return kNarrowest + (kWidest - kNarrowest) * i / (kWidths - 1);
 }
 
-// Calls visit(w, p) for OP itself, w = 0, and for each play of it.
+// Calls visit(w, p) for OP itself, w = 0, and for plays of widths from `low` to
+// `high`.
 template <typename Visit>
-void ForEachPlay(std::span<const double> op, const Visit& visit) {
+void ForEachPlay(std::span<const double> op, double low, double high,
+                 const Visit& visit) {
   visit(0.0, std::vector<double>(op.begin(), op.end()));
-  const double range = RangeOf(op);
-  for (int i = 0; i < kWidths; ++i) {
-    const double width = range * WidthShare(i);
+  constexpr int kTried = 5;
+  for (int i = 0; i < kTried; ++i) {
+    const double width = low + (high - low) * i / (kTried - 1);
     for (const double side : kSides) {
       visit(width, PlayOf(op, width, op.front() + side * width));
     }
@@ -170,6 +172,7 @@ std::optional<PlayFit> FitPlay(std::span<const double> op,
       fit.linear = best;
     }
   }
+  fit.step = range * (WidthShare(1) - WidthShare(0));
   fit.band_low = fit.band;
   fit.band_high = fit.band;
   for (const auto& [width, error] : errors) {
@@ -182,7 +185,7 @@ std::optional<PlayFit> FitPlay(std::span<const double> op,
 }
 
 double PlayPredictionGain(std::span<const double> op,
-                          std::span<const double> pv) {
+                          std::span<const double> pv, const PlayFit& fit) {
   constexpr int kOrder = 4;
   const auto rows = static_cast<Eigen::Index>(pv.size()) - kOrder;
   if (rows < Eigen::Index{4} * kOrder || RangeOf(op) <= 0.0 ||
@@ -211,7 +214,9 @@ double PlayPredictionGain(std::span<const double> op,
   known.topLeftCorner<kOrder + 1, kOrder + 1>() = fixed.transpose() * fixed;
   double linear = 0.0;
   double least = std::numeric_limits<double>::infinity();
-  ForEachPlay(op, [&](double width, const std::vector<double>& play) {
+  const double low = std::max(fit.band_low - 2.0 * fit.step, fit.step);
+  const double high = fit.band_high + 2.0 * fit.step;
+  const auto try_play = [&](double width, const std::vector<double>& play) {
     const Eigen::VectorXd input =
         Eigen::Map<const Eigen::VectorXd>(play.data(), rows + kOrder).array() -
         op[0];
@@ -236,7 +241,8 @@ double PlayPredictionGain(std::span<const double> op,
     } else {
       linear = error;
     }
-  });
+  };
+  ForEachPlay(op, low, high, try_play);
   if (!(linear > 0.0) || !(least > 0.0)) {
     return 0.0;
   }

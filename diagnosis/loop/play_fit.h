@@ -12,6 +12,7 @@ struct PlayFit {
   double band{0.0};       ///< w of the best fit [% of OP span].
   double band_low{0.0};   ///< The widths whose squared error is within 5 % of
   double band_high{0.0};  ///< the least.
+  double step{0.0};       ///< Between the widths that were tried.
   double start{0.0};      ///< Of the play.
   int lag{0};             ///< Of the first-order filter [samples].
   int delay{0};           ///< [samples]
@@ -37,17 +38,19 @@ struct PlayFit {
 std::optional<PlayFit> FitPlay(std::span<const double> op,
                                std::span<const double> pv, int sign);
 
-/// The gain of one-step predictions of PV by a play:
+/// The gain of one-step predictions of PV by the play that was fitted:
 ///
 ///     LLR = N/2 ln(SSE(u) / min_w SSE(play_w u)),
 ///     PV(k) = c + Σ_i a_i PV(k-i) + Σ_i b_i u(k-i),   i = 1..4,
 ///
 /// by least squares, consistent in closed loop. Without u(k): with it the
-/// controller's own law would explain everything.
+/// controller's own law would explain everything. w goes from two steps below
+/// `fit.band_low` to two above `fit.band_high`: a play of another width would
+/// be no witness of this one.
 ///
 /// @returns 0 if there are too few samples or nothing to predict.
 double PlayPredictionGain(std::span<const double> op,
-                          std::span<const double> pv);
+                          std::span<const double> pv, const PlayFit& fit);
 
 /// r² of increments of PV over h = 3, 6 or 12 samples from the mean of OP over
 /// the same samples, delays 0, 1, 3, 6, as an integrating process has them; of

@@ -1,6 +1,8 @@
 #include "diagnosis/records/certainty.h"
 
+#include <algorithm>
 #include <array>
+#include <optional>
 
 #include "diagnosis/fault_catalogue.h"
 
@@ -9,6 +11,9 @@ namespace {
 
 constexpr double kSureFactor = 0.9;
 constexpr double kAgreeingFactor = 0.5;
+// An external leak takes at most a twentieth of the flow, and estimates err.
+constexpr double kWeak = 0.06;
+constexpr int kExternalLeak = 5;
 
 }  // namespace
 
@@ -36,6 +41,44 @@ Certainty CertaintyOf(std::string_view faults, Layer layer, double factor,
   return cause && factor >= least ? Certainty::kSure : Certainty::kLikely;
 }
 
+std::vector<std::string> LookAlikesBeside(
+    std::string_view faults, Layer layer, double strength,
+    const std::vector<std::string>& known) {
+  std::vector<std::string> beside;
+  const std::optional<int> fault = ParseFault(faults);
+  if (!fault || known.empty() || layer != Layer::kObservers) {
+    return beside;
+  }
+  const FaultFacts& facts = FaultFactsOf(*fault);
+  const auto add = [&](int other) {
+    if (other != 0 &&
+        std::ranges::find(known, FaultName(other)) == known.end()) {
+      beside.push_back(FaultName(other));
+    }
+  };
+  const bool weak = strength > 0.0 && strength <= kWeak;
+  if (facts.alike == Alike::kWithinItsSize ||
+      (weak && facts.alike == Alike::kWhileWeak)) {
+    std::ranges::for_each(facts.look_alikes, add);
+  }
+  // Not so to a simulation, which sees what the loop does.
+  if (weak && facts.acts_on == ActsOn::kFlowReading) {
+    add(kExternalLeak);
+  }
+  return beside;
+}
+
+std::vector<std::string> LookAlikesOf(const FaultEvent& event) {
+  std::vector<std::string> known;
+  if (event.models) {
+    for (const int fault : event.models->faults) {
+      known.push_back(FaultName(fault));
+    }
+  }
+  const Transition& t = event.transition;
+  return LookAlikesBeside(IsolatedFaults(event), t.layer, t.strength, known);
+}
+
 std::string IsolatedFaults(const FaultEvent& event) {
   std::string text;
   for (const FaultCandidate& candidate : event.candidates) {
@@ -51,8 +94,10 @@ Certainty CertaintyOf(const FaultEvent& event) {
   const bool outside = event.candidates.empty() &&
                        t.unknown != Unknown::kTooEarly &&
                        t.kind != TransitionKind::kDetected;
-  return CertaintyOf(IsolatedFaults(event), t.layer, t.factor,
-                     outside ? Unknown::kOutsideKnown : Unknown::kTooEarly);
+  return WithLookAlikes(
+      CertaintyOf(IsolatedFaults(event), t.layer, t.factor,
+                  outside ? Unknown::kOutsideKnown : Unknown::kTooEarly),
+      LookAlikesOf(event));
 }
 
 }  // namespace fdi

@@ -2,6 +2,7 @@
 
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "diagnosis/records/fault_event.h"
 #include "diagnosis/verdict.h"
@@ -29,6 +30,26 @@ std::string_view CertaintyName(Certainty certainty);  ///< "one of", ...
 /// @param unknown why there is no name.
 Certainty CertaintyOf(std::string_view faults, Layer layer, double factor,
                       Unknown unknown = Unknown::kTooEarly);
+
+/// Faults that look like `faults`, where these are a single one, to observers
+/// whose set does not know them: of one shape whatever the size, or as long as
+/// both are weak. Empty for a name by a simulation of the valve, which knows
+/// all faults.
+/// @param strength of the fault; signed [-].
+/// @param known names of all faults of the set; empty: the set is not known,
+///   and nothing is added.
+std::vector<std::string> LookAlikesBeside(
+    std::string_view faults, Layer layer, double strength,
+    const std::vector<std::string>& known);
+
+/// `certainty` of a name with these look-alikes beside it.
+inline Certainty WithLookAlikes(Certainty certainty,
+                                const std::vector<std::string>& look_alikes) {
+  return look_alikes.empty() ? certainty : Certainty::kOneOf;
+}
+
+/// Those of the name that `event` gives; none if it came from the bus.
+std::vector<std::string> LookAlikesOf(const FaultEvent& event);
 
 /// The faults that `event` isolates, joined by |; empty if none.
 std::string IsolatedFaults(const FaultEvent& event);

@@ -12,7 +12,7 @@ namespace {
 
 constexpr const char* kApi = "/api/";
 constexpr const char* kLogIn = "/api/v1/login";
-constexpr const char* kTokenHeader = "X-FDI-Token";
+constexpr const char* kNoSession = "expected a session: POST /api/v1/login";
 constexpr std::size_t kShownPath = 200;
 
 // Quotes untrusted text as one word of a log line.
@@ -27,28 +27,10 @@ std::string_view PlainAddress(std::string_view address) {
                                       : address;
 }
 
-// The token of the request. The page sends it in a header of its own, because
-// a browser's fetch() with Authorization would displace what the browser itself
-// sends there to a proxy with basic authentication.
-std::string TokenOf(const httplib::Request& request) {
-  if (request.has_header(kTokenHeader)) {
-    return request.get_header_value(kTokenHeader);
-  }
-  constexpr std::string_view kScheme = "Bearer ";
-  const std::string header = request.get_header_value("Authorization");
-  return header.starts_with(kScheme) ? header.substr(kScheme.size())
-                                     : std::string();
-}
-
 }  // namespace
 
 Admission::Admission(const AdmissionOptions& options, LogSink log)
-    : options_(options),
-      log_(std::move(log)),
-      token_(options.token_file ? LoadToken(*options.token_file) : "", log_) {
-  if (options.token_file) {
-    log_(LogLevel::kInfo, "console_token file=" + options.token_file->string());
-  }
+    : options_(options), log_(std::move(log)) {
   Reload();
 }
 
@@ -68,8 +50,7 @@ void Admission::Reload() {
 
 void Admission::AddTo(httplib::Server& server, const std::string& cookie,
                       bool https) {
-  // Without users there is no cookie that a browser would add by itself. The
-  // token comes in a header that a foreign page cannot fill in.
+  // Without users nothing can be changed, so no page has to prove its origin.
   if (!logins_) {
     return;
   }
@@ -114,8 +95,7 @@ bool Admission::Admit(const httplib::Request& request,
     Refuse(request, response, 403, "proxy_user",
            "the proxy names a user who is not in the file of --console-users");
   } else {
-    Refuse(request, response, 401, "no_session",
-           std::string("expected a session: POST ") + kLogIn);
+    Refuse(request, response, 401, "no_session", kNoSession);
   }
   return false;
 }
@@ -188,7 +168,7 @@ bool Admission::HasSession(const httplib::Request& request) const {
 
 bool Admission::MayWrite(const httplib::Request& request) {
   const std::optional<Visitor> visitor = Authenticate(request);
-  return visitor ? visitor->role >= Role::kAcknowledge : token_.writable();
+  return visitor && visitor->role >= Role::kAcknowledge;
 }
 
 void Admission::LogIn(const httplib::Request& request,
@@ -255,29 +235,14 @@ bool Admission::Authorize(const httplib::Request& request,
     who = visitor->name;
     return true;
   }
-  // Reached without users, or if the session has ended since Admit().
-  switch (token_.Check(TokenOf(request), request.remote_addr)) {
-    case Permission::kReadOnly:
-      Refuse(request, response, 403, "read_only",
-             "this console is read-only: start the monitor with "
-             "--console-write FILE or --console-users FILE");
-      return false;
-    case Permission::kWrongToken:  // Already logged by the guard.
-      response.set_header("WWW-Authenticate", "Bearer");
-      SendError(response, 401,
-                std::string(kTokenHeader) +
-                    ", or Authorization: Bearer: expected the token of the "
-                    "file named by --console-write");
-      return false;
-    case Permission::kTooMany:
-      response.set_header("Retry-After", "1");
-      Refuse(request, response, 429, "slowed",
-             "too many wrong tokens came from this address");
-      return false;
-    case Permission::kGranted:
-      break;
+  if (logins_) {  // The session has ended since Admit().
+    Refuse(request, response, 401, "no_session", kNoSession);
+  } else {
+    Refuse(request, response, 403, "read_only",
+           "this console is read-only: start the monitor with "
+           "--console-users FILE");
   }
-  return true;
+  return false;
 }
 
 // `action`, and `reason` below, are string literals: the counts keep views of
@@ -286,7 +251,7 @@ void Admission::LogAction(const httplib::Request& request, const char* action,
                           const std::string& who, const std::string& subject) {
   const auto visitor = logins_ ? logins_->OfName(who) : std::nullopt;
   std::string line = "console_action user=" + Quoted(who) + " role=";
-  line.append(visitor ? RoleName(visitor->role) : "token")
+  line.append(visitor ? RoleName(visitor->role) : "none")
       .append(" action=")
       .append(action)
       .append(subject.empty() ? "" : " ")
@@ -337,17 +302,12 @@ void Admission::Refuse(const httplib::Request& request,
   SendError(response, status, what);
 }
 
-const char* Admission::mode() const {
-  return logins_ ? "users" : token_.writable() ? "token" : "off";
-}
-
 AdmissionCounts Admission::counts() const {
   AdmissionCounts counts;
   {
     const MutexLock lock(mutex_);
     counts = counts_;
   }
-  counts.tokens = token_.counts();
   if (logins_) {
     counts.sessions = logins_->sessions();
   }

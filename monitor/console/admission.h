@@ -10,7 +10,6 @@
 
 #include "base/log.h"
 #include "base/mutex.h"
-#include "monitor/console/access.h"
 #include "monitor/console/logins.h"
 #include "monitor/throttled_log.h"
 
@@ -24,9 +23,7 @@ namespace fdi::console {
 
 /// Settings of Admission.
 struct AdmissionOptions {
-  /// File of the token that permits actions on alarms; none: read-only.
-  std::optional<std::filesystem::path> token_file;
-  /// File of users and roles, used instead of the token; see LoadUsers().
+  /// File of users and roles, see LoadUsers(); none: read-only.
   std::optional<std::filesystem::path> users_file;
   /// Header in which the proxy at proxy_address names the user of a request;
   /// empty: no proxy.
@@ -36,16 +33,16 @@ struct AdmissionOptions {
 
 /// Refusals by reason and actions by kind, since the start.
 struct AdmissionCounts {
-  TokenGuard::Counts tokens;
   std::map<std::string_view, std::uint64_t> refused;
   std::map<std::string_view, std::uint64_t> actions;
   std::optional<std::size_t> sessions;  ///< With users.
 };
 
 /// Decides who may read and who may act. Without users, everybody may read and
-/// the token permits actions. With users, everything except the files of the
-/// page requires a login. Each action and each refusal is logged in one line;
-/// refusals are limited to 10 per reason in 10 s. Thread safe.
+/// nobody may act. With users, everything except the files of the page requires
+/// a login or a proxy that names the user. Each action and each refusal is
+/// logged in one line; refusals are limited to 10 per reason in 10 s. Thread
+/// safe.
 class Admission {
  public:
   /// @throws ConfigError, DataError if a file is invalid.
@@ -76,9 +73,7 @@ class Admission {
                  const std::string& who, const std::string& subject);
 
   /// Whether anybody can act at all.
-  bool writable() const { return logins_ || token_.writable(); }
-  /// "token", "users" or "off".
-  const char* mode() const;
+  bool writable() const { return logins_.has_value(); }
   AdmissionCounts counts() const;
 
   /// Reloads the users. @throws as the constructor; then the old ones stay.
@@ -99,7 +94,6 @@ class Admission {
 
   const AdmissionOptions options_;
   const LogSink log_;
-  TokenGuard token_;
   std::optional<Logins> logins_;
   std::string cookie_;
   bool https_{false};

@@ -34,6 +34,7 @@ void AddTo(ValveAlarm& valve, const Alarm& alarm,
     valve.fault = e.fault.value_or("");
     valve.by_audit = !e.ended_ns && e.layer == LayerName(Layer::kAudit);
     valve.certainty = storage::CertaintyOf(e);
+    valve.look_alikes = storage::LookAlikesOf(e);
   }
 }
 

@@ -180,14 +180,14 @@ void Console::Start(ConsoleSources sources) {
 void Console::LogListenAddress() const {
   const bool local = monitor::IsLoopback(server_->address().host);
   log_(local ? LogLevel::kInfo : LogLevel::kWarning,
-       "console_listening address=" + ToString(server_->address()) + " write=" +
-           (access_.writable() ? "on" : "off") + " access=" + access_.mode() +
+       "console_listening address=" + ToString(server_->address()) +
+           " access=" + (access_.writable() ? "users" : "read_only") +
            " tls=" + (server_->has_tls() ? "on" : "off") +
            (local ? "" : " open_to_network=yes"));
   if (!local && !server_->has_tls() && access_.writable()) {
     log_(LogLevel::kWarning,
-         "console_unencrypted reason=\"passwords and tokens can be read on the "
-         "network: give --console-tls, or listen on 127.0.0.1 behind a proxy "
+         "console_unencrypted reason=\"passwords can be read on the network: "
+         "give --console-tls, or listen on 127.0.0.1 behind a proxy "
          "with TLS\"");
   }
 }

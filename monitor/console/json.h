@@ -44,6 +44,7 @@ struct ValveAlarm {
   /// it.
   bool by_audit{false};
   Certainty certainty{Certainty::kNotYet};
+  std::vector<std::string> look_alikes{};
 
   bool operator==(const ValveAlarm&) const = default;
 };

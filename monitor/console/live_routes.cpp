@@ -8,6 +8,8 @@
 #include "base/printable.h"
 #include "base/time_units.h"
 #include "monitor/console/api.h"
+#include "storage/models/models.h"
+#include "storage/models/plant_loops.h"
 
 namespace fdi::console {
 namespace {
@@ -91,6 +93,46 @@ void AddStoredGaps(const Api& api, const std::string& valve_id,
   }
 }
 
+Json WindowsJson(const ModelFacts& models,
+                 const std::vector<TracePoint>& points) {
+  Json json = Json::array();
+  for (const WindowBeyond& window : WindowsBeyond(models, points)) {
+    json.push_back({{"channel", models.channels[window.channel].name},
+                    {"samples", window.length},
+                    {"of", window.deviation ? "deviation" : "mean"},
+                    {"value", window.value},
+                    {"low", window.low},
+                    {"high", window.high}});
+  }
+  return json;
+}
+
+// What the entry of the valve and the table of the plant say about it. The page
+// of a plant does not have them.
+Json About(const Api& api, const httplib::Request& request) {
+  Json about = {{"type", nullptr},
+                {"service", nullptr},
+                {"grade", nullptr},
+                {"group", nullptr}};
+  if (api.sources.plant_history || api.sources.models.empty()) {
+    return about;
+  }
+  const std::string valve_id = request.matches[1];
+  storage::ModelStore store(api.sources.models);
+  if (const auto entry = store.FindValve(valve_id);
+      entry && !entry->type.empty()) {
+    about["type"] = entry->type;
+  }
+  for (const storage::PlantLoop& loop : store.Loops()) {
+    if (loop.name == valve_id) {
+      about["service"] = loop.service.empty() ? Json() : Json(loop.service);
+      about["grade"] = loop.grade ? Json(*loop.grade) : Json();
+      about["group"] = loop.group.empty() ? Json() : Json(loop.group);
+    }
+  }
+  return about;
+}
+
 Json Trend(const Api& api, const httplib::Request& request) {
   const std::string valve_id = request.matches[1];
   const std::int64_t seconds =
@@ -100,11 +142,15 @@ Json Trend(const Api& api, const httplib::Request& request) {
     throw NotFoundError("valve " + valve_id +
                         " has sent nothing since the monitor started");
   }
+  Json windows = trend->now.models
+                     ? WindowsJson(*trend->now.models, trend->points)
+                     : Json::array();
   const std::int64_t since_ns = trend->now.stamp_ns - seconds * kNsPerSecond;
   std::erase_if(trend->points, [since_ns](const TracePoint& point) {
     return point.sample.stamp_ns < since_ns;
   });
   Json json = TrendJson(trend->now.models.get(), valve_id, trend->points);
+  json["windows"] = std::move(windows);
   json["gaps"] = Json::array();
   for (const DataGap& gap : trend->gaps) {
     json["gaps"].push_back(GapJson(gap));
@@ -179,6 +225,7 @@ std::vector<Route> LiveRoutes() {
   return {{"/api/v1/status", Status},
           {"/api/v1/faults", Faults},
           {"/api/v1/valves", Valves},
+          {"/api/v1/valves/(.+)/about", About},
           {"/api/v1/valves/(.+)/trend", Trend}};
 }
 

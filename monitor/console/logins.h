@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "base/mutex.h"
-#include "monitor/console/access.h"
+#include "monitor/console/failure_limit.h"
 #include "monitor/console/users.h"
 
 namespace fdi::console {
@@ -60,8 +60,7 @@ class Logins {
   mutable Mutex mutex_;
   Users users_ GUARDED_BY(mutex_);
   std::vector<Session> sessions_ GUARDED_BY(mutex_);
-  FailureLimit failures_ GUARDED_BY(mutex_){
-      FailureLimit::WhenFull::kReplaceOldest};
+  FailureLimit failures_ GUARDED_BY(mutex_);
 };
 
 }  // namespace fdi::console

@@ -10,6 +10,7 @@
 #include "base/error.h"
 #include "base/text.h"
 #include "diagnosis/fault_catalogue.h"
+#include "diagnosis/residual_windows.h"
 #include "storage/models/models.h"
 
 namespace fdi::console {
@@ -94,7 +95,7 @@ std::shared_ptr<const ModelFacts> FactsOf(const ModelSet& models) {
   for (const ChannelSpec& channel : models.channels) {
     facts->channels.push_back(
         {channel.name, channel.output, UnitOf(channel.output, models.flow_unit),
-         channel.lower_threshold, channel.upper_threshold});
+         channel.lower_threshold, channel.upper_threshold, channel.windows});
   }
   for (const int fault : models.faults) {
     facts->faults.push_back(FaultName(fault));
@@ -157,6 +158,45 @@ std::string_view ShownState(State state, Quality quality, bool partly) {
 
 std::string_view ShownState(const Verdict& verdict) {
   return ShownState(verdict.state, verdict.quality, verdict.confidence < 1.0);
+}
+
+std::vector<WindowBeyond> WindowsBeyond(const ModelFacts& models,
+                                        const std::vector<TracePoint>& points) {
+  ModelSet set;  // Of the channels alone, which is what windows are made from.
+  for (const ModelFacts::Channel& channel : models.channels) {
+    set.channels.emplace_back().windows = channel.windows;
+  }
+  ResidualWindows windows(set);
+  for (const TracePoint& point : points) {
+    if (point.quality == Quality::kLive &&
+        point.residuals.size() == set.channels.size()) {
+      windows.Push(point.residuals, point.sample.Has(Signal::kCv)
+                                        ? point.sample[Signal::kCv]
+                                        : kNone);
+    }
+  }
+  std::vector<WindowBeyond> beyond;
+  for (std::size_t c = 0; c < set.channels.size(); ++c) {
+    for (std::size_t w = 0; w < set.channels[c].windows.size(); ++w) {
+      const WindowLimits& limits = set.channels[c].windows[w];
+      const ResidualWindow& window = windows.window(c, w);
+      const ResidualWindow& command = windows.command(c, w);
+      if (!Applies(limits, window, command)) {
+        continue;
+      }
+      if (window.mean() < limits.lower_mean ||
+          window.mean() > limits.upper_mean) {
+        beyond.push_back({c, limits.length, false, window.mean(),
+                          limits.lower_mean, limits.upper_mean});
+      }
+      if (const double upper = UpperLogRms(limits, command);
+          window.log_rms() > upper) {
+        beyond.push_back({c, limits.length, true, std::exp(window.log_rms()),
+                          0.0, std::exp(upper)});
+      }
+    }
+  }
+  return beyond;
 }
 
 std::string TwoDigits(double value) {

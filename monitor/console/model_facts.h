@@ -24,6 +24,7 @@ struct ModelFacts {
     std::string unit;
     double low{0.0};   ///< Normal residuals r = y − ŷ below this
     double high{0.0};  ///< or above this are abnormal [unit].
+    std::vector<WindowLimits> windows{};
   };
   std::string model_set;  ///< NAME@VERSION
   std::uint64_t hash{0};
@@ -68,6 +69,22 @@ class StoredModels {
 /// some channel abstained, and otherwise "NORMAL".
 std::string_view ShownState(State state, Quality quality, bool partly);
 std::string_view ShownState(const Verdict& verdict);
+
+/// A window of a normal residual that is beyond its limits (WindowLimits).
+struct WindowBeyond {
+  std::size_t channel{0};
+  int length{0};          ///< [samples]
+  bool deviation{false};  ///< Of the residual about its mean; else the mean.
+  double value{0.0};      ///< [unit]
+  double low{0.0};        ///< [unit]; 0 for a deviation.
+  double high{0.0};       ///< [unit]
+};
+
+/// Those at the last of `points`, which reach back as far as is known. They
+/// raise alarms of slow and small faults, while each single residual is within
+/// its thresholds. None where the limits of the set are not known.
+std::vector<WindowBeyond> WindowsBeyond(const ModelFacts& models,
+                                        const std::vector<TracePoint>& points);
 
 /// Returns the plain name of a fault such as "f19".
 using FaultNamer = std::function<std::string(std::string_view)>;

@@ -182,10 +182,6 @@ std::optional<Refusal> TakeHeader(std::string_view line, std::size_t max_body,
     }
     head.user = value;
     pass(user_header, value);
-  } else if (name == "authorization") {
-    pass("Authorization", value);
-  } else if (name == "x-fdi-token") {
-    pass("X-FDI-Token", value);
   } else if (name == "x-forwarded-proto") {
     pass("X-Forwarded-Proto", value);
   } else if (name == "cookie") {

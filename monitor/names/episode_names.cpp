@@ -6,6 +6,8 @@
 #include <iterator>
 #include <numeric>
 
+#include "simulator/second_look/taught_names.h"
+
 namespace fdi::monitor {
 namespace {
 
@@ -73,11 +75,9 @@ void EpisodeNames::StepLooks(const Sample& sample, const Verdict& engine,
 std::optional<EpisodeName::Look> EpisodeNames::LookThatCounts(
     const Verdict& engine) {
   const simulator::LookAnswer* answer = looks_->Answer();
-  const auto names =
-      answer != nullptr
-          ? simulator::NamesOf(
-                *answer, simulator::ObserversName(*models_, engine.isolated))
-          : std::nullopt;
+  const auto names = answer != nullptr
+                         ? simulator::NamesBeside(engine, *models_, *answer)
+                         : std::nullopt;
   if (!names) {
     return std::nullopt;
   }

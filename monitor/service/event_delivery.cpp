@@ -199,8 +199,7 @@ class ProgramDelivery : public EventDelivery {
 
 [[noreturn]] void Refuse(const std::string& target, const std::string& why) {
   throw ConfigError("--on-event '" + target + "': " + why +
-                    "; accepted are a command with its arguments and "
-                    "http://HOST[:PORT][/PATH]");
+                    "; expected a command with its arguments");
 }
 
 // Words are separated by blanks; within '...' or "..." a blank belongs to the

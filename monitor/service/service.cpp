@@ -12,7 +12,6 @@
 #include "monitor/service/service.h"
 
 #include <algorithm>
-#include <cstdio>
 #include <exception>
 #include <functional>
 #include <limits>
@@ -28,12 +27,14 @@
 #include "diagnosis/records/partitions.h"
 #include "diagnosis/records/valve_glob.h"
 #include "idl/interface_watch.h"
+#include "idl/library_log.h"
 #include "monitor/bus/dds_options.h"
 #include "monitor/clock_watch.h"
 #include "monitor/guard.h"
 #include "monitor/health_book.h"
 #include "monitor/service/shadow.h"
 #include "report/fault_texts.h"
+#include "report/logging.h"
 #include "storage/history/history_reader.h"
 
 namespace fdi::monitor {
@@ -497,7 +498,7 @@ void Service::Serve(report::StopSignals& signals) {
       " valves=" + options_.valves +
       " max_valves=" + std::to_string(options_.max_valves) +
       " domain=" + std::to_string(context_.options.domain) + "\n";
-  std::fputs(ready.c_str(), stderr);
+  report::WriteToStderr(ready);
   Notify("READY=1");
   TimePoint next_tick = Clock::now();
   std::uint64_t limit_us = 0;
@@ -630,6 +631,7 @@ StatusFacts Service::Facts() const {
           samples_.status(),
           datagrams,
           intake_participant_.refused_participants(),
+          idl::RefusedPermissions(),
           decisions_.status(),
           pipeline_.journal_backlog(),
           recorder_ ? recorder_->waiting() : 0,

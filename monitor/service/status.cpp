@@ -116,7 +116,6 @@ void AddAlarms(const storage::AlarmCounts& counts, Exposition& page) {
 
 std::vector<Measure> ConsoleMeasures(const MetricsFacts& facts) {
   constexpr std::string_view kStreams = "fdi_console_streams_total";
-  constexpr std::string_view kTokens = "fdi_console_token_failures_total";
   const console::StreamCounts& streams = *facts.streams;
   return {
       {"", "fdi_console_streams", Type::kGauge, "Live streams now", "", "",
@@ -127,12 +126,6 @@ std::vector<Measure> ConsoleMeasures(const MetricsFacts& facts) {
        "outcome", "admitted", streams.admitted},
       {"", kStreams, Type::kCounter, "", "outcome", "refused", streams.refused},
       {"", kStreams, Type::kCounter, "", "outcome", "dropped", streams.dropped},
-      {"", kTokens, Type::kCounter,
-       "Requests to change something with a wrong token, or not looked at "
-       "after too many of those",
-       "outcome", "wrong", facts.admissions.tokens.wrong},
-      {"", kTokens, Type::kCounter, "", "outcome", "not_looked_at",
-       facts.admissions.tokens.unread},
       {"", "fdi_console_bytes", Type::kGauge,
        "Memory of the trends that the console shows", "", "",
        facts.board_bytes}};
@@ -201,6 +194,10 @@ void AddRefusals(const StatusFacts& facts, std::vector<Measure>& measures) {
                       "fdi_dds_participants_refused_total", kCounter,
                       "Participants without a key of our authority", "", "",
                       facts.refused_participants});
+  measures.push_back({"", "fdi_dds_permissions_refused_total", kCounter,
+                      "Participants, writers and readers with a key of our "
+                      "authority without the right to what they do",
+                      "", "", facts.refused_permissions});
 }
 
 }  // namespace

@@ -32,6 +32,7 @@ struct StatusFacts {
   idl::SubscriberStatus samples;
   idl::DatagramCounts datagrams;       ///< Summed over all participants.
   std::uint64_t refused_participants;  ///< By the intake participant.
+  std::uint64_t refused_permissions;   ///< See idl::RefusedPermissions().
   idl::PublisherStatus decisions;
   Journal::Backlog journal;
   std::size_t recorder_backlog{0};

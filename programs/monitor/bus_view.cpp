@@ -70,6 +70,16 @@ report::Json ModelNames::Residuals(const idl::DecisionMessage& message) const {
   return residuals;
 }
 
+std::vector<std::string> ModelNames::FaultsOf(std::uint64_t hash) const {
+  std::vector<std::string> names;
+  if (const idl::ModelSetInfoMessage* info = Find(hash)) {
+    for (const int fault : info->faults) {
+      names.push_back(FaultName(fault));
+    }
+  }
+  return names;
+}
+
 report::Json ModelNames::Factors(const idl::DecisionMessage& message) const {
   const idl::ModelSetInfoMessage* info = Find(message.model_hash);
   report::Json factors = report::Json::object();

@@ -43,17 +43,13 @@ void ConsoleAccess::ApplyTo(console::ConsoleOptions& options) const {
   }
 }
 
-void AddConsoleAccess(CLI::App& verb, ConsoleAccess& access,
-                      CLI::Option* token) {
+void AddConsoleAccess(CLI::App& verb, ConsoleAccess& access) {
   CLI::Option* users =
       verb.add_option("--console-users", access.users,
                       "Ask for a name and a password of FILE, which "
                       "console-user makes, and let each user do what the role "
                       "allows")
           ->type_name("FILE");
-  if (token != nullptr) {
-    users->excludes(token);
-  }
   CLI::Option* header =
       verb.add_option("--console-proxy-user", access.proxy_header,
                       "Header by which a proxy says which of those users asks")

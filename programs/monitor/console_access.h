@@ -7,7 +7,6 @@
 
 namespace CLI {
 class App;
-class Option;
 }  // namespace CLI
 
 namespace fdi::monitor {
@@ -24,8 +23,6 @@ struct ConsoleAccess {
   void ApplyTo(console::ConsoleOptions& options) const;
 };
 
-/// @param token option that excludes users; may be null.
-void AddConsoleAccess(CLI::App& verb, ConsoleAccess& access,
-                      CLI::Option* token);
+void AddConsoleAccess(CLI::App& verb, ConsoleAccess& access);
 
 }  // namespace fdi::monitor

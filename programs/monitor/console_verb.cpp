@@ -152,7 +152,7 @@ void AddConsoleVerb(report::Program& program) {
                   "free one")
       ->capture_default_str()
       ->type_name("ADDRESS:PORT");
-  AddConsoleAccess(console, options.access, nullptr);
+  AddConsoleAccess(console, options.access);
   console
       .add_option("--console-files", options.console.files,
                   "Folder of the page instead of the installed one")

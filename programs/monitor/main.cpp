@@ -22,7 +22,7 @@ std::vector<fdi::report::VerbExamples> Examples() {
          "fdi-monitor run --model-set paper@2 --valves 'FV-1*' --interface "
          "all"},
         {"A page on which people may acknowledge and label",
-         "fdi-monitor run --console=127.0.0.1:8080 --console-write token"},
+         "fdi-monitor run --console=127.0.0.1:8080 --console-users users"},
         {"The page for the control room, over https and with logins",
          "fdi-monitor run --console=0.0.0.0:8443 --console-tls console.pem "
          "--console-users users"},

@@ -5,6 +5,7 @@
 #include <CLI/CLI.hpp>
 
 #include "base/error.h"
+#include "base/headroom.h"
 #include "monitor/service/service.h"
 #include "monitor/throttled_log.h"
 #include "programs/monitor/console_access.h"
@@ -23,7 +24,6 @@ struct RunArguments {
   std::string http{"off"};
   std::string console{"off"};
   console::ConsoleOptions console_options;
-  std::string console_token;
   ConsoleAccess console_access;
   PairOptions pair;
   std::filesystem::path groups;
@@ -59,13 +59,12 @@ std::function<std::string(std::string)> AddressOr(const std::string& usual) {
 }
 
 void TakeConsole(const RunArguments& arguments, ServiceOptions& options) {
-  const bool writable = !arguments.console_token.empty();
   if (arguments.console == "off") {
-    if (writable || arguments.console_access.given() ||
+    if (arguments.console_access.given() ||
         !arguments.console_options.files.empty()) {
       throw ConfigError(
-          "--console-write, --console-users, --console-tls and "
-          "--console-files need --console[=[ADDRESS:]PORT]");
+          "--console-users, --console-tls and --console-files need "
+          "--console[=[ADDRESS:]PORT]");
     }
     return;
   }
@@ -73,9 +72,6 @@ void TakeConsole(const RunArguments& arguments, ServiceOptions& options) {
       options.console.emplace(arguments.console_options);
   console.address = ParseHttpAddress(arguments.console, "--console");
   console.names = options.http_names;
-  if (writable) {
-    console.admission.token_file = arguments.console_token;
-  }
   arguments.console_access.ApplyTo(console);
 }
 
@@ -86,13 +82,7 @@ void AddConsoleOptions(CLI::App& run, RunArguments& arguments) {
       ->default_str("127.0.0.1:8080")
       ->transform(AddressOr("127.0.0.1:8080"))
       ->type_name("[=[ADDRESS:]PORT]");
-  CLI::Option* token =
-      run.add_option("--console-write", arguments.console_token,
-                     "Let everybody who has the token in FILE acknowledge, "
-                     "shelve and label; a FILE that does not exist is made "
-                     "with a random token")
-          ->type_name("FILE");
-  AddConsoleAccess(run, arguments.console_access, token);
+  AddConsoleAccess(run, arguments.console_access);
   run.add_option("--console-files", arguments.console_options.files,
                  "Folder of the page instead of the installed one")
       ->type_name("DIR");
@@ -162,6 +152,9 @@ int Run(const RunArguments& arguments, const report::Context& context) {
   if (options.console) {
     options.console->routes = PlannerRoutes(arguments.groups, context);
   }
+  // Some 25 threads, 55 with the console: a lack is said before the bus or a
+  // file is touched.
+  RequireHeadroom(options.console ? 64 : 32, 64U << 20U);
   // Before the service, so that a signal during its start requests an orderly
   // stop.
   report::StopSignals signals(report::StopSignals::HangUp::kReload);
@@ -239,6 +232,11 @@ void AddRunVerb(report::Program& program) {
       ->transform(AddressOr("127.0.0.1:9464"))
       ->type_name("[=[ADDRESS:]PORT]");
   AddConsoleOptions(run, arguments);
+  program.AddRemoved("run", "--console-write",
+                     "name who may act with fdi-monitor console-user NAME "
+                     "--role acknowledge --users FILE, and give "
+                     "--console-users FILE; scripts have fdi-store history "
+                     "ack, label and shelve");
   run.add_option("--allow-host", service.http_names,
                  "Answer --http and --console under this name, too, and not "
                  "only under localhost, addresses and the name of the machine")

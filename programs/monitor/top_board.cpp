@@ -115,8 +115,26 @@ void TopBoard::Add(const idl::ModelSetInfoMessage& info,
   names_.Add(info);
 }
 
-void TopBoard::Add(const idl::DecisionMessage& message, Clock::time_point now) {
-  decisions_[message.valve_id] = {message, now};
+void TopBoard::Add(const idl::DecisionMessage& message, Clock::time_point now,
+                   const idl::Reception& from) {
+  decisions_[message.valve_id] = {message, now, from.participant_id,
+                                  from.received_ns - from.sent_ns};
+}
+
+void TopBoard::Hear(const idl::Reception& reception) {
+  const std::int64_t delay_ns = reception.received_ns - reception.sent_ns;
+  std::int64_t& least =
+      least_delay_ns_.try_emplace(reception.participant_id, delay_ns)
+          .first->second;
+  least = std::min(least, delay_ns);
+}
+
+bool TopBoard::IsSilent(const LatestVector& latest,
+                        Clock::time_point now) const {
+  const auto least = least_delay_ns_.find(latest.participant_id);
+  const std::chrono::nanoseconds late(
+      least == least_delay_ns_.end() ? 0 : latest.delay_ns - least->second);
+  return now - latest.at + late > silence_;
 }
 
 void TopBoard::Add(const FaultEvent& message, Clock::time_point /*now*/) {
@@ -179,19 +197,25 @@ Json TopBoard::RowOf(const LatestVector& latest, Clock::time_point now) const {
   const auto open = open_.find(message.valve_id);
   const bool abnormal = verdict.state != State::kNormal;
   const bool since = open != open_.end() && abnormal;
-  Certainty certainty = CertaintyOf(faults, Layer::kObservers, largest);
+  const bool silent = IsSilent(latest, now);
+  const std::vector<std::string> look_alikes = LookAlikesBeside(
+      faults, Layer::kObservers, strength, names_.FaultsOf(message.model_hash));
+  Certainty certainty = WithLookAlikes(
+      CertaintyOf(faults, Layer::kObservers, largest), look_alikes);
   if (since && faults.empty() && open->second.unnamed == Certainty::kNotKnown) {
     certainty = Certainty::kNotKnown;
     faults = "unknown";
   }
   return {{"valve_id", message.valve_id},
-          {"state", console::ShownState(verdict)},
+          {"state",
+           silent && !abnormal ? "NOT_JUDGED" : console::ShownState(verdict)},
           {"quality", QualityName(verdict.quality)},
-          {"silent", now - latest.at > silence_},
+          {"silent", silent},
           {"fault", faults.empty() ? Json() : Json(faults)},
           {"name",
            faults.empty() ? Json() : Json(texts_.Words(faults, strength).name)},
           {"certainty", abnormal ? Json(CertaintyName(certainty)) : Json()},
+          {"look_alikes", look_alikes},
           {"factor", largest},
           {"strength", verdict.isolated == 0 ? Json() : Json(strength)},
           {"normal_factor", verdict.normal_factor},

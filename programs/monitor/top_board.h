@@ -31,9 +31,15 @@ class TopBoard {
       : texts_(std::move(texts)), silence_(silence) {}
 
   void Add(const idl::ModelSetInfoMessage& info, Clock::time_point now);
-  void Add(const idl::DecisionMessage& message, Clock::time_point now);
+  /// @param from when it was sent, which may be long ago: DDS hands the last
+  ///   vector of a valve to who comes late.
+  void Add(const idl::DecisionMessage& message, Clock::time_point now,
+           const idl::Reception& from = {});
   void Add(const FaultEvent& message, Clock::time_point now);
   void Add(const idl::MonitorStatusMessage& message, Clock::time_point now);
+  /// To be told of every message: the quickest of a participant says how far
+  /// its clock differs from ours.
+  void Hear(const idl::Reception& reception);
   /// The monitor disposed of this valve.
   void Remove(const std::string& valve_id);
 
@@ -41,7 +47,8 @@ class TopBoard {
   /// "name", "certainty", "factor", "strength", "normal_factor", "factors",
   /// "residuals", "since_utc", "abnormal_s", "stamp_utc", "model_set"}]}, and
   /// its table, which has words instead of factors.
-  /// `state` is console::ShownState(); `fault` and
+  /// `state` is console::ShownState(), of a silent valve never NORMAL; `fault`
+  /// and
   /// `certainty` are null unless a fault is detected, `fault` also until it has
   /// a name ("unknown" where no known one fits); `factor` is
   /// the largest of the isolated set, or of any fault; `strength` is null until
@@ -61,13 +68,17 @@ class TopBoard {
   struct LatestVector {
     idl::DecisionMessage message;
     Clock::time_point at;
+    std::uint64_t participant_id;
+    std::int64_t delay_ns;  // From its sending to `at`, by two clocks.
   };
+  bool IsSilent(const LatestVector& latest, Clock::time_point now) const;
   report::Json RowOf(const LatestVector& latest, Clock::time_point now) const;
 
   report::FaultTexts texts_;
   std::chrono::milliseconds silence_;
   ModelNames names_;
   std::map<std::string, LatestVector> decisions_;
+  std::map<std::uint64_t, std::int64_t> least_delay_ns_;  // By participant.
   struct OpenEpisode {
     std::int64_t detection_stamp_ns;  // First abnormal sample.
     std::uint64_t id;

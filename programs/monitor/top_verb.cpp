@@ -2,6 +2,7 @@
 #include <chrono>
 #include <iostream>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include <CLI/CLI.hpp>
@@ -38,8 +39,17 @@ struct TopOptions {
 };
 
 void Take(BusView& bus, TopBoard& board) {
-  bus.Take([&board](const auto& message,
-                    const auto&) { board.Add(message, Clock::now()); },
+  const auto add = [&board](const auto& message,
+                            const idl::Reception& reception) {
+    board.Hear(reception);
+    if constexpr (std::is_same_v<decltype(message),
+                                 const idl::DecisionMessage&>) {
+      board.Add(message, Clock::now(), reception);
+    } else {
+      board.Add(message, Clock::now());
+    }
+  };
+  bus.Take(add,
            [&board](const std::string& valve_id) { board.Remove(valve_id); });
 }
 
@@ -80,7 +90,9 @@ int Once(const TopOptions& options, const report::Context& context,
 
 int Live(const TopOptions& options, const report::Context& context,
          BusView& bus, TopBoard& board) {
-  const report::StopSignals signals;
+  report::StopSignals signals;
+  // A terminal may have been stopped (Ctrl-S).
+  signals.EndWithin(std::chrono::seconds(3));
   const report::LiveScreen screen;
   const TopView view = options.View(context.options.utc);
   auto drawn = Clock::now() - kRefresh;

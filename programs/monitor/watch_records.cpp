@@ -24,11 +24,22 @@ Json Utc(std::int64_t stamp_ns) {
   return FormatTime(stamp_ns, true);
 }
 
+// "f6 or f18"
+std::string WithOr(std::string faults,
+                   const std::vector<std::string>& look_alikes) {
+  for (const std::string& other : look_alikes) {
+    faults += " or " + other;
+  }
+  return faults;
+}
+
 // "likely f19 strength=0.52", "not yet, may be f3|f6"
-std::string NameText(const FaultEvent& message, const std::string& faults) {
-  std::string text(CertaintyName(CertaintyOf(message)));
+std::string NameText(const FaultEvent& message, const std::string& faults,
+                     const std::vector<std::string>& look_alikes) {
+  std::string text(
+      CertaintyName(WithLookAlikes(CertaintyOf(message), look_alikes)));
   if (!faults.empty()) {
-    return text + " " + faults +
+    return text + " " + WithOr(faults, look_alikes) +
            " strength=" + FormatNumber(message.transition.strength, 2);
   }
   const std::string names =
@@ -73,19 +84,26 @@ WatchRecord WatchRecords::RecordOf(const idl::DecisionMessage& message) const {
   Json isolated = Json::array();
   std::string faults;
   double largest = 0.0;
+  double strength = 0.0;
   std::size_t bit = 0;
   for (const auto& [name, factor] : factors.items()) {
-    if ((v.isolated >> bit++ & 1U) != 0) {
+    if (Has(v.isolated, bit)) {
       isolated.push_back(name);
       faults += (faults.empty() ? "" : "|") + name;
       largest = std::max(largest, factor.get<double>());
+      strength = v.strengths[bit];
     }
+    ++bit;
   }
   Json certainty;
+  std::vector<std::string> look_alikes;
   if (v.state != State::kNormal) {
-    certainty = CertaintyName(CertaintyOf(faults, Layer::kObservers, largest));
+    look_alikes = LookAlikesBeside(faults, Layer::kObservers, strength,
+                                   names_.FaultsOf(message.model_hash));
+    certainty = CertaintyName(WithLookAlikes(
+        CertaintyOf(faults, Layer::kObservers, largest), look_alikes));
     line += " " + certainty.get<std::string>() +
-            (faults.empty() ? "" : " " + faults);
+            (faults.empty() ? "" : " " + WithOr(faults, look_alikes));
   }
   return {{{"topic", "DecisionVector"},
            {"valve_id", message.valve_id},
@@ -101,7 +119,8 @@ WatchRecord WatchRecords::RecordOf(const idl::DecisionMessage& message) const {
            {"residuals", residuals},
            {"factors", factors},
            {"isolated", std::move(isolated)},
-           {"certainty", std::move(certainty)}},
+           {"certainty", std::move(certainty)},
+           {"look_alikes", std::move(look_alikes)}},
           line};
 }
 
@@ -125,6 +144,8 @@ TransitionKind WatchRecords::KindOf(const FaultEvent& message) {
 void WatchRecords::Add(const FaultEvent& message, Clock::time_point /*now*/) {
   const Transition& t = message.transition;
   const std::string faults = IsolatedFaults(message);
+  const std::vector<std::string> look_alikes = LookAlikesBeside(
+      faults, t.layer, t.strength, names_.FaultsOf(message.model_hash));
   Json candidates = Json::array();
   for (const FaultCandidate& candidate : message.candidates) {
     candidates.push_back({{"fault", FaultName(candidate.fault)},
@@ -141,7 +162,9 @@ void WatchRecords::Add(const FaultEvent& message, Clock::time_point /*now*/) {
           {"stamp_utc", Utc(t.stamp_ns)},
           {"detected_utc", Utc(t.detection_stamp_ns)},
           {"fault", faults.empty() ? "unknown" : faults},
-          {"certainty", CertaintyName(CertaintyOf(message))},
+          {"certainty",
+           CertaintyName(WithLookAlikes(CertaintyOf(message), look_alikes))},
+          {"look_alikes", look_alikes},
           {"factor", t.factor},
           {"strength", faults.empty() ? Json() : Json(t.strength)},
           {"reason", reason},
@@ -150,7 +173,8 @@ void WatchRecords::Add(const FaultEvent& message, Clock::time_point /*now*/) {
            message.model_set + "@" + std::to_string(message.model_version)},
           {"persisted", message.persisted}},
          Start(t.stamp_ns, message.valve_id) + " EVENT " + kind + " " +
-             NameText(message, faults) + " episode=" + Hex(message.episode_id) +
+             NameText(message, faults, look_alikes) +
+             " episode=" + Hex(message.episode_id) +
              (t.reason == EndReason::kNone ? "" : " reason=" + reason) +
              (message.persisted ? "" : " NOT_PERSISTED")});
 }

@@ -9,6 +9,7 @@
 #include "programs/monitor/verbs.h"
 #include "programs/monitor/watch_records.h"
 #include "report/json_output.h"
+#include "report/logging.h"
 #include "report/program.h"
 #include "report/stop_signals.h"
 
@@ -43,6 +44,8 @@ struct WatchCounts {
   void Add(const idl::ModelSetInfoMessage& /*message*/) { ++models; }
 };
 
+constexpr std::chrono::seconds kStopPatience{3};
+
 bool Passed(Clock::time_point since, double seconds) {
   return seconds > 0.0 &&
          Clock::now() - since > std::chrono::duration<double>(seconds);
@@ -70,8 +73,11 @@ int RunWatch(const WatchOptions& given, const report::Context& context) {
     options.bus.vectors = Vectors::kAll;
   }
   report::StopSignals signals;
+  // Whoever reads the output may have stopped reading.
+  signals.EndWithin(kStopPatience);
   BusView bus(options.bus, context, context.log);
-  std::cerr << "watch_ready domain=" << context.options.domain << '\n';
+  report::WriteToStderr(
+      "watch_ready domain=" + std::to_string(context.options.domain) + "\n");
   const bool json = context.options.json;
   WatchRecords records(context.options.utc, [json](const WatchRecord& record) {
     std::cout << (json ? report::JsonText(record.object) : record.line) << '\n';

@@ -81,20 +81,33 @@ bool IsNamed(std::string_view column, std::string_view name) {
              column[column.size() - name.size() - 1]) != std::string_view::npos;
 }
 
-// The column as the user `asked`, else the only one with a usual name.
+// "FIC101." of "FIC101.OP", else empty.
+std::string_view TagOf(std::string_view column) {
+  return column.substr(0, column.find_last_of("./: ") + 1);
+}
+
+// The column as the user `asked`, else the only one with a usual name, or of
+// several the one with the tag of `op`, where the user has named that.
 std::optional<std::string> ColumnOf(std::span<const char* const> names,
                                     const char* option,
                                     const std::string& asked,
+                                    const std::string& op,
                                     const std::vector<std::string>& header,
                                     const std::string& source) {
   if (!asked.empty()) {
     return asked;
   }
+  const std::string_view tag = TagOf(op);
   for (const char* name : names) {
     std::vector<std::string> found;
     std::ranges::copy_if(
         header, std::back_inserter(found),
         [name](const std::string& column) { return IsNamed(column, name); });
+    if (found.size() > 1 && !tag.empty()) {
+      std::erase_if(found, [tag](const std::string& column) {
+        return TagOf(column) != tag;
+      });
+    }
     if (found.size() > 1) {
       throw DataError(source + ": columns " + Quoted(Listed(found)) +
                       " all look like " + option +
@@ -131,8 +144,9 @@ importer::ColumnMap LoopMap(const std::string& text,
     if (role.signal == Signal::kX && options.ignore_x) {
       continue;
     }
-    if (const auto column = ColumnOf(role.names, role.option,
-                                     options.*(role.column), header, source)) {
+    if (const auto column =
+            ColumnOf(role.names, role.option, options.*(role.column),
+                     options.op, header, source)) {
       map.columns.push_back({*column, role.signal});
     } else if (role.signal == Signal::kCv || role.signal == Signal::kF) {
       throw DataError(source + ": no column for " + (role.option + 2) +
@@ -142,7 +156,8 @@ importer::ColumnMap LoopMap(const std::string& text,
   }
   static constexpr const char* kMode[] = {"MODE"};
   map.mode_column =
-      ColumnOf(kMode, "--mode", options.mode, header, source).value_or("");
+      ColumnOf(kMode, "--mode", options.mode, options.op, header, source)
+          .value_or("");
   // PV keeps its own unit: nothing here depends on it.
   map.flow_unit = FlowUnit::kM3PerHour;
   return map;
@@ -421,6 +436,7 @@ Json Optional(bool known, double value) {
 Json JudgedJson(const Judged& one) {
   const loop::Evidence& e = one.audit.evidence;
   const loop::PlayFit fit = e.fit.value_or(loop::PlayFit{});
+  const auto band = e.band();
   const loop::Oscillation wave = e.oscillation.value_or(loop::Oscillation{});
   const double period_s = one.window.period_s;
   const bool is_stiction = one.audit.verdict == Verdict::kStiction;
@@ -441,9 +457,12 @@ Json JudgedJson(const Judged& one) {
       {"hint", one.hint.empty() ? Json(nullptr) : Json(one.hint)},
       {"read_off", one.window.x.empty() ? "PV" : "X"},
       {"integrates", e.integrates},
-      {"band_pct", Optional(e.fit.has_value(), fit.band)},
-      {"band_low_pct", Optional(e.fit.has_value(), fit.band_low)},
-      {"band_high_pct", Optional(e.fit.has_value(), fit.band_high)},
+      {"band_pct",
+       Optional(band.has_value(), band.value_or(loop::Band{}).width)},
+      {"band_low_pct",
+       Optional(band.has_value(), band.value_or(loop::Band{}).low)},
+      {"band_high_pct",
+       Optional(band.has_value(), band.value_or(loop::Band{}).high)},
       {"period_s", Optional(e.oscillation.has_value(), wave.period * period_s)},
       {"regularity", Optional(e.oscillation.has_value(), wave.regularity)},
       {"shape", Optional(e.oscillation.has_value(), wave.shape)},
@@ -459,7 +478,9 @@ Json JudgedJson(const Judged& one) {
       {"sp_moves", Optional(!one.window.sp.empty(), e.sp_moves)},
       {"distinct", e.distinct_answer},
       {"longest_repeat_s", static_cast<double>(e.longest_repeat) * period_s},
-      {"unanswered_pct", e.unanswered}};
+      {"unanswered_pct", e.unanswered},
+      {"stands", one.window.x.empty() ? Json(nullptr) : Json(e.standing.times)},
+      {"stands_share", Optional(!one.window.x.empty(), e.standing.share)}};
 }
 
 // What needs somebody first comes first; wide bands before narrow ones.
@@ -487,7 +508,7 @@ int RankOf(const Judged& one) {
 
 void Rank(std::vector<Judged>& judged) {
   const auto band = [](const Judged& one) {
-    return one.audit.evidence.fit ? one.audit.evidence.fit->band : 0.0;
+    return one.audit.evidence.band().value_or(loop::Band{}).width;
   };
   std::ranges::stable_sort(judged, [&](const Judged& a, const Judged& b) {
     const int rank_a = RankOf(a);
@@ -741,12 +762,12 @@ LoopAudits AuditStoredRuns(const DataDirectory& data, std::int64_t since_ns,
     }
   }
   for (const Judged& one : judged) {
-    const bool sticks = one.audit.verdict == Verdict::kStiction;
+    const auto band = one.audit.evidence.band();
     audits.windows.push_back({one.loop,
                               std::string(loop::VerdictName(one.audit.verdict)),
                               one.audit.sure, std::string(one.audit.reason),
-                              sticks && one.audit.evidence.fit
-                                  ? std::optional(one.audit.evidence.fit->band)
+                              one.audit.verdict == Verdict::kStiction && band
+                                  ? std::optional(band->width)
                                   : std::nullopt,
                               one.start_ns.value_or(0)});
   }

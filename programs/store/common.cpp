@@ -179,6 +179,7 @@ Json EpisodeJson(const Alarm& alarm) {
       {"cleared_utc", TextJson(episode.cleared_utc)},
       {"fault", TextJson(episode.fault)},
       {"certainty", CertaintyName(CertaintyOf(episode))},
+      {"look_alikes", LookAlikesOf(episode)},
       {"peak_factor", episode.peak_factor},
       {"model_set", episode.model_set},
       {"end_reason", TextJson(episode.end_reason)},

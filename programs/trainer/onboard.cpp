@@ -146,7 +146,8 @@ Json OnboardingJson(const Onboarding& onboarding,
          {"rmse", fit.rmse},
          {"bias", fit.bias},
          {"vaf", VafJson(fit.vaf)},
-         {"naive_rmse", fit.naive_rmse}});
+         {"naive_rmse", fit.naive_rmse},
+         {"seen_from", fit.seen_from}});
   }
   if (onboarding.coverage) {
     json["coverage"] = CoverageJson(*onboarding.coverage);
@@ -218,6 +219,18 @@ void AddFit(const simulator::ValveFit& fit, report::Report& report) {
               FormatNumber(fit.fitted.flow_rmse, 3) + "\n");
 }
 
+// The least lasting change of F that is beyond a limit, where F is all that
+// shows the valve.
+std::string LeastFlowChange(const Onboarding& onboarding) {
+  double share = 1.0;
+  for (const ChannelFit& fit : onboarding.channels) {
+    if (fit.output == Signal::kF && fit.mean > 0.0) {
+      share = std::min(share, fit.seen_from / fit.mean);
+    }
+  }
+  return FormatNumber(100.0 * share, 0);
+}
+
 // What signals and period of the record keep from being seen.
 std::vector<std::string> LimitsOfRecord(const Onboarding& onboarding) {
   constexpr double kSlowS = 5.0;
@@ -230,6 +243,11 @@ std::vector<std::string> LimitsOfRecord(const Onboarding& onboarding) {
         "no position (X): faults of the rod, the trim, the flow meter and the "
         "pressures are seen in F alone, which tells few of them apart; play, "
         "friction and the position transmitter are not told at all");
+    lines.push_back("nothing that changes F by less than " +
+                    LeastFlowChange(onboarding) +
+                    " % of its mean is beyond the limits: this record of the "
+                    "healthy valve shows no less. More hours, or P1 and P2, "
+                    "make them narrower");
   }
   if (has(Signal::kF) && !(has(Signal::kP1) && has(Signal::kP2))) {
     lines.push_back(
@@ -270,10 +288,11 @@ report::Report ReportOf(const Onboarding& onboarding,
                 {.heading = "RMSE", .key = "rmse", .decimals = 3},
                 {.heading = "bias", .key = "bias", .decimals = 3},
                 {.heading = "VAF [%]", .key = "vaf", .decimals = 1},
-                {.heading = "naive RMSE", .key = "naive_rmse", .decimals = 3}});
+                {.heading = "naive RMSE", .key = "naive_rmse", .decimals = 3},
+                {.heading = "seen from", .key = "seen_from", .decimals = 3}});
   report.Line(
       "normal observer on data it was not fitted to; naive: X = CV, else the "
-      "mean\n");
+      "mean; a lasting change is beyond the limits from \"seen from\" on\n");
   report.Line("model set " + NameOf(models) + ", hash " +
               storage::HashHex(models.content_hash) + ", " +
               std::to_string(models.observers.size()) + " observers");

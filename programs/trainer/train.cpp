@@ -11,6 +11,7 @@
 #include "base/time_text.h"
 #include "diagnosis/fault_catalogue.h"
 #include "programs/trainer/model_report.h"
+#include "programs/trainer/teach.h"
 #include "programs/trainer/verbs.h"
 #include "report/models/lineage_text.h"
 #include "report/program.h"
@@ -50,6 +51,7 @@ struct TrainOptions {
   std::vector<std::string> strengths;  ///< EPISODE=S
   bool drop_missing{false};
   bool skip_refused{false};
+  std::string type;  ///< That gets what an onboarded valve has learnt.
   bool dry_run{false};
 };
 
@@ -247,6 +249,18 @@ report::Report PlanReport(const LabelPlan& plan) {
   return report;
 }
 
+// A set of onboarding has no settings of a training.
+void CheckTeaching(const TrainOptions& options, const ModelSet& parent) {
+  const bool renamed = !options.name.empty() && options.name != parent.name;
+  if (renamed || options.false_alarms_per_hour || options.assume_normal) {
+    throw ConfigError(
+        "--name, --false-alarms-per-hour and --assume-normal are for sets of "
+        "fdi-trainer train: " +
+        NameOf(parent) +
+        " was made by onboarding, and gets observers of what labels name");
+  }
+}
+
 report::Report TrainFromLabels(const TrainOptions& options,
                                const report::Context& context) {
   const storage::DataDirectory directory{context.options.data_dir};
@@ -258,6 +272,13 @@ report::Report TrainFromLabels(const TrainOptions& options,
   request.strengths = ParseStrengths(options.strengths);
   request.runs = options.runs;
   LabelPlan plan = MakeLabelPlan(request, directory);
+  const bool onboarded = IsOnboarded(*plan.parent);
+  if (onboarded) {
+    CheckTeaching(options, *plan.parent);
+  } else if (!options.type.empty()) {
+    throw ConfigError("--type is for sets of fdi-trainer onboard, " +
+                      NameOf(*plan.parent) + " is none");
+  }
   Override(options, plan.training);
   if (options.dry_run) {
     return PlanReport(plan);
@@ -276,6 +297,10 @@ report::Report TrainFromLabels(const TrainOptions& options,
                         {{"episodes", std::to_string(plan.learnt.size())},
                          {"refused", std::to_string(plan.refused.size())},
                          {"runs_stored", std::to_string(stored)}}));
+  if (onboarded) {
+    return TeachAndStore(plan, {options.type, options.activate}, signals,
+                         context);
+  }
   std::vector<std::string> selectors = plan.runs;
   for (const LabelledEpisode& episode : plan.learnt) {
     selectors.push_back(episode.meaning.run);
@@ -366,6 +391,10 @@ void AddLabelOptions(CLI::App& verb, TrainOptions& options) {
                   "estimate")
       ->delimiter(',')
       ->type_name("EPISODE=S,...");
+  verb.add_option("--type", options.type,
+                  "Valve type that was saved with the parent, a set of "
+                  "onboarding: valves onboarded later get the new observers")
+      ->type_name("NAME");
   verb.add_flag("--drop-missing", options.drop_missing,
                 "Train without runs of the parent that are gone");
   verb.add_flag("--skip-refused", options.skip_refused,

@@ -50,6 +50,9 @@ std::string FaultLine(const Episode& e, const std::string& name) {
     return line;
   }
   line += ": " + name + " (" + *e.fault + ")";
+  for (const std::string& other : storage::LookAlikesOf(e)) {
+    line += " or " + other;
+  }
   return line.append(ByLayer(e.layer.value_or("")));
 }
 
@@ -226,10 +229,11 @@ std::string IntervalText(double value, double lowest, double highest,
   const auto number = [decimals](double x) {
     return report::FormatNumber(x, decimals);
   };
+  const std::string from = number(lowest);
+  const std::string to = number(highest);
   return number(value) + unit +
-         (lowest < highest
-              ? " (" + number(lowest) + " to " + number(highest) + ")"
-              : "");
+         (lowest < highest && from != to ? " (" + from + " to " + to + ")"
+                                         : "");
 }
 
 std::vector<Column> EpisodeFields(const Alarm& alarm,

@@ -11,8 +11,8 @@
 /// An episode in words.
 namespace fdi::plot {
 
-/// "0.42 (0.38 to 0.46)", "9.6 days (7.2 to 14.5)"; an interval without width
-/// is not known.
+/// "0.42 (0.38 to 0.46)", "9.6 days (7.2 to 14.5)"; an interval without a
+/// width that can be seen is left out.
 std::string IntervalText(double value, double lowest, double highest,
                          int decimals, const std::string& unit = "");
 

@@ -14,12 +14,12 @@ Range RoomyRange(const std::vector<double>& values) {
 }
 
 // Two lines, which the legend has room for.
-std::vector<std::string> BandTexts(const loop::PlayFit& fit) {
+std::vector<std::string> BandTexts(const loop::Band& found) {
   char band[48];
   char range[64];
-  std::snprintf(band, sizeof band, "band %.2f %%", fit.band);
-  std::snprintf(range, sizeof range, "(%.2f to %.2f %%)", fit.band_low,
-                fit.band_high);
+  std::snprintf(band, sizeof band, "band %.2f %%", found.width);
+  std::snprintf(range, sizeof range, "(%.2f to %.2f %%)", found.low,
+                found.high);
   return {band, range};
 }
 
@@ -37,9 +37,10 @@ Panel AnswerOverOp(const loop::Window& window, const loop::Audit& audit) {
   if (fit && fit->slope != 0.0) {
     panel.range = RoomyRange(answer);
     const Range op = *panel.own_axis;
+    const loop::Band band = *audit.evidence.band();
     for (const double side : {-0.5, 0.5}) {
       const auto at = [&](double u) {
-        return fit->offset + fit->slope * (u + side * fit->band);
+        return fit->offset + fit->slope * (u + side * band.width);
       };
       panel.series.push_back({side < 0.0 ? "sides of the play" : "",
                               ink::kVermilion,
@@ -48,7 +49,7 @@ Panel AnswerOverOp(const loop::Window& window, const loop::Audit& audit) {
                               {at(op.from), at(op.to)},
                               {op.from, op.to}});
     }
-    panel.notes = BandTexts(*fit);
+    panel.notes = BandTexts(band);
   }
   return panel;
 }

@@ -8,4 +8,8 @@ namespace fdi::storage {
 /// How certain its name is; that of one that has ended, as it was.
 Certainty CertaintyOf(const Episode& episode);
 
+/// What may be the cause as well as the fault that names `episode`
+/// (LookAlikesBeside()).
+std::vector<std::string> LookAlikesOf(const Episode& episode);
+
 }  // namespace fdi::storage

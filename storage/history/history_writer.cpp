@@ -356,16 +356,29 @@ SessionStart HistoryWriter::BeginSession(
   }
   transaction.Commit();
   session_id_ = start.session_id;
-  alive_ns_ = now_ns;
+  began_ns_ = alive_ns_ = now_ns;
   return start;
 }
 
 void HistoryWriter::EndSession(std::int64_t now_ns, bool clean) {
   traces_.EndAll();
   CommitBatch(
-      [&] { database_.Run(sql::end_session, now_ns, clean, session_id_); });
+      [&] { database_.Run(sql::end_session, clean, StoreSignOfLife(now_ns)); });
   session_id_.reset();
   database_.Checkpoint();
+}
+
+// A clock that was set back to before the session began ends it at its last
+// sign of life and begins another one, so that none ends before it begins.
+std::int64_t HistoryWriter::StoreSignOfLife(std::int64_t now_ns) {
+  if (now_ns >= began_ns_) {
+    database_.Cached(sql::set_alive).Bind(now_ns, *session_id_).Run();
+    return *session_id_;
+  }
+  database_.Run(sql::insert_next_session, now_ns, *session_id_);
+  const std::int64_t next = database_.LastInsertRowid();
+  database_.Run(sql::end_session, true, *session_id_);
+  return next;
 }
 
 // What was pending before is stored first: the trace of an episode is in the
@@ -515,11 +528,15 @@ void HistoryWriter::Commit(std::int64_t now_ns) {
   if (!HasPending() && !alive && !failed_) {
     return;
   }
+  std::optional<std::int64_t> session = session_id_;
   CommitBatch([&] {
     if (session_id_) {
-      database_.Cached(sql::set_alive).Bind(now_ns, session_id_).Run();
+      session = StoreSignOfLife(now_ns);
     }
   });
+  // Only now is a next session in the file.
+  session_id_ = session;
+  began_ns_ = std::min(began_ns_, now_ns);
   alive_ns_ = now_ns;
 }
 

@@ -153,12 +153,15 @@ class HistoryWriter {
   };
 
   void StorePending();
+  /// @returns the session that it is a sign of.
+  std::int64_t StoreSignOfLife(std::int64_t now_ns);
   /// Discards buffers that are now in the file.
   void DiscardCommitted();
 
   Database database_;
   TraceWriter traces_{database_};
   std::optional<std::int64_t> session_id_;
+  std::int64_t began_ns_{0};  // The session.
   std::int64_t alive_ns_{0};
   std::vector<DataGap> gaps_;
   std::vector<SentEvent> sent_;

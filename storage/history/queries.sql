@@ -281,9 +281,11 @@ VALUES (?1, ?1, ?2, ?3)
 -- name: put_fault_name
 INSERT INTO fault_name (number, fault, name) VALUES (?, ?, ?)
 ON CONFLICT (number) DO UPDATE SET fault = excluded.fault, name = excluded.name
+-- name: insert_next_session
+INSERT INTO monitor_session (start_ns, alive_ns, software, config)
+SELECT ?1, ?1, software, config FROM monitor_session WHERE session_id = ?2
 -- name: end_session
-UPDATE monitor_session SET alive_ns = ?1, stop_ns = ?1, clean = ?2
-WHERE session_id = ?3
+UPDATE monitor_session SET stop_ns = alive_ns, clean = ? WHERE session_id = ?
 -- name: set_alive
 UPDATE monitor_session SET alive_ns = ? WHERE session_id = ?
 -- name: insert_gap

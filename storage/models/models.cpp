@@ -287,6 +287,9 @@ void ModelStore::Activate(const ModelReference& reference) {
   const std::int64_t id = RequireId(chosen);
   database_.Run(sql::deactivate, chosen.name);
   database_.Run(sql::activate, id);
+  // Onboarding has written the version into the entry of its valve, which no
+  // person has chosen.
+  database_.Run(sql::follow_active, *chosen.version, chosen.name);
   BumpGeneration();
   transaction.Commit();
 }

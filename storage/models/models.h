@@ -201,6 +201,8 @@ class ModelStore {
   std::vector<ModelSummary> List();
   ModelSummary Summary(const ModelReference& reference);
   /// Makes the version, or else the newest one, the active one of its name.
+  /// Valves onboarded with a version of that name get it; assignments of a
+  /// version by a person stay.
   void Activate(const ModelReference& reference);
 
   /// Writes the canonical bytes to a file that does not exist yet.

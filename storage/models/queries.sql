@@ -35,6 +35,10 @@ INSERT INTO training_run VALUES (?, ?, ?)
 UPDATE model_set SET active = 0 WHERE name = ?
 -- name: activate
 UPDATE model_set SET active = 1 WHERE model_set_id = ?
+-- name: follow_active
+UPDATE valve SET model_set_version = ?
+WHERE model_set = ? AND model_set_version IS NOT NULL
+  AND baseline_epoch IS NOT NULL
 -- name: bump_generation
 UPDATE generation SET value = value + 1
 -- name: insert_lineage

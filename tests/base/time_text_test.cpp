@@ -49,6 +49,55 @@ TEST_F(TimeTextTest, YearsOfTwoDigitsNeedPointsAMonthOrAnOrder) {
   EXPECT_EQ(date("3/10/26", DateOrder::kNotSaid), "none");
 }
 
+TEST_F(TimeTextTest, TimesAreReadAsHistoriansAndSpreadsheetsWriteThem) {
+  LocalClock clock("UTC");
+  for (const char* text :
+       {"2026-03-10T09:00:00Z",
+        "2026-W11-2T09:00:00",
+        "2026-069T09:00:00Z",
+        "20260310T090000Z",
+        "20260310090000",
+        "20260310 09:00",
+        "2026-03-10 10:00:00 CET",
+        "2026-03-10 11:00 CEST",
+        "2026/03/10 10:00 UTC+01:00",
+        "2026-03-10T10:00+01:00[Europe/Berlin]",
+        "Tue Mar 10 05:00:00 EDT 2026",
+        "Tue Mar 10 2026 10:00:00 GMT+0100 (Central European Standard Time)",
+        "Tue, 10 Mar 2026 09:00:00 GMT",
+        "March 10, 2026 9:00 AM",
+        "3/10/2026, 9:00:00\u202fAM",
+        "3/10/26 9:00 a. m.",
+        "10-Mrz-2026 09:00:00",
+        "10. März 2026 09:00",
+        "10 mars 2026 09:00",
+        "10.Mar.2026 09:00:00:000"}) {
+    const auto time = ScanTime(text, DateOrder::kMonthFirst);
+    ASSERT_TRUE(time) << text;
+    EXPECT_EQ(clock.Utc(*time, 0), 1'773'133'200'000'000'000) << text;
+  }
+  const std::pair<const char*, int> months[] = {
+      {"févr.", 2}, {"kwi", 4}, {"Mai", 5},  {"juin", 6},      {"juil.", 7},
+      {"août", 8},  {"wrz", 9}, {"paź", 10}, {"listopad", 11}, {"Dez", 12}};
+  for (const auto& [month, number] : months) {
+    const auto time = ScanTime("10 " + std::string(month) + " 2026 09:00");
+    ASSERT_TRUE(time) << month;
+    EXPECT_EQ(time->fields.tm_mon + 1, number) << month;
+  }
+  // Zones of several countries, weeks and days that do not exist, numbers.
+  for (const char* text :
+       {"2026-03-10 09:00:00 CST", "2026-W54-1", "2026-W11-8", "2026-366",
+        "20261310090000", "46091416666667", "20260310", "12345678", "Average",
+        "2026-03-10 09:00:00:25"}) {
+    EXPECT_FALSE(ScanTime(text)) << text;
+  }
+}
+
+TEST_F(TimeTextTest, ANameOfAZoneKeepsItsSummerTime) {
+  EXPECT_EQ(LocalClock("CET").Utc(*ScanTime("2026-07-10 09:00"), 0),
+            LocalClock("Europe/Berlin").Utc(*ScanTime("2026-07-10 09:00"), 0));
+}
+
 TEST_F(TimeTextTest, DecimalsAreAsManyAsTheStampNeeds) {
   EXPECT_EQ(FormatTime(kStampNs + 500'000'000, true),
             "2026-11-20T14:56:11.500Z");

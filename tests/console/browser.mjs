@@ -46,8 +46,8 @@ export async function close(page) {
 }
 
 function contextOf(browser, options) {
-  return browser.newContext({
-    viewport: {width: 1600, height: 1000}, ...options});
+  return browser.newContext({viewport: {width: 1600, height: 1000},
+    extraHTTPHeaders: {'X-User': 'anna'}, ...options});
 }
 
 async function show(context, address, hash) {
@@ -65,6 +65,13 @@ async function show(context, address, hash) {
     page.hosts.add(new URL(request.url()).origin));
   await page.goto(`${address}/${hash}`);
   return page;
+}
+
+/** Light or dark, once the page has followed. */
+export async function setScheme(page, scheme) {
+  await page.emulateMedia({colorScheme: scheme});
+  await page.locator(`html[data-theme=${scheme}]`)
+      .waitFor({state: 'attached'});
 }
 
 /**

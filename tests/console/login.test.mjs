@@ -62,8 +62,6 @@ test('who may acknowledge does so by name, and cannot label', async () => {
   const page = await open(browser, address, '#/alarms', kOptions);
   await logIn(page, 'acknowledge');
   await page.getByRole('button', {name: 'Acknowledge V1'}).click();
-  assert.equal(await page.getByLabel('Your name').count(), 0);
-  assert.equal(await page.getByLabel('Token').count(), 0);
   await page.getByRole('dialog').getByRole('button', {name: 'Acknowledge'})
       .click();
   await page.locator('tr.group-ACKED', {hasText: 'acknowledge'}).waitFor();

@@ -1,7 +1,7 @@
 // Our programs as children of a test.
 
 import {execFile, execFileSync, spawn} from 'node:child_process';
-import {mkdtempSync, rmSync} from 'node:fs';
+import {mkdtempSync, rmSync, writeFileSync} from 'node:fs';
 import {tmpdir} from 'node:os';
 import path from 'node:path';
 import {promisify} from 'node:util';
@@ -23,13 +23,15 @@ export async function until(condition, what, patienceMs = kPatienceMs) {
 /** A data directory, a domain and the programs in it; all end with stop(). */
 export class Plant {
   data = mkdtempSync(path.join(tmpdir(), 'fdi-console-'));
-  tokenFile = path.join(this.data, 'token');
-  access = ['--console-write', this.tokenFile];
+  // A proxy, which the browser plays, names anna.
+  access = ['--console-users', path.join(this.data, 'proxied'),
+    '--console-proxy-user', 'X-User', '--console-proxy-from', '127.0.0.1'];
   #domain = process.env.FDI_DOMAIN;
   #children = new Set();
 
   constructor() {
     process.once('exit', () => this.#kill());
+    writeFileSync(this.access[1], 'anna:engineer:*\n', {mode: 0o600});
   }
 
   #kill() {

@@ -1,5 +1,9 @@
 #include "diagnosis/records/certainty.h"
 
+#include <memory>
+#include <string>
+#include <vector>
+
 #include <gtest/gtest.h>
 
 namespace fdi {
@@ -17,6 +21,41 @@ TEST(CertaintyTest, ItFollowsFromTheNameItsLayerAndItsFactor) {
   EXPECT_EQ(CertaintyOf("", Layer::kObservers, 0.0, Unknown::kOutsideKnown),
             kNotKnown);
   EXPECT_EQ(CertaintyOf("unknown", Layer::kObservers, 0.0), kNotKnown);
+}
+
+TEST(CertaintyTest, WhatASetDoesNotKnowAndLooksTheSameStandsBeside) {
+  using Names = std::vector<std::string>;
+  const auto beside = [](std::string_view fault, double strength,
+                         const Names& known, Layer layer = Layer::kObservers) {
+    return LookAlikesBeside(fault, layer, strength, known);
+  };
+  const Names paper{"f1", "f3", "f6", "f7", "f19"};
+  EXPECT_EQ(beside("f6", 0.9, paper), Names{"f18"});
+  EXPECT_EQ(beside("f6", 0.9, paper, Layer::kPhysics), Names());
+  EXPECT_EQ(beside("f6", 0.9, {"f6", "f18"}), Names());
+  EXPECT_EQ(beside("f6", 0.9, {}), Names());
+  EXPECT_EQ(beside("f3|f6", 0.9, paper), Names());
+  // A little more than an external leak may take, and the other sign.
+  EXPECT_EQ(beside("f19", 0.05, paper), Names{"f5"});
+  EXPECT_EQ(beside("f19", 0.07, paper), Names());
+  EXPECT_EQ(beside("f19", -0.05, paper), Names());
+  EXPECT_EQ(beside("f1", 0.9, paper), Names());
+  EXPECT_EQ(WithLookAlikes(Certainty::kSure, {"f18"}), Certainty::kOneOf);
+  EXPECT_EQ(WithLookAlikes(Certainty::kNotYet, {}), Certainty::kNotYet);
+}
+
+TEST(CertaintyTest, AnEventKnowsTheFaultsOfItsSet) {
+  auto models = std::make_shared<ModelSet>();
+  models->faults = {3, 6};
+  FaultEvent event;
+  event.transition.kind = TransitionKind::kIsolated;
+  event.transition.factor = 1.0;
+  event.transition.strength = 0.4;
+  event.candidates = {{6, 1.0, 0.4, true}};
+  EXPECT_EQ(CertaintyOf(event), Certainty::kSure);
+  event.models = models;
+  EXPECT_EQ(CertaintyOf(event), Certainty::kOneOf);
+  EXPECT_EQ(LookAlikesOf(event), std::vector<std::string>{"f18"});
 }
 
 TEST(CertaintyTest, OnTheBusTheCandidatesTellWhetherItIsTooEarly) {

@@ -12,6 +12,7 @@
 
 #include "base/error.h"
 #include "base/passing_error.h"
+#include "tests/idl/signed_documents.h"
 #include "tests/storage/temporary_directory.h"
 
 namespace fdi::idl {
@@ -27,11 +28,6 @@ std::int64_t NowNs() {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(
              std::chrono::system_clock::now().time_since_epoch())
       .count();
-}
-
-std::string Slurp(const fs::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(stream), {}};
 }
 
 class KeysTest : public testing::Test {
@@ -268,44 +264,10 @@ TEST_F(KeysTest, FilesOfAnotherKeyOrAuthorityAreRefused) {
   }
 }
 
-struct Freer {
-  void operator()(BIO* bio) const { BIO_free_all(bio); }
-  void operator()(X509* certificate) const { X509_free(certificate); }
-  void operator()(EVP_PKEY* key) const { EVP_PKEY_free(key); }
-  void operator()(PKCS7* signature) const { PKCS7_free(signature); }
-  void operator()(X509_STORE* store) const { X509_STORE_free(store); }
-};
-template <typename T>
-using Owned = std::unique_ptr<T, Freer>;
-
-Owned<BIO> Open(const fs::path& file, const char* mode = "r") {
-  return Owned<BIO>(BIO_new_file(file.c_str(), mode));
-}
-Owned<X509> CertificateIn(const fs::path& file) {
-  return Owned<X509>(
-      PEM_read_bio_X509(Open(file).get(), nullptr, nullptr, nullptr));
-}
-Owned<EVP_PKEY> KeyIn(const fs::path& file) {
-  return Owned<EVP_PKEY>(
-      PEM_read_bio_PrivateKey(Open(file).get(), nullptr, nullptr, nullptr));
-}
-
 // Replaces the permissions of a key by some that its holder has signed.
 void SignOwnPermissions(const fs::path& folder) {
-  constexpr int kFlags = PKCS7_DETACHED | PKCS7_TEXT;
-  const std::string text = Slurp(folder / "permissions.p7s");
-  const std::size_t begin = text.find("<?xml");
-  const std::string document =
-      text.substr(begin, text.find("</dds>") + 7 - begin);
-  const Owned<BIO> in(
-      BIO_new_mem_buf(document.data(), static_cast<int>(document.size())));
-  const Owned<PKCS7> signature(
-      PKCS7_sign(CertificateIn(folder / "cert.pem").get(),
-                 KeyIn(folder / "key.pem").get(), nullptr, in.get(), kFlags));
-  ASSERT_NE(signature, nullptr);
-  BIO_reset(in.get());
-  SMIME_write_PKCS7(Open(folder / "permissions.p7s", "w").get(),
-                    signature.get(), in.get(), kFlags);
+  SignAgain(folder / "permissions.p7s", folder / "cert.pem",
+            folder / "key.pem");
 }
 
 // As Fast DDS 2.9.1 verifies the permissions of a participant.

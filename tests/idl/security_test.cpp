@@ -2,11 +2,15 @@
 // gives any.
 #include <map>
 
+#include <fastdds/dds/domain/DomainParticipantFactory.hpp>
 #include <gtest/gtest.h>
 
 #include "base/error.h"
+#include "idl/library_log.h"
+#include "idl/participant_impl.h"
 #include "idl/security/keys.h"
 #include "tests/idl/dds_fixture.h"
+#include "tests/idl/signed_documents.h"
 #include "tests/storage/temporary_directory.h"
 
 namespace fdi::idl {
@@ -117,6 +121,68 @@ TEST_F(SecurityTest, AGatewayPublishesInItsPartitionAlone) {
   const Publisher<ValveSampleMessage> publisher(
       gateway, {Profile::kLive, 0, {"hall-1"}});
   EXPECT_TRUE(publisher.WaitForReaders(1, kPatience));
+}
+
+// The library checks the domain of a grant only on the other side, so this is
+// what a program of one's own would do with any key.
+TEST_F(SecurityTest, EndpointsWithoutTheRightAreRefusedAndCounted) {
+  const auto grant_elsewhere = [&](const std::string& key) {
+    const std::string in = "<allow_rule>";
+    SignAgain(Keys() / key / "permissions.p7s", Keys() / "ca.pem",
+              Keys() / "ca.key", [&](std::string text) {
+                const std::size_t at = text.find(in);
+                const std::size_t end = text.find("</domains>", at) + 10;
+                std::string all = text.substr(at, end - at) + "</allow_rule>";
+                text.replace(text.find("<min>0", at), 6, "<min>232");
+                return text.insert(at, all);
+              });
+  };
+  grant_elsewhere("gateway");
+  grant_elsewhere("reader");
+  const std::uint64_t before = RefusedPermissions();
+  Participant monitor(With("monitor"), log_.Sink());
+  const Subscriber<ValveSampleMessage> samples(monitor);
+  const Publisher<FaultEvent> events(monitor);
+
+  Participant gateway(With("gateway"), log_.Sink());
+  const Publisher<ValveSampleMessage> forged(gateway);
+  EXPECT_TRUE(log_.WaitFor("permission_refused of=writer guid="));
+  EXPECT_TRUE(log_.WaitFor(
+      "reason=\"fdi/v1/ValveSample topic not found in allow rule.\""));
+  Participant reader(With("reader"), log_.Sink());
+  const Subscriber<FaultEvent> read(reader);
+  EXPECT_TRUE(log_.WaitFor("permission_refused of=reader guid="));
+  EXPECT_EQ(RefusedPermissions() - before, 2U);
+  EXPECT_EQ(samples.status().matched, 0);
+  EXPECT_EQ(events.matched(), 0);
+}
+
+// Its certificate is of our authority, its rights of another one.
+TEST_F(SecurityTest, RightsOfAnotherAuthorityAreRefusedAndCounted) {
+  const std::filesystem::path others = directory_.path() / "others";
+  MakeAuthority(others, 10);
+  MakeKey(others, "gateway", Role::kMonitor, 10, false);
+  const std::uint64_t before = RefusedPermissions();
+  Participant monitor(With("monitor"), log_.Sink());
+  dds::DomainParticipantQos qos = monitor.impl()->get_qos();
+  const std::string rights = "file://" + (others / "gateway").string() + "/";
+  for (auto& property : qos.properties().properties()) {
+    const std::string& name = property.name();
+    std::string& value = property.value();
+    if (name.find("Access-Permissions.") != std::string::npos) {
+      value = rights + value.substr(value.rfind('/') + 1);
+    } else if (name.find("PKI-DH.") != std::string::npos) {
+      value = "file://" + (Keys() / "gateway").string() + "/" +
+              value.substr(value.rfind('/') + 1);
+    }
+  }
+  auto* const factory = dds::DomainParticipantFactory::get_instance();
+  dds::DomainParticipant* const stranger =
+      factory->create_participant(domain_.id(), qos);
+  ASSERT_NE(stranger, nullptr);
+  EXPECT_TRUE(log_.WaitFor("permission_refused of=participant guid="));
+  EXPECT_EQ(factory->delete_participant(stranger), return_code::RETCODE_OK);
+  EXPECT_GT(RefusedPermissions(), before);
 }
 
 TEST_F(SecurityTest, ABadKeyIsRefusedBeforeTheBusIsTouched) {

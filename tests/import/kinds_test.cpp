@@ -306,6 +306,116 @@ std::vector<Kind> Kinds() {
                     std::to_string(flow / 1000) + " " +
                     std::to_string(1000 + flow % 1000).substr(1) + ",0";
            })},
+      {"100 ns since year 1",
+       Wide("Ticks," + names, count(10000000, 62135596800))},
+      {"seconds since 1904", Wide("Time," + names, count(1, 2082844800))},
+      {"Julian days", Wide("JD," + names,
+                           [](std::size_t k) {
+                             return Fixed(
+                                 2440587.5 + (static_cast<double>(kStart) +
+                                              static_cast<double>(k)) /
+                                                 86400.0,
+                                 8);
+                           })},
+      {"days of MATLAB", Wide("Time," + names,
+                              [](std::size_t k) {
+                                return Fixed(
+                                    719529.0 + (static_cast<double>(kStart) +
+                                                static_cast<double>(k)) /
+                                                   86400.0,
+                                    8);
+                              })},
+      {"digits alone",
+       Wide("time," + names,
+            [](std::size_t k) { return Clock("%Y%m%d%H%M%S", k); })},
+      {"blanks between the columns",
+       "Date        Time      FV17.OP  FV17.ZT  FT17.PV\n" +
+           Rows([](std::size_t k) {
+             return Clock("%Y-%m-%d  %H:%M:%S  ", k) + Fixed(kValve.cv[k]) +
+                    "   " + Fixed(kValve.x[k]) + " " + Fixed(kValve.f[k]);
+           })},
+      {"a title of measurement, and a column that no row has",
+       "LabVIEW Measurement\t\nWriter_Version\t2\nSeparator\tTab\n"
+       "***End_of_Header***\t\nChannels\t3\t\t\t\n"
+       "Y_Unit_Label\t%\t%\tt/h\t\nX_Dimension\tTime\tTime\tTime\t\n"
+       "Delta_X\t1.0\t1.0\t1.0\t\n***End_of_Header***\t\t\t\t\n"
+       "Time\tFV17 Output\tFV17 Position\tFT17 Flow\tComment\n" +
+           Rows([](std::size_t k) {
+             return Iso(k) + "\t" + Fixed(kValve.cv[k]) + "\t" +
+                    Fixed(kValve.x[k]) + "\t" + Fixed(kValve.f[k]);
+           })},
+      {"a query with a line and a count",
+       "         time         |   tag   |  value\n"
+       "----------------------+---------+--------\n" +
+           Tall(
+               [](std::size_t k, const std::string& tag, double value) {
+                 return ' ' + Clock("%Y-%m-%d %H:%M:%S+00", k) + " | " + tag +
+                        " | " + Fixed(value);
+               },
+               false) +
+           "(360 rows)\n"},
+      {"a time beside each value, tags above",
+       "17FC101.OP,,17ZT101.PV,,17FT101.PV,\n"
+       "Timestamp,Value,Timestamp,Value,Timestamp,Value\n" +
+           Rows([](std::size_t k) {
+             const std::string time = Clock("%d-%b-%y %H:%M:%S,", k);
+             return time + Fixed(kValve.cv[k]) + "," + time +
+                    Fixed(kValve.x[k]) + "," + time + Fixed(kValve.f[k]);
+           })},
+      {"quality under one name", "time,FC17.OUT,Q,ZT17.PV,Q,FT17.PV,Q\n" +
+                                     Rows([&](std::size_t k) {
+                                       return Iso(k) + "," +
+                                              Fixed(kValve.cv[k]) + ",G," +
+                                              Fixed(kValve.x[k]) +
+                                              (in(k, 5, 9) ? ",B," : ",G,") +
+                                              Fixed(kValve.f[k]) + ",G";
+                                     }),
+       Range(5, 9)},
+      {"confidence and units of each reading",
+       "Tagname,Timestamp,Value,Confidence,Units\n" +
+           Tall(
+               [](std::size_t k, const std::string& tag, double value) {
+                 const bool bad = tag == "17FT.PV" && k >= 50 && k < 60;
+                 return tag + "," + Iso(k) + "," + Fixed(value) +
+                        (bad ? ",0," : ",100,") +
+                        (tag == "17FT.PV" ? "T/H" : "PCT");
+               },
+               false),
+       {},
+       Range(50, 59)},
+      {"two columns of quality, one of them known",
+       "DateTime|TagName|Value|Quality|OPCQuality\n" +
+           Tall(
+               [](std::size_t k, const std::string& tag, double value) {
+                 const bool bad = tag == "17ZT.PV" && k >= 50 && k < 60;
+                 return Iso(k) + "|" + tag + "|" + Fixed(value) +
+                        (bad ? "|1|24" : "|0|192");
+               },
+               false),
+       Range(50, 59)},
+      {"rows and headers twice",
+       [&] {
+         std::string text;
+         for (std::size_t k = 0; k < kRows; ++k) {
+           const std::string row = Iso(k) + "," + Plain(k) + "\n";
+           text += k % 40 == 0 ? "time," + names + "\n" : "";
+           text += k == 50 ? row + row : row;
+         }
+         return text;
+       }()},
+      {"more words for no reading",
+       "time,17FC.OP,17ZT.PV,17FT.PV\n" + Rows([&](std::size_t k) {
+         static constexpr const char* kWords[] = {
+             "<No Data>",    "NO_DATA",     "[-11059] No Good Data",
+             "Not Connected", "*****",      "--.-",
+             "\\N",          "Bad_Value",   "1.#QNAN",
+             "Equip Fail",   "{null}",      "Bad, Device Failure"};
+         return Iso(k) + "," + Fixed(kValve.cv[k]) + "," +
+                (in(k, 20, 31) ? '"' + std::string(kWords[k - 20]) + '"'
+                               : Fixed(kValve.x[k])) +
+                "," + Fixed(kValve.f[k]);
+       }),
+       Range(20, 31)},
       {"a leap second",
        [&] {
          // date -d 2016-12-31T23:59:00Z +%s
@@ -434,6 +544,68 @@ TEST(KindsTest, AmbiguousDecimalsAndDatesAreMarkedAsChoices) {
   EXPECT_TRUE(Sniff(points, "plant.csv", given).choices.empty());
 }
 
+TEST(KindsTest, FlaggedReadingsAreUncertain) {
+  const std::string text =
+      "time,FC1.OP,ZT1.PV,FT1 [t/h]\n" + Rows([](std::size_t k) {
+        return Iso(k) + "," + Fixed(kValve.cv[k]) + "," + Fixed(kValve.x[k]) +
+               (k == 7 ? "?" : "") + "," + Fixed(kValve.f[k]) +
+               (k == 9 ? "*" : "");
+      });
+  const ColumnMap map = MapOf(text);
+  const auto table = ReadCsv(text, {.map = map});
+  const auto& samples = table.runs[0].samples;
+  EXPECT_NEAR(100.0 - samples[7].sample[Signal::kX], kValve.x[7], 1e-3);
+  EXPECT_EQ(samples[7].sample.quality[Index(Signal::kX)],
+            SignalQuality::kUncertain);
+  EXPECT_EQ(samples[8].sample.quality[Index(Signal::kX)], SignalQuality::kGood);
+  EXPECT_EQ(samples[9].sample.quality[Index(Signal::kF)],
+            SignalQuality::kUncertain);
+}
+
+TEST(KindsTest, ARefusalNamesTheLikeliestCause) {
+  const std::pair<std::string, const char*> files[] = {
+      {"Timestamp,Value,Timestamp,Value\n" + Rows([](std::size_t k) {
+         return Iso(k) + "," + Fixed(kValve.cv[k]) + "," + Iso(k + k / 7) +
+                "," + Fixed(kValve.x[k]);
+       }),
+       "each value has a time of its own"},
+      {"time,CV,X,F\n" + Rows([](std::size_t k) {
+         return Clock("%Y-%m-%d %H:%M:%S CST,", k) + Plain(k);
+       }),
+       "has a zone that is not known, or that several countries use"},
+      {"Tag: FC1.OP\nTimestamp,Value\n" + Rows([](std::size_t k) {
+         return Iso(k) + "," + Fixed(kValve.cv[k]);
+       }) + "\nTag: ZT1.PV\nTimestamp,Value\n" +
+           Rows(
+               [](std::size_t k) { return Iso(k) + "," + Fixed(kValve.x[k]); }),
+       "another table begins here"}};
+  for (const auto& [text, says] : files) {
+    std::string said;
+    try {
+      const ColumnMap map = MapOf(text, Utc());
+    } catch (const DataError& error) {
+      said = error.what();
+    }
+    EXPECT_THAT(said, HasSubstr(says));
+  }
+}
+
+// A shut line lasts longer than what shows the sense.
+TEST(KindsTest, AFaultThatLastsDoesNotTurnTheSense) {
+  std::string text = "time,FC1.OP,ZT1.PV,FT1 [t/h]\n";
+  for (std::size_t k = 0; k < 1400; ++k) {
+    const std::size_t at = k % kRows;
+    text +=
+        Clock("%Y-%m-%dT%H:%M:%SZ,", k) +
+        (k < 480 ? Plain(at)
+                 : "100.000,100.000,0.01" + Fixed(static_cast<double>(at), 0)) +
+        "\n";
+  }
+  const Sniffed found = Sniff(text, "plant.csv", Utc());
+  EXPECT_TRUE(found.columns[0].opening);
+  EXPECT_TRUE(found.columns[1].opening);
+}
+
 TEST(KindsTest, UnknownQualityIsNamedAndRefused) {
   const std::string text =
       "Tag,Time,Value,Quality\n" +
@@ -450,6 +622,13 @@ TEST(KindsTest, UnknownQualityIsNamedAndRefused) {
   } catch (const DataError& error) {
     EXPECT_THAT(error.what(), HasSubstr("\"Wobbly\" is no known quality"));
   }
+  // Also where nothing but the other cells says that it is a quality.
+  const std::string beside = "time,FC1.OP,ZT1.PV,Q\n" + Rows([](std::size_t k) {
+                               return Iso(k) + "," + Fixed(kValve.cv[k]) + "," +
+                                      Fixed(kValve.x[k]) +
+                                      (k == 3 ? ",P" : ",G");
+                             });
+  EXPECT_THAT(Findings(beside), HasSubstr("\"P\" is no known quality"));
   ColumnMap more = map;
   more.quality.uncertain = {"wobbly"};
   const auto& sample = ReadCsv(text, {.map = more}).runs[0].samples[3].sample;
@@ -600,6 +779,107 @@ TEST(KindsTest, UnitsAndRangesBeatLettersOfTags) {
   EXPECT_EQ(guess("FV-7.PV", 1.0, 0.0, "FV-7.ZT"), Signal::kCv);
   // Pulses of a flow meter are no opening.
   EXPECT_EQ(guess("FV-7 position", 1000.5, 0.0), std::nullopt);
+}
+
+// Whole sets of tags, each with what it is: a wrong guess in silence is worse
+// than none.
+TEST(KindsTest, TagsOfAPlantAreToldApartTogether) {
+  using Tags = std::vector<std::pair<const char*, const char*>>;
+  const std::map<std::string, std::optional<Signal>> signals = {
+      {"cv", Signal::kCv}, {"x", Signal::kX},   {"f", Signal::kF},
+      {"sp", Signal::kSp}, {"p1", Signal::kP1}, {"p2", Signal::kP2}};
+  const auto cell = [](const std::string& kind, std::size_t k) {
+    return kind == "cv"      ? kValve.cv[k]
+           : kind == "x"     ? kValve.x[k]
+           : kind == "f"     ? kValve.f[k]
+           : kind == "p1"    ? 35.0 - 0.02 * kValve.f[k]
+           : kind == "p2"    ? 26.0 + 0.02 * kValve.f[k]
+           : kind == "dp"    ? 9.0 - 0.04 * kValve.f[k]
+           : kind == "total" ? 1000.0 + static_cast<double>(k / 3)
+           : kind == "ends"  ? static_cast<double>(k / 100)
+                             : 17.0;
+  };
+  for (const Tags& tags : std::initializer_list<Tags>{
+           {{"FV101.SP", "cv"}, {"FV101.PV", "x"}, {"FT101.PV", "f"}},
+           {{"FV101.READVALUE", "x"},
+            {"FV101.WRITEVALUE", "cv"},
+            {"FT101", "f"}},
+           {{"HV12", "x"}, {"HV13", "cv"}, {"FT12", "f"}},
+           {{"FIC-17/PID1/OUT.CV", "cv"},
+            {"FIC-17/AI1/OUT.CV", "f"},
+            {"ZT-17/AI1/OUT.CV", "x"}},
+           {{"FIC17.PIDA.OP", "cv"},
+            {"ZI17.DACA.PV", "x"},
+            {"FIC17.PIDA.PV", "f"},
+            {"FIC17.PIDA.SP", ""}},
+           {{"FY101", "cv"}, {"FZT101", "x"}, {"FT101", "f"}},
+           {{"LMN", "cv"}, {"LMNR_IN", "x"}, {"PV_IN", ""}},
+           {{"OP", "cv"}, {"PV", ""}, {"SV", "sp"}, {"FB", "x"}},
+           {{"Flow Valve Cmd", "cv"},
+            {"Flow Valve Pos", "x"},
+            {"Flow Rate", "f"}},
+           {{"valve_pos_ref", "cv"},
+            {"valve_pos_act", "x"},
+            {"flow_meas", "f"}},
+           {{"ZSO101", "ends"},
+            {"FV101.OP", "cv"},
+            {"ZT101", "x"},
+            {"FT101", "f"}},
+           {{"FQI101.PV", "total"},
+            {"FT101.PV", "f"},
+            {"FV101.OP", "cv"},
+            {"FV101.ZT", "x"}},
+           {{"PDT101 [bar]", "dp"},
+            {"FV101.OP", "cv"},
+            {"FV101.ZT", "x"},
+            {"FT101", "f"}},
+           {{"PIC5.SP", ""}, {"PIC5.OP", "cv"}, {"ZT5", "x"}, {"FT5", "f"}},
+           {{"Ventil Sollwert [%]", "cv"},
+            {"Ventil Istwert [%]", "x"},
+            {"Durchfluss Istwert [m3/h]", "f"}},
+           {{"Reglerausgang [%]", "cv"},
+            {"Ventilöffnung [%]", "x"},
+            {"Massenstrom [t/h]", "f"}},
+           {{"Stellbefehl [%]", "cv"},
+            {"Rückführung [%]", "x"},
+            {"Menge [t/h]", "f"},
+            {"Vordruck (bar ü)", "p1"}},
+           {{"consigne vanne", "cv"},
+            {"position vanne", "x"},
+            {"débit", "f"},
+            {"pression amont", "p1"},
+            {"pression aval", "p2"}},
+           {{"Consigna de posición", "cv"},
+            {"Posición real", "x"},
+            {"Caudal", "f"},
+            {"Presión de salida [bar]", "p2"}},
+           {{"Uscita regolatore", "cv"},
+            {"Posizione valvola", "x"},
+            {"Portata", "f"},
+            {"Pressione a monte", "p1"},
+            {"Pressione a valle", "p2"}},
+           {{"Wartość zadana położenia", "cv"},
+            {"Otwarcie rzeczywiste", "x"},
+            {"Natężenie przepływu", "f"}}}) {
+    std::string header = "time";
+    for (const auto& [name, kind] : tags) {
+      header += std::string(",") + name;
+    }
+    const Sniffed found = Sniff(header + "\n" + Rows([&](std::size_t k) {
+                                  std::string row = Iso(k);
+                                  for (const auto& [name, kind] : tags) {
+                                    row += "," + Fixed(cell(kind, k));
+                                  }
+                                  return row;
+                                }),
+                                "plant.csv", {});
+    for (std::size_t i = 0; i < tags.size(); ++i) {
+      const auto known = signals.find(tags[i].second);
+      EXPECT_EQ(found.columns[i].signal,
+                known == signals.end() ? std::nullopt : known->second)
+          << tags[i].first << " beside " << tags[0].first;
+    }
+  }
 }
 
 TEST(KindsTest, WhatValveAndRecordTheModelsAreNotForIsSaid) {

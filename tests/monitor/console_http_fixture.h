@@ -19,7 +19,7 @@
 
 namespace fdi::console {
 
-inline constexpr const char* kToken = "0123456789abcdef";
+inline constexpr const char* kUserHeader = "X-User";
 
 /// The console over real HTTP, beside a history, without a pipeline.
 class ConsoleRoutesTest : public storage::HistoryFixture {
@@ -30,19 +30,21 @@ class ConsoleRoutesTest : public storage::HistoryFixture {
     std::filesystem::create_directory(folder);
     std::ofstream(folder / "index.html") << "<title>page</title>";
     std::ofstream(directory_.path() / "secret.txt") << "secret";
-    const auto token = directory_.path() / "token";
-    std::ofstream(token) << kToken << '\n';
-    std::filesystem::permissions(token, std::filesystem::perms(0600));
     storage::ModelStore(directory_.path() / "models.db",
                         storage::Access::kOccasionalWriter);
   }
 
-  void Start(bool writable = true) {
+  /// With engineers anna and bo, whom a proxy names; anna asks.
+  void Start() {
     AdmissionOptions admission;
-    if (writable) {
-      admission.token_file = directory_.path() / "token";
+    admission.users_file = directory_.path() / "engineers";
+    admission.proxy_header = kUserHeader;
+    admission.proxy_address = "127.0.0.1";
+    for (const char* name : {"anna", "bo"}) {
+      StoreUser(*admission.users_file, name, User{Role::kEngineer});
     }
     Start(admission);
+    client_->set_default_headers({{kUserHeader, "anna"}});
   }
   void Start(const AdmissionOptions& admission) {
     ConsoleOptions options;
@@ -93,10 +95,15 @@ class ConsoleRoutesTest : public storage::HistoryFixture {
     EXPECT_EQ(answer->status, status) << path << answer->body;
     return Json::parse(answer->body);
   }
-  Json Post(const std::string& path, const Json& body, int status = 200,
-            const std::string& token = kToken) {
-    const httplib::Result answer = client_->Post(
-        path, {{"X-FDI-Token", token}}, body.dump(), "application/json");
+  /// By whom `body` names, else by anna.
+  Json Post(const std::string& path, const Json& body, int status = 200) {
+    const std::string who =
+        body.is_object() ? body.value("who", "anna") : "anna";
+    const httplib::Result answer =
+        client_->Post(path,
+                      {{kUserHeader, who},
+                       {"Origin", "http://127.0.0.1:" + std::to_string(port_)}},
+                      body.dump(), "application/json");
     EXPECT_TRUE(answer) << path;
     if (!answer) {
       return {};

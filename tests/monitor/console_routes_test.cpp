@@ -11,6 +11,7 @@
 #include "base/time_units.h"
 #include "diagnosis/fault_catalogue.h"
 #include "report/plot/gnuplot.h"
+#include "storage/models/plant_loops.h"
 #include "tests/monitor/console_http_fixture.h"
 #include "tests/storage/message_of.h"
 
@@ -160,6 +161,30 @@ TEST_F(ConsoleRoutesTest, WhatCannotBeIsRefusedWithTheRange) {
   Get("/api/v1/history?fault=f99", 400);
   Get("/api/v1/valves/V2/trend", 404);
   Get("/api/v1/episodes/0123456789abcdef", 404);
+}
+
+TEST_F(ConsoleRoutesTest, WhatAValveServesComesFromItsEntryAndThePlantsTable) {
+  {
+    storage::ModelStore models(directory_.path() / "models.db",
+                               storage::Access::kOccasionalWriter);
+    storage::ValveEntry entry;
+    entry.pattern = "LV-*";
+    entry.type = "globe DN100";
+    models.PutValve(entry);
+    storage::PlantLoop loop;
+    loop.name = "LV-1";
+    loop.service = "L";
+    loop.grade = 1;
+    models.PutLoop(loop, entry);
+  }
+  Start();
+
+  EXPECT_EQ(Get("/api/v1/valves/LV-1/about"),
+            Json::parse(R"({"type": "globe DN100", "service": "L", "grade": 1,
+                            "group": null})"));
+  EXPECT_EQ(Get("/api/v1/valves/FV-1/about"),
+            Json::parse(R"({"type": null, "service": null, "grade": null,
+                            "group": null})"));
 }
 
 TEST_F(ConsoleRoutesTest, AnEpisodeComesWithItsEvidence) {

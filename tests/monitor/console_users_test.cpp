@@ -7,7 +7,7 @@
 #include <gmock/gmock.h>
 
 #include "base/error.h"
-#include "monitor/console/access.h"
+#include "monitor/console/failure_limit.h"
 #include "monitor/console/logins.h"
 #include "monitor/console/users.h"
 #include "tests/storage/message_of.h"
@@ -205,7 +205,7 @@ TEST_F(LoginsTest, GuessesAreSlowedByNameAndAddress) {
 // Each name costs its inventor the time of a hash. No number of them locks out
 // who has a name, or frees the guesses at one.
 TEST_F(LoginsTest, ManyNamesLockNobodyOut) {
-  FailureLimit limit(FailureLimit::WhenFull::kReplaceOldest);
+  FailureLimit limit;
   for (int i = 0; i < 1000; ++i) {
     const std::string name = "n" + std::to_string(i);
     EXPECT_TRUE(limit.Allows(name, now_));

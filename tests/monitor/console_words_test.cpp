@@ -1,4 +1,6 @@
+#include <cmath>
 #include <limits>
+#include <vector>
 
 #include "diagnosis/fault_catalogue.h"
 #include "monitor/console/model_facts.h"
@@ -49,6 +51,30 @@ TEST(ConsoleWordsTest, NothingBeyondItsThresholdIsSaidSo) {
   point.state = State::kNormal;
   EXPECT_EQ(Explain(TwoChannels(), point, Describe),
             "as the normal model expects");
+}
+
+// A shift of 1 m3/h is within the thresholds, but not on the mean.
+TEST(ConsoleWordsTest, AWindowThatRaisesAnAlarmIsToldWithItsLimits) {
+  ModelFacts models = TwoChannels();
+  models.channels[1].windows = {{30, -0.5, 0.5, 10.0}, {500, -0.1, 0.1, 10.0}};
+  std::vector<TracePoint> points(60, Abnormal({0.0, -1.0}, {0.0, 0.0, 0.0}));
+  points.push_back(Abnormal({}, {}));  // Not judged.
+
+  const std::vector<WindowBeyond> beyond = WindowsBeyond(models, points);
+  ASSERT_EQ(beyond.size(), 1U);  // The longer one is not full.
+  EXPECT_EQ(beyond[0].channel, 1U);
+  EXPECT_EQ(beyond[0].length, 30);
+  EXPECT_FALSE(beyond[0].deviation);
+  EXPECT_NEAR(beyond[0].value, -1.0, 1e-9);
+  EXPECT_EQ(beyond[0].low, -0.5);
+
+  models.channels[1].windows = {{30, -5.0, 5.0, std::log(0.2)}};
+  for (std::size_t k = 0; k < points.size(); k += 2) {
+    points[k].residuals = {0.0, 1.0};
+  }
+  ASSERT_EQ(WindowsBeyond(models, points).size(), 1U);
+  EXPECT_TRUE(WindowsBeyond(models, points)[0].deviation);
+  EXPECT_NEAR(WindowsBeyond(models, points)[0].high, 0.2, 1e-9);
 }
 
 TEST(ConsoleWordsTest, WhileAValveIsNormalNoFaultFits) {

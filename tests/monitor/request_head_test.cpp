@@ -33,7 +33,6 @@ TEST(RequestHeadTest, PassesOnOnlyWhatPagesRead) {
       "Content-Type: multipart/form-data; boundary=x\r\n"
       "Accept-Encoding: gzip, deflate, br\r\nContent-Length: 4\r\n"
       "Authorization: Bearer abc\r\n"
-      "X-FDI-Token: abc\r\n"
       "X-Forwarded-Proto: https\r\n\r\n";
   ASSERT_FALSE(ParseRequestHead(bytes + "body", kBody, head));
 
@@ -46,8 +45,6 @@ TEST(RequestHeadTest, PassesOnOnlyWhatPagesRead) {
             "GET /api/v1/stream?valve=V1 HTTP/1.1\r\nHost: localhost:8080\r\n"
             "Cookie: a=b\r\nOrigin: null\r\n"
             "Accept-Encoding: gzip\r\nContent-Length: 4\r\n"
-            "Authorization: Bearer abc\r\n"
-            "X-FDI-Token: abc\r\n"
             "X-Forwarded-Proto: https\r\n\r\n");
 }
 

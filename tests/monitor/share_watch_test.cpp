@@ -52,6 +52,7 @@ TEST(ContestedStatusTest, LongAndStrangeNamesFitTheWire) {
                     .samples = {},
                     .datagrams = {},
                     .refused_participants = 0,
+                    .refused_permissions = 0,
                     .decisions = {},
                     .journal = {}};
   EXPECT_EQ(StatusOf(facts).health, idl::Health::kOk);

@@ -165,6 +165,23 @@ TEST_F(ReadWorkTest, FalseAlarmsAreNoWorkAndCostTrust) {
   EXPECT_NEAR(rows[1].score, before / 2.0, 1e-9);
 }
 
+TEST_F(ReadWorkTest, WhereOnlyTheDataEndedTheFaultStands) {
+  using Kind = TransitionKind;
+  const auto none = EndReason::kNone;
+  writer_.Record(Event(Kind::kDetected, 0, 0, 0.3, none, "V4"), kDetected);
+  writer_.Record(Event(Kind::kIsolated, 20, 4, 0.8, none, "V4"), kDetected);
+  writer_.Record(
+      Event(Kind::kClosed, 60, 4, 0.8, EndReason::kStreamEnded, "V4"),
+      kDetected);
+  query_.valve_glob = "V4";
+
+  const auto rows = Read();
+  ASSERT_EQ(rows.size(), 1u);
+  EXPECT_FALSE(rows[0].work.faults[0].ended_ns);
+  EXPECT_THAT(rows[0].why,
+              HasSubstr("stands for 24 h, not confirmed for 24 h"));
+}
+
 TEST_F(ReadWorkTest, ALabelSaysWhatItReallyWas) {
   Label("V1", "f13");
   for (const WorkRow& row : Read()) {

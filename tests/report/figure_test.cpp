@@ -11,6 +11,7 @@
 
 #include "base/error.h"
 #include "report/plot/episode_figure.h"
+#include "report/plot/episode_page.h"
 #include "report/plot/gnuplot.h"
 #include "report/plot/run_figure.h"
 #include "tests/storage/history_fixture.h"
@@ -30,6 +31,12 @@ using testing::HasSubstr;
 using testing::Not;
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+
+TEST(IntervalTextTest, AWidthThatCannotBeSeenIsLeftOut) {
+  EXPECT_EQ(IntervalText(0.42, 0.38, 0.46, 2), "0.42 (0.38 to 0.46)");
+  EXPECT_EQ(IntervalText(0.19, 0.189, 0.191, 2), "0.19");
+  EXPECT_EQ(IntervalText(0.19, 0.19, 0.19, 2), "0.19");
+}
 
 // The data of the only series of a figure, as the script has them.
 std::string Points(const Figure& figure) {

@@ -217,6 +217,7 @@ TEST(ReportTest, HtmlHasThePartsOfTheTextAndEscapesThem) {
       out.str(),
       AllOf(HasSubstr("<title>A &amp; B</title>"), HasSubstr("<h1>A &amp; B"),
             HasSubstr("<p>Two\nlines.</p>"), HasSubstr("<h2>Runs</h2>"),
+            HasSubstr("p{white-space:pre-line;overflow-wrap:anywhere}"),
             HasSubstr("<a href=\"#p\">a&lt;b&gt;&amp;&quot;c&quot;</a>"),
             HasSubstr("<td class=\"number good\">50.0 %</td>"),
             HasSubstr("<td class=\"number good\">-</td>"),

@@ -212,6 +212,17 @@ TEST(LogSinkTest, StalledReaderCostsLinesAndNoTime) {
   EXPECT_THAT(then, HasSubstr(" again\n"));
 }
 
+TEST(LogSinkTest, AnErrorGivesUpOnAReaderThatDoesNotRead) {
+  const StalledStderr stalled;
+  constexpr auto kPatience = std::chrono::milliseconds(20);
+  while (WriteToStderr(std::string(1000, 'x'), kPatience)) {
+  }
+  EXPECT_FALSE(WriteToStderr("error: lost\n", kPatience));
+  stalled.Read();
+  EXPECT_TRUE(WriteToStderr("error: read\n", kPatience));
+  EXPECT_EQ(stalled.Read(), "error: read\n");
+}
+
 TEST(LogSinkTest, NoTextMakesALineOrCommandsTheTerminal) {
   testing::internal::CaptureStderr();
   MakeStderrSink(LogLevel::kInfo)(LogLevel::kWarning,

@@ -188,12 +188,30 @@ TEST_F(HistoryWriterTest, AClockThatIsSetBackHasSignsOfLife) {
     HistoryWriter writer(path_);
     writer.BeginSession(kDetected, "v", "");
     writer.Commit(earlier);
-    EXPECT_EQ(Sql("SELECT alive_ns FROM monitor_session"),
-              std::to_string(earlier));
+    writer.Commit(earlier + 30 * kSecond);
+    EXPECT_EQ(Sql("SELECT max(alive_ns) FROM monitor_session WHERE stop_ns IS "
+                  "NULL"),
+              std::to_string(earlier + 30 * kSecond));
   }
   HistoryWriter writer(path_);
   EXPECT_EQ(writer.BeginSession(earlier - kSecond, "v", "").died_ns,
             earlier - kSecond);
+}
+
+TEST_F(HistoryWriterTest, NoSessionEndsBeforeItBegins) {
+  HistoryWriter writer(path_);
+  writer.BeginSession(kDetected, "v", "c");
+  writer.Commit(kDetected + 20 * kSecond);
+  writer.Commit(kDetected - 3600 * kSecond);
+  RecordEpisode(writer, 0b010);
+  writer.EndSession(kDetected - 7200 * kSecond, true);
+
+  EXPECT_EQ(
+      Sql("SELECT group_concat(((start_ns - " + std::to_string(kDetected) +
+          ") / 1000000000) || '+' || ((stop_ns - start_ns) / 1000000000) "
+          "|| ' ' || clean || software || config) FROM monitor_session"),
+      "0+20 1vc,-3600+0 1vc,-7200+0 1vc");
+  EXPECT_EQ(Sql("SELECT session_id FROM episode"), "2");
 }
 
 TEST_F(HistoryWriterTest, KnowsWhichEpisodeOfAValveEndedLast) {

@@ -102,7 +102,6 @@ class ShiftTest : public MonitorFixture {
       valve.gateway = i >= 9 && i <= 13;
     }
     std::ofstream(directory_.path() / "index.html") << "<title>page</title>";
-    WritePrivate("token", "0123456789abcdef\n");
     WritePrivate("hook", "#!/bin/sh\ncat >>\"$(dirname \"$0\")/told\"\n");
     std::filesystem::permissions(directory_.path() / "hook",
                                  std::filesystem::perms(0700));
@@ -127,12 +126,11 @@ class ShiftTest : public MonitorFixture {
   }
 
   void Start() {
-    monitor_ = StartMonitor(
-        {"--console=127.0.0.1:0", "--console-files", directory_.path().string(),
-         "--console-write", (directory_.path() / "token").string(),
-         "--http=127.0.0.1:0", "--on-event",
-         (directory_.path() / "hook").string(), "--on-event-rate", "6000",
-         "--stale-timeout", "600"});
+    monitor_ =
+        StartMonitor({"--console=127.0.0.1:0", "--console-files",
+                      directory_.path().string(), "--http=127.0.0.1:0",
+                      "--on-event", (directory_.path() / "hook").string(),
+                      "--on-event-rate", "6000", "--stale-timeout", "600"});
     page_ = PortOf("console_listening");
     metrics_ = PortOf("http_listening");
     EXPECT_TRUE(gateway_->WaitForReaders(1, kMonitorPatience));

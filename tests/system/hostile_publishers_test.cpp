@@ -9,6 +9,7 @@
 
 #include <gmock/gmock.h>
 
+#include "base/passing_error.h"
 #include "storage/history/history_reader.h"
 #include "tests/system/attack.h"
 #include "tests/system/honest_valve.h"
@@ -64,6 +65,15 @@ class HostilePublishersTest : public MonitorFixture {
   /// Waits until so many samples went through engines, whatever their verdict.
   bool AwaitDiagnosed(std::uint64_t count) {
     return Await([this, count] { return counters_["diagnosed"] >= count; });
+  }
+
+  // For a shell.
+  static std::string Words(const std::vector<std::string>& command) {
+    std::string line;
+    for (const std::string& word : command) {
+      line += " '" + word + "'";
+    }
+    return line;
   }
 
   static Sample Shifted(std::uint64_t k, std::int64_t shift_s) {
@@ -208,18 +218,30 @@ TEST_F(HostilePublishersTest, JumpsCostAValveItsShareAndOthersNothing) {
       << monitor->errors();
 }
 
-// The library throws in destructors then: that was an abort.
+// The library throws in destructors then, or ends the process by an assertion.
 TEST_F(HostilePublishersTest, WithoutAddressSpaceTheStartFailsWithAMessage) {
-  std::string command = "ulimit -v 130000; exec";
-  for (const std::string& word : Command({})) {
-    command += " '" + word + "'";
+  for (const std::string limit : {"130000", "300000"}) {
+    ChildProcess monitor(
+        {"/bin/bash", "-c",
+         "ulimit -v " + limit + "; exec" + Words(Command({}))});
+    const auto code = monitor.AwaitExit();
+    EXPECT_EQ(code, kExitPassing) << limit << monitor.errors();
+    EXPECT_THAT(monitor.errors(), testing::HasSubstr("error: no room for "));
   }
-  ChildProcess monitor({"/bin/bash", "-c", command});
-  const auto code = monitor.AwaitExit();
-  ASSERT_TRUE(code);
-  EXPECT_GT(*code, 0);
-  EXPECT_LT(*code, 128) << monitor.errors();
-  EXPECT_THAT(monitor.errors(), testing::HasSubstr("error: "));
+}
+
+TEST_F(HostilePublishersTest, AFullLogHoldsUpNeitherTheStartNorTheEnd) {
+  ChildProcess monitor(
+      {"/bin/bash", "-c",
+       "exec 2> >(exec sleep 20); timeout 0.2 head -c 1000000 /dev/zero >&2; "
+       "exec" +
+           Words(Command({}))});
+  speaker_ = ":" + std::to_string(monitor.pid());
+  EXPECT_TRUE(Await([this] { return !counters_.empty(); }));
+  Publish(0, 40);
+  EXPECT_TRUE(AwaitVectors(40));
+  monitor.Signal(SIGTERM);
+  EXPECT_EQ(monitor.AwaitExit(std::chrono::seconds(10)), 0);
 }
 
 // It takes part in the lossless stream, and its places are full. Each vector

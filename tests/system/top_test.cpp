@@ -70,5 +70,27 @@ TEST_F(TopSystemTest, TheTableComesAgainUntilCtrlC) {
   EXPECT_EQ(top.Settings().c_lflag, before.c_lflag);
 }
 
+// It waits for its reader, but not with a stop.
+TEST_F(TopSystemTest, AWatchWhoseReaderHasStoppedReadingEnds) {
+  std::string command =
+      "exec 1> >(exec sleep 20); "
+      "timeout 0.2 head -c 1000000 /dev/zero; exec";
+  for (const std::string& word : Top()) {
+    command += word == "top" ? " watch" : " '" + word + "'";
+  }
+  ChildProcess watch({"/bin/bash", "-c", command});
+  EXPECT_TRUE(watch.AwaitLine("watch_ready"));
+  EXPECT_TRUE(Await([&] {
+    std::string function;
+    std::ifstream("/proc/" + std::to_string(watch.pid()) + "/wchan") >>
+        function;
+    return function.find("pipe_write") != std::string::npos;
+  }));
+
+  watch.Signal(SIGTERM);
+
+  EXPECT_EQ(watch.AwaitExit(std::chrono::seconds(10)), 1);
+}
+
 }  // namespace
 }  // namespace fdi::monitor

@@ -9,6 +9,7 @@
 
 #include "diagnosis/fault_catalogue.h"
 #include "diagnosis/observer_bank.h"
+#include "diagnosis/taught.h"
 #include "trainer/evaluation.h"
 #include "trainer/regression.h"
 #include "trainer/statistics.h"
@@ -104,6 +105,39 @@ TEST(DifferenceObserversTest, AModelThatDoesNotForgetErrsFromAnyPast) {
   EXPECT_LT(FreeRunError(WithMemory(0.5), {stretch}), 1.5e2);
 }
 
+// The command leaves its usual range once, for eight samples: models of the
+// other three quarters know nothing of how the flow bends there.
+TEST(DifferenceObserversTest, OneExcursionOfTheCommandDoesNotSetTheLimits) {
+  const auto limits = [](bool excursion) {
+    TrainingRun run = HealthyRun(3, 1600);
+    std::mt19937 random(4);
+    std::normal_distribution<double> noise(0.0, 1.0);
+    for (std::size_t k = 0; k < run.samples.size(); ++k) {
+      Sample& sample = run.samples[k].sample;
+      if (excursion && k >= 900 && k < 908) {
+        sample.Set(Signal::kCv, 20.0);
+      }
+      sample.Set(Signal::kF, 200.0 * std::exp(-0.04 * sample[Signal::kCv]) +
+                                 0.3 * noise(random));
+    }
+    TrainingOptions options = TwoChannels();
+    options.channels.resize(1);
+    ChannelPlan& plan = options.channels.front();
+    plan.name = "F(CV)";
+    plan.output = Signal::kF;
+    plan.pools = {{{Signal::kCv, 0}}};
+    plan.antecedents = {{Signal::kCv, 0}};
+    plan.own_past.clear();
+    return TrainDifferenceSet({run}, {{19, 0.5}}, WithFault, 200.0, options)
+        .channels.front();
+  };
+  const ChannelSpec with = limits(true);
+  const ChannelSpec without = limits(false);
+  EXPECT_LT(with.upper_threshold, 1.5 * without.upper_threshold);
+  EXPECT_LT(with.windows.front().upper_mean,
+            1.5 * without.windows.front().upper_mean);
+}
+
 // 2 % of a flow of 18 is half its noise: fitted to the noisy readings the
 // observer would err by more than it has to say.
 TEST(DifferenceObserversTest, SaysWhatTheFaultChangesWithoutTheNoise) {
@@ -182,11 +216,18 @@ TrainingRun FurtherValve(unsigned seed, int count) {
 
 TEST(DifferenceObserversTest, AFurtherValveOfTheTypeTakesTheFaultsOver) {
   const std::vector<TrainingRun> healthy{FurtherValve(7, 1500)};
-  ASSERT_TRUE(IsTransferable(Trained(), healthy, TwoChannels()));
+  // Also what a label has taught, which stands behind the others.
+  ModelSet of_type = Trained();
+  of_type.observers.push_back(of_type.observers.back());
+  of_type.observers.back().name += kTaughtMark;
+  of_type.observers.back().moved = MaskOf(Signal::kT1);
+  ASSERT_TRUE(IsTransferable(of_type, healthy, TwoChannels()));
 
   const auto models = std::make_shared<const ModelSet>(
-      TransferDifferenceSet(Trained(), healthy, TwoChannels()));
+      TransferDifferenceSet(of_type, healthy, TwoChannels()));
 
+  EXPECT_TRUE(IsTaught(models->observers.back()));
+  EXPECT_EQ(models->observers.back().moved, MaskOf(Signal::kT1));
   EXPECT_EQ(ComputeIndices(ScoreRun(models, FurtherValve(4, 7200))).episodes,
             0);
   ExpectNamed(models, FurtherValve);

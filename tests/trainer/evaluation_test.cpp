@@ -102,6 +102,26 @@ TEST(IndicesTest, WrongSetsAreCountedAndTheLastOneDecides) {
   EXPECT_EQ(r.final_set, std::vector<int>{6});
 }
 
+TEST(IndicesTest, AnAnswerIsAsCertainAsItWasWhenItWasNamed) {
+  std::vector<Indication> all = Quiet();
+  Detect(all, 700, 1000);
+  Isolate(all, 720, 760, {3});
+  Isolate(all, 760, 1000, {3, 6});
+  for (std::size_t k = 0; k < all.size(); ++k) {
+    all[k].wording.certainty = k < 720   ? Certainty::kNotYet
+                               : k < 760 ? Certainty::kSure
+                               : k < 900
+                                   ? Certainty::kOneOf
+                                   : Certainty::kLikely;  // The set stays.
+  }
+  EXPECT_EQ(ComputeIndices(all).wording.certainty, Certainty::kOneOf);
+  Isolate(all, 700, 1000, {});
+  for (Indication& indication : all) {
+    indication.wording.certainty = Certainty::kNotKnown;
+  }
+  EXPECT_EQ(ComputeIndices(all).wording.certainty, Certainty::kNotKnown);
+}
+
 TEST(IndicesTest, RunWithoutFaultHasRatesButNoTimes) {
   std::vector<Indication> all = Quiet();
   for (Indication& indication : all) {

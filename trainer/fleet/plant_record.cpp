@@ -188,8 +188,8 @@ std::string Verdict(const loop::Audit& audit) {
   std::string text(loop::VerdictName(audit.verdict));
   if (audit.verdict == loop::Verdict::kStiction) {
     text += audit.sure ? ", sure" : ", likely";
-    if (audit.evidence.fit) {
-      text += ", band " + Fixed(audit.evidence.fit->band, 2) + " % of OP";
+    if (const auto band = audit.evidence.band()) {
+      text += ", band " + Fixed(band->width, 2) + " % of OP";
     }
   }
   return text + ": " + std::string(audit.reason);

@@ -12,6 +12,7 @@
 #include "storage/runs/runs.h"
 #include "trainer/campaign/campaign_fields.h"
 #include "trainer/campaign/run_input.h"
+#include "trainer/scoring/detectors.h"
 
 namespace fdi::trainer {
 namespace {
@@ -20,22 +21,23 @@ using storage::TrainingEpisode;
 using Json = nlohmann::ordered_json;
 
 // The settings that the set was trained with: those of its preset, overridden
-// by what the set holds and, since versions that store them, by its lineage.
+// by what the set holds and, since versions that store them, by its lineage. Of
+// a set of onboarding only the options of the data set are used.
 TrainingOptions SettingsOf(const ModelSet& models,
                            const storage::Lineage& lineage) {
   TrainingOptions options;
   try {
-    options = PresetOptions(models.preset);
+    options = IsOnboarded(models) ? options : PresetOptions(models.preset);
   } catch (const ConfigError&) {
     throw DataError("model set " + NameOf(models) + " is of preset '" +
                     models.preset +
-                    "': only sets of fdi-trainer train (paper, extended) can "
-                    "be trained on; onboard the valve anew instead");
+                    "': only sets of fdi-trainer train (paper, extended) and "
+                    "of fdi-trainer onboard can learn from labels");
   }
   options.name = models.name;
   options.decision = models.decision;
   options.false_alarms_per_hour = models.false_alarms_per_hour;
-  if (!lineage.settings.empty()) {
+  if (!lineage.settings.empty() && !IsOnboarded(models)) {
     try {
       const Json json = Json::parse(lineage.settings);
       VisitTraining(options, [&json](const char* key, auto& field, auto...) {
@@ -77,11 +79,26 @@ std::vector<storage::Episode> FindLabelled(storage::HistoryReader& history,
   return episodes;
 }
 
-// The one set that diagnosed the episodes.
-std::string ParentOf(const std::vector<storage::Episode>& episodes) {
+std::string NameOfSet(const storage::Episode& episode) {
+  return storage::ParseModelReference(episode.model_set).name;
+}
+
+// The one set that diagnosed the episodes. Versions of a set of onboarding
+// differ by their limits and by what labels have taught, so that what is in
+// force now is built on.
+ModelSet ParentOf(const std::vector<storage::Episode>& episodes,
+                  storage::ModelStore& store) {
   std::set<std::string> sets;
+  std::set<std::string> names;
   for (const storage::Episode& episode : episodes) {
     sets.insert(episode.model_set);
+    names.insert(NameOfSet(episode));
+  }
+  if (names.size() == 1) {
+    ModelSet active = store.Load(*names.begin());
+    if (IsOnboarded(active)) {
+      return active;
+    }
   }
   if (sets.size() > 1) {
     throw ConfigError("the labelled episodes are of several model sets (" +
@@ -89,7 +106,35 @@ std::string ParentOf(const std::vector<storage::Episode>& episodes) {
                       "): choose the one to build on with --parent "
                       "NAME[@VERSION]");
   }
-  return *sets.begin();
+  return store.Load(*sets.begin());
+}
+
+// What a set of onboarding can learn from, and how.
+void CheckOnboarded(const LabelRequest& request, const ModelSet& parent,
+                    storage::ModelStore& store,
+                    std::vector<storage::Episode>& episodes) {
+  if (!request.runs.empty()) {
+    throw ConfigError(
+        "--runs is for sets of fdi-trainer train: a set of "
+        "onboarding learns healthy hours by fdi-trainer onboard "
+        "--extend");
+  }
+  std::erase_if(episodes, [](const storage::Episode& episode) {
+    return episode.label == "false";
+  });
+  if (episodes.empty()) {
+    throw NotFoundError(
+        "no label names a fault: episodes labelled false are "
+        "learnt by fdi-trainer limits --valve ID");
+  }
+  for (const storage::Episode& episode : episodes) {
+    const auto entry = store.FindValve(episode.valve_id);
+    if (entry && entry->baseline() == storage::BaselineState::kProvisional) {
+      throw DataError("valve " + episode.valve_id +
+                      " was changed since model set " + NameOf(parent) +
+                      " was made: onboard it anew");
+    }
+  }
 }
 
 bool Contains(const std::vector<std::string>& words, const std::string& word) {
@@ -124,6 +169,14 @@ void PlanRuns(const LabelRequest& request, const std::filesystem::path& file,
   storage::RunStore store(file);
   for (const std::string& run : plan.parent->training_runs) {
     if (replaced.contains(run)) {
+      continue;
+    }
+    // The record of onboarding is not read again, and may be a file.
+    const bool is_evidence = std::ranges::any_of(
+        plan.lineage.episodes,
+        [&](const TrainingEpisode& before) { return before.run == run; });
+    if (IsOnboarded(*plan.parent) && !is_evidence) {
+      plan.runs.push_back(run);
       continue;
     }
     try {
@@ -178,7 +231,71 @@ bool IsEvidenceOf(const storage::RunInfo& run, const LabelledEpisode& episode) {
          run.last_stamp_ns == episode.samples.back().sample.stamp_ns;
 }
 
+// Pieces in which the observers settle and something is left.
+std::vector<Stretch> PiecesOf(const TrainingRun& run, const LabelPlan& plan) {
+  const int needed = plan.parent->decision.settling_samples +
+                     plan.training.dataset.dropped_after_step;
+  std::vector<Stretch> pieces = SplitAtGaps(run);
+  std::erase_if(pieces, [needed](const Stretch& piece) {
+    return piece.samples.size() < static_cast<std::size_t>(needed);
+  });
+  return pieces;
+}
+
+std::vector<Lesson> LessonsOf(const LabelPlan& plan,
+                              const storage::DataDirectory& directory) {
+  std::vector<Lesson> lessons;
+  for (const LabelledEpisode& episode : plan.learnt) {
+    TrainingRun run;
+    run.id = "episode " + episode.meaning.episode_id;
+    run.period_s = plan.parent->sample_period_s;
+    run.flow_unit = plan.parent->flow_unit;
+    run.samples = episode.samples;
+    lessons.push_back(
+        {episode.meaning.fault, episode.meaning.strength, PiecesOf(run, plan)});
+  }
+  for (const TrainingEpisode& before : plan.lineage.episodes) {
+    if (before.fault != 0 && Contains(plan.runs, before.run) &&
+        SameEpisode(plan.learnt, before) == nullptr) {
+      storage::RunStore store(directory.runs());
+      TrainingRun run = ToTrainingRun(store.Load(before.run), false);
+      run.id = "episode " + before.episode_id;
+      lessons.push_back({before.fault, before.strength, PiecesOf(run, plan)});
+    }
+  }
+  return JoinLessons(std::move(lessons));
+}
+
 }  // namespace
+
+bool IsOnboarded(const ModelSet& models) {
+  return models.preset == "onboard";
+}
+
+Teaching TeachFrom(const LabelPlan& plan,
+                   const storage::DataDirectory& directory) {
+  Teaching teaching;
+  for (const Lesson& lesson : LessonsOf(plan, directory)) {
+    try {
+      teaching.taught.push_back(Teach(*plan.parent, lesson));
+    } catch (const DataError& error) {
+      std::set<std::string> episodes;
+      for (const Stretch& stretch : lesson.stretches) {
+        episodes.insert(stretch.run_id);
+      }
+      throw DataError(JoinText(episodes) + ": " + error.what());
+    }
+  }
+  teaching.models = WithTaught(*plan.parent, teaching.taught);
+  return teaching;
+}
+
+std::vector<int> NameIn(const std::shared_ptr<const ModelSet>& models,
+                        const LabelledEpisode& episode) {
+  ScoredRun run;
+  run.run = episode.record;
+  return Evaluate(EngineDetector(models), run).last_set;
+}
 
 std::string SettingsText(const TrainingOptions& options) {
   TrainingOptions copy = options;
@@ -192,11 +309,15 @@ std::string SettingsText(const TrainingOptions& options) {
 LabelPlan MakeLabelPlan(const LabelRequest& request,
                         const storage::DataDirectory& directory) {
   storage::HistoryReader history(directory.history());
-  const auto episodes = FindLabelled(history, request);
+  auto episodes = FindLabelled(history, request);
   LabelPlan plan;
   storage::ModelStore store(directory.models());
   plan.parent = std::make_shared<const ModelSet>(
-      store.Load(request.parent.empty() ? ParentOf(episodes) : request.parent));
+      request.parent.empty() ? ParentOf(episodes, store)
+                             : store.Load(request.parent));
+  if (IsOnboarded(*plan.parent)) {
+    CheckOnboarded(request, *plan.parent, store, episodes);
+  }
   plan.lineage = store.LineageOf({plan.parent->name, plan.parent->version});
   plan.training = SettingsOf(*plan.parent, plan.lineage);
   LabelReader reader(history, directory.runs(), plan.parent,
@@ -204,6 +325,10 @@ LabelPlan MakeLabelPlan(const LabelRequest& request,
   plan.has_news = !request.runs.empty();
   for (const storage::Episode& episode : episodes) {
     LabelledEpisode read = reader.Read(episode);
+    if (IsOnboarded(*plan.parent) && NameOfSet(episode) != plan.parent->name) {
+      read.refusal = "it was diagnosed by " + episode.model_set +
+                     ", and a set of onboarding learns from its own valve";
+    }
     if (read.refusal.empty()) {
       plan.has_news = plan.has_news || IsNew(read, plan.lineage);
       plan.learnt.push_back(std::move(read));

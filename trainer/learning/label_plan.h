@@ -8,9 +8,13 @@
 #include "storage/database/data_directory.h"
 #include "storage/models/models.h"
 #include "trainer/learning/labelled_episodes.h"
+#include "trainer/learning/taught_observers.h"
 #include "trainer/training.h"
 
 namespace fdi::trainer {
+
+/// The set was made by `fdi-trainer onboard`, or from such a one.
+bool IsOnboarded(const ModelSet& models);
 
 /// The settings of a training that its model set does not hold, as JSON. They
 /// are stored with the set, so that its next version is made in the same way.
@@ -25,6 +29,10 @@ struct LabelRequest {
 };
 
 /// What `train --from-labels` is to train on. Making a plan stores nothing.
+///
+/// A set of onboarding is not trained anew: it gets observers of the faults
+/// that labels name (TeachFrom). Episodes labelled false are left to
+/// `fdi-trainer limits`.
 struct LabelPlan {
   std::shared_ptr<const ModelSet> parent;
   storage::Lineage lineage;  ///< Of the parent.
@@ -39,9 +47,13 @@ struct LabelPlan {
   bool has_news{false};
 };
 
+/// Of an onboarded valve, the parent is the active version of its set,
+/// whichever of them diagnosed the episodes.
+///
 /// @throws ConfigError if the episodes are of several sets and no parent is
-///   given; NotFoundError if there is no labelled episode, no such run or set;
-///   DataError if the parent was not made by `fdi-trainer train`.
+///   given, or if runs are named for a set of onboarding; NotFoundError if
+///   there is no labelled episode, no such run or set; DataError if the valve
+///   was changed since it was onboarded.
 LabelPlan MakeLabelPlan(const LabelRequest& request,
                         const storage::DataDirectory& directory);
 
@@ -64,6 +76,21 @@ int StoreEvidence(LabelPlan& plan, const storage::DataDirectory& directory,
 /// The parent and every episode that the new set has learnt from, by itself or
 /// through its parent.
 storage::Lineage LineageOf(const LabelPlan& plan);
+
+/// The parent of `plan`, a set of onboarding, with the observers that its
+/// labels teach, and those that the labels before it have taught.
+struct Teaching {
+  ModelSet models;  ///< Not stored yet.
+  std::vector<TaughtObserver> taught;
+};
+/// @throws DataError naming the episodes, as Teach() and WithTaught().
+Teaching TeachFrom(const LabelPlan& plan,
+                   const storage::DataDirectory& directory);
+
+/// What `models` calls the episode, with what went before it: the last set of
+/// faults, empty for none.
+std::vector<int> NameIn(const std::shared_ptr<const ModelSet>& models,
+                        const LabelledEpisode& episode);
 
 /// Leaves in `runs` the signals that all of them have, as training demands;
 /// nothing changes if one that `parent` reads is missing somewhere, which

@@ -213,7 +213,7 @@ LabelledEpisode LabelReader::Read(const storage::Episode& episode) {
     // In this order: the strength can only be estimated from samples that suit
     // the engine of the parent.
     meaning.fault = FaultMeant(episode);
-    const EpisodeSamples all = LoadSamples(episode, SpanAround(episode));
+    EpisodeSamples all = LoadSamples(episode, SpanAround(episode));
     result.data = all.where;
     RequireSuited(all.run);
     meaning.strength =
@@ -221,6 +221,7 @@ LabelledEpisode LabelReader::Read(const storage::Episode& episode) {
     result.samples =
         TakeSamples(all.run, episode, {meaning.fault, meaning.strength});
     meaning.samples = static_cast<std::int64_t>(result.samples.size());
+    result.record = std::move(all.run);
   } catch (const Refusal& refusal) {
     result.refusal = refusal.what();
   }

@@ -28,6 +28,7 @@ struct LabelledEpisode {
   std::string refusal;  ///< Why nothing can be learnt from it, or empty.
   /// The samples to train on, each with the truth that the label implies.
   std::vector<LabelledSample> samples;
+  storage::StoredRun record;  ///< With what went before the episode.
 };
 
 /// Reads what labels teach a successor of `parent`:

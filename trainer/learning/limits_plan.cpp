@@ -23,9 +23,10 @@ namespace {
 
 // A fault acts on the residuals before an alarm tells of it.
 constexpr std::int64_t kBeforeEpisodeNs = 10 * kNsPerMinute;
-constexpr const char* kOnboarded = "onboard";
 // Under this key the lineage of a set that was made here tells from what.
 constexpr const char* kLimits = "limits";
+// Under this one that of a set that labels have taught.
+constexpr const char* kTaught = "taught";
 
 struct TimeSpan {
   std::int64_t from_ns{0};
@@ -55,7 +56,7 @@ std::shared_ptr<const ModelSet> OnboardedSet(const std::string& valve,
                         " has no model set: see fdi-trainer onboard");
   }
   auto models = std::make_shared<const ModelSet>(store.Load(*reference));
-  if (models->preset != kOnboarded) {
+  if (!IsOnboarded(*models)) {
     throw DataError("model set " + NameOf(*models) + " of valve " + valve +
                     " was not made by fdi-trainer onboard: see fdi-trainer "
                     "train --from-labels");
@@ -72,9 +73,9 @@ namespace {
 
 // Older sets have no settings, and an empty text is no JSON. Without exceptions
 // parse() then returns a value that contains nothing.
-bool HasLearnedLimits(const storage::Lineage& lineage) {
-  return nlohmann::json::parse(lineage.settings, nullptr, false)
-      .contains(kLimits);
+bool IsMadeFromAnother(const storage::Lineage& lineage) {
+  const auto settings = nlohmann::json::parse(lineage.settings, nullptr, false);
+  return settings.contains(kLimits) || settings.contains(kTaught);
 }
 
 }  // namespace
@@ -83,7 +84,7 @@ ModelSet FirstSet(const ModelSet& models, storage::ModelStore& store) {
   // Each set made here names its predecessor; the chain ends at onboarding.
   ModelSet first = models;
   storage::Lineage lineage = store.LineageOf({first.name, first.version});
-  while (HasLearnedLimits(lineage) && lineage.parent) {
+  while (IsMadeFromAnother(lineage) && lineage.parent) {
     const storage::ModelReference parent{lineage.parent->name,
                                          lineage.parent->version};
     first = store.Load(parent);
@@ -234,7 +235,7 @@ std::vector<storage::StoredRun> EvidenceOf(const LabelPlan& labels,
         std::ranges::any_of(labels.learnt, [&](const LabelledEpisode& now) {
           return now.meaning.episode_id == before.episode_id;
         });
-    if (!read_now && HasRun(labels.runs, before.run)) {
+    if (!read_now && before.fault == 0 && HasRun(labels.runs, before.run)) {
       evidence.push_back(storage::RunStore(runs).Load(before.run));
     }
   }
@@ -278,6 +279,10 @@ std::vector<std::string> RunsOfParent(
     const std::filesystem::path& file) {
   std::vector<std::string> runs = labels.parent->training_runs;
   for (const storage::TrainingEpisode& before : labels.lineage.episodes) {
+    // What labels have taught of faults is in the observers, which stay.
+    if (before.fault != 0) {
+      continue;
+    }
     const auto now = std::ranges::find(episodes, before.episode_id,
                                        &storage::Episode::episode_id);
     if ((now != episodes.end() && now->label != "false") ||

@@ -24,7 +24,7 @@ std::shared_ptr<const ModelSet> OnboardedSet(const std::string& valve,
                                              storage::ModelStore& store);
 
 /// The set of onboarding that `models` has its observers from: itself, unless
-/// its limits were set later (StoreLimits).
+/// its limits were set later (StoreLimits) or labels have taught it more.
 ModelSet FirstSet(const ModelSet& models, storage::ModelStore& store);
 
 /// Which healthy data the limits of a valve are to be set by.

@@ -1,6 +1,7 @@
 #include "trainer/onboarding/onboarding.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <memory>
 #include <thread>
@@ -231,6 +232,11 @@ TrainingOptions OnboardingPreset(SignalMask signals) {
       plan.own_past = {{{kCv, 0}, {kCv, 1}, {kX, 1}, {kX, 2}},
                        {{kCv, 0}, {kCv, 1}, {kCv, 2}, {kX, 1}, {kX, 2}}};
     }
+    if (plan.output == kF && (signals & MaskOf(kX)) == 0) {
+      // A flow that hardly follows the command is all that there is: many rules
+      // would learn its noise, and err where the command goes for once.
+      plan.rule_counts.insert(plan.rule_counts.begin(), {1, 2});
+    }
     for (std::vector<Regressor>& pool : plan.pools) {
       Restrict(signals, pool);
     }
@@ -332,6 +338,47 @@ Stretch LongestStretch(const std::vector<TrainingRun>& runs) {
   return longest;
 }
 
+// What cuts the record into pieces: missing readings, of which signal, or gaps.
+std::string Interruptions(const std::vector<TrainingRun>& runs) {
+  std::array<std::size_t, kSignalCount> lacks{};
+  std::size_t samples = 0;
+  SignalMask some = 0;
+  for (const TrainingRun& run : runs) {
+    for (const LabelledSample& labelled : run.samples) {
+      some = static_cast<SignalMask>(some | labelled.sample.present);
+    }
+  }
+  for (const TrainingRun& run : runs) {
+    samples += run.samples.size();
+    for (const LabelledSample& labelled : run.samples) {
+      for (std::size_t i = 0; i < kSignalCount; ++i) {
+        const auto signal = static_cast<Signal>(i);
+        lacks[i] += (some & kBasicSignals & MaskOf(signal)) != 0 &&
+                            !labelled.sample.Has(signal)
+                        ? 1U
+                        : 0U;
+      }
+    }
+  }
+  const auto worst = std::ranges::max_element(lacks);
+  if (*worst > 0) {
+    const std::string name(
+        SignalName(static_cast<Signal>(worst - lacks.begin())));
+    return ". Likeliest: " + name + " is missing in " + std::to_string(*worst) +
+           " of " + std::to_string(samples) +
+           " samples (no reading, or bad quality), which cuts the record. Take "
+           "a longer record, or a stretch without them with @from:to, or leave "
+           "the signal out with --signals";
+  }
+  return samples < kMinSamples
+             ? ". The whole record has " + std::to_string(samples) +
+                   ": export at least 25 minutes of normal operation"
+             : ". Likeliest: gaps cut the record, or samples with other "
+               "signals "
+               "than the first. Export one stretch of at least 25 minutes, or "
+               "fill short gaps with --resample 1s:linear";
+}
+
 void RequireHealthy(const std::vector<TrainingRun>& runs) {
   Require(!runs.empty(), "no run was given");
   for (const TrainingRun& run : runs) {
@@ -347,7 +394,7 @@ void RequireHealthy(const std::vector<TrainingRun>& runs) {
   if (longest < kMinSamples) {
     throw DataError("the runs have at most " + std::to_string(longest) +
                     " samples in a row, onboarding takes at least " +
-                    std::to_string(kMinSamples));
+                    std::to_string(kMinSamples) + Interruptions(runs));
   }
 }
 
@@ -489,10 +536,14 @@ std::vector<PhysicalValue> Physics(const ValveType& type,
       records));
 }
 
-// sqrt(E[y²] − E[y]²), the error of the mean as a model; for X, y is X − CV and
-// its mean counts as an error, because the model is X = CV. Rounding may take
-// the difference of a nearly constant reading below 0.
-double NaiveError(const std::vector<TrainingRun>& runs, Signal output) {
+// Of the readings of `output`, or of X − CV where that is what is compared.
+struct Moments {
+  double mean{0.0};
+  double square{0.0};
+};
+
+Moments MomentsOf(const std::vector<TrainingRun>& runs, Signal output,
+                  bool less_command) {
   double sum = 0.0;
   double squares = 0.0;
   double count = 0.0;
@@ -503,14 +554,34 @@ double NaiveError(const std::vector<TrainingRun>& runs, Signal output) {
         continue;
       }
       const double y =
-          sample[output] - (output == Signal::kX ? sample[Signal::kCv] : 0.0);
+          sample[output] - (less_command ? sample[Signal::kCv] : 0.0);
       sum += y;
       squares += y * y;
       count += 1.0;
     }
   }
-  const double mean = output == Signal::kX ? 0.0 : sum / count;
-  return std::sqrt(std::max(0.0, squares / count - mean * mean));
+  return {sum / count, squares / count};
+}
+
+// sqrt(E[y²] − E[y]²), the error of the mean as a model; for X, y is X − CV and
+// its mean counts as an error, because the model is X = CV. Rounding may take
+// the difference of a nearly constant reading below 0.
+double NaiveError(const std::vector<TrainingRun>& runs, Signal output) {
+  const bool is_x = output == Signal::kX;
+  const Moments y = MomentsOf(runs, output, is_x);
+  const double mean = is_x ? 0.0 : y.mean;
+  return std::sqrt(std::max(0.0, y.square - mean * mean));
+}
+
+// A change that lasts moves single residuals and their means alike.
+double SeenFrom(const ChannelSpec& channel) {
+  double up = channel.upper_threshold;
+  double down = -channel.lower_threshold;
+  for (const WindowLimits& window : channel.windows) {
+    up = std::min(up, window.upper_mean);
+    down = std::min(down, -window.lower_mean);
+  }
+  return std::max(up, down);
 }
 
 std::vector<ChannelFit> FitsOf(const ModelSet& models,
@@ -522,7 +593,9 @@ std::vector<ChannelFit> FitsOf(const ModelSet& models,
     fits.push_back({models.channels[c].name, models.channels[c].output,
                     channel.residual_sd, channel.validation.bias,
                     channel.validation.vaf,
-                    NaiveError(runs, models.channels[c].output)});
+                    NaiveError(runs, models.channels[c].output),
+                    SeenFrom(models.channels[c]),
+                    MomentsOf(runs, models.channels[c].output, false).mean});
   }
   return fits;
 }

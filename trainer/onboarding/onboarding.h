@@ -121,6 +121,9 @@ struct ChannelFit {
   double bias{0.0};        ///< Mean residual [unit of the output].
   double vaf{0.0};         ///< [%]
   double naive_rmse{0.0};  ///< [unit of the output]
+  double seen_from{0.0};   ///< The least lasting change, either way, that is
+                           ///< beyond a limit [unit of the output].
+  double mean{0.0};        ///< Of the output in the record [its unit].
 };
 
 struct Onboarding {

@@ -174,7 +174,9 @@ void CheckSense(const Readings& cv, const Readings& x, const Readings& f) {
   if (rises > kAgainst) {
     throw DataError("F rises while X closes (correlation " + Text(rises) +
                     "): CV and X must count in % of closing; if they count "
-                    "opening, map both with sense = \"opening\"");
+                    "opening, map both with sense = \"opening\". If they are "
+                    "mapped so, the record is not of a healthy valve: the line "
+                    "was shut, or the supply lost");
   }
 }
 

@@ -5,6 +5,7 @@
 #include "diagnosis/fault_catalogue.h"
 #include "diagnosis/quality_count.h"
 #include "simulator/second_look/episode_looks.h"
+#include "simulator/second_look/taught_names.h"
 #include "simulator/second_look/valve_physics.h"
 #include "trainer/campaign/run_input.h"
 #include "trainer/parallel_for.h"
@@ -34,24 +35,40 @@ class SecondLooks {
     if (OutOfOrder(verdict.intake)) {
       return;
     }
-    sets_.push_back(NamesAt(verdict.isolated));
+    Name name{NamesAt(verdict), {}};
+    if (name.faults) {
+      const bool stays = !names_.empty() && name.faults == names_.back().faults;
+      const bool by_look = looks_->Answer() != nullptr;
+      name.wording =
+          stays ? names_.back().wording
+                : WordingOf(models_, verdict, *name.faults,
+                            by_look ? Layer::kPhysics : Layer::kObservers);
+    }
+    names_.push_back(std::move(name));
   }
 
   void Apply(std::vector<Indication>& indications) const {
     for (std::size_t k = 0; k < indications.size(); ++k) {
-      if (sets_[k]) {
-        indications[k].isolated = *sets_[k];
-        indications[k].withdrawn = sets_[k]->empty();
+      if (names_[k].faults) {
+        indications[k].isolated = *names_[k].faults;
+        indications[k].withdrawn = names_[k].faults->empty();
+        indications[k].wording = names_[k].wording;
       }
     }
   }
 
  private:
+  // Instead of what the engine says, which stands where there are no faults.
+  struct Name {
+    std::optional<std::vector<int>> faults;
+    Wording wording;
+  };
+
   // Nothing if what the engine says stands.
-  std::optional<std::vector<int>> NamesAt(FaultSet isolated) const {
+  std::optional<std::vector<int>> NamesAt(const Verdict& verdict) const {
+    const FaultSet isolated = verdict.isolated;
     if (const simulator::LookAnswer* answer = looks_->Answer()) {
-      if (auto names = simulator::NamesOf(
-              *answer, simulator::ObserversName(models_, isolated))) {
+      if (auto names = simulator::NamesBeside(verdict, models_, *answer)) {
         // A finding that the set does not have, no name can hold.
         std::erase_if(*names, [this](int fault) {
           return IsFinding(fault) && FaultIndex(models_, fault) < 0;
@@ -67,7 +84,7 @@ class SecondLooks {
   const ModelSet& models_;
   simulator::ValvePhysics physics_;
   std::optional<simulator::ValveLooks> looks_;
-  std::vector<std::optional<std::vector<int>>> sets_;
+  std::vector<Name> names_;
 };
 
 Answer FollowEngine(const std::shared_ptr<const ModelSet>& models,
@@ -133,6 +150,10 @@ EvaluatedRun Evaluate(const Detector& detector, const ScoredRun& run,
   result.seconds = answer.seconds;
   for (const Indication& indication : answer.indications) {
     if (!indication.isolated.empty() || indication.withdrawn) {
+      if (indication.isolated.empty() ||
+          indication.isolated != result.last_set) {
+        result.last_wording = indication.wording;
+      }
       result.last_set = indication.isolated;
     }
   }

@@ -47,6 +47,13 @@ bool IsDetected(const EvaluatedRun& run) {
                                 : run.indices.episodes > 0;
 }
 
+const Wording* AnswerWording(const EvaluatedRun& run) {
+  if (!IsDetected(run) && Outcome(run).empty()) {
+    return nullptr;
+  }
+  return run.indices.fault != 0 ? &run.indices.wording : &run.last_wording;
+}
+
 const std::vector<int>& Outcome(const EvaluatedRun& run) {
   return run.indices.fault != 0 ? run.indices.final_set : run.last_set;
 }
@@ -77,6 +84,13 @@ EvaluationFigures FiguresOf(const std::vector<EvaluatedRun>& runs,
     if (!run.has_truth) {
       ++figures.without_truth;
       continue;
+    }
+    if (const Wording* wording = AnswerWording(run)) {
+      AnswerCount& count =
+          figures.by_certainty.at(static_cast<std::size_t>(wording->certainty));
+      ++count.answers;
+      count.right += run.indices.d_acc > 0.0 ||
+                     Contains(wording->look_alikes, run.indices.fault);
     }
     indices.push_back(run.indices);
     durations.push_back(run.duration_s);

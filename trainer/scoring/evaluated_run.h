@@ -16,6 +16,7 @@ struct EvaluatedRun {
   bool has_truth{true};
   double duration_s{0.0};     ///< Of its samples: gaps do not count.
   std::vector<int> last_set;  ///< Last set isolated in the whole run.
+  Wording last_wording;       ///< Of it.
   /// Seconds by quality; empty where a detector gives none.
   std::optional<std::array<double, kQualityCount>> seconds{};
 };
@@ -36,6 +37,10 @@ std::string FaultsText(const std::vector<int>& faults);
 /// DD at the horizon under a fault, an episode at all without one.
 bool IsDetected(const EvaluatedRun& run);
 
+/// The wording of the answer that the run ended with; nullptr if there was
+/// none.
+const Wording* AnswerWording(const EvaluatedRun& run);
+
 /// The set that a run ended with: under the fault, or at all without one.
 const std::vector<int>& Outcome(const EvaluatedRun& run);
 
@@ -43,6 +48,12 @@ const std::vector<int>& Outcome(const EvaluatedRun& run);
 /// the final set if that of the truth is among them, else 0; −1 without fault.
 double GroupAccuracy(const EvaluatedRun& run,
                      const std::vector<FaultGroup>& groups);
+
+/// Answers of one certainty.
+struct AnswerCount {
+  int answers{0};
+  int right{0};  ///< The set, or a look-alike beside it, is the fault.
+};
 
 /// Sums over the runs that have a truth.
 struct EvaluationFigures {
@@ -52,6 +63,7 @@ struct EvaluationFigures {
   double mean_d_acc_group{-1.0};  ///< Over detected runs.
   int wrong_isolations{0};        ///< Of all runs.
   int without_truth{0};
+  std::array<AnswerCount, 5> by_certainty{};  ///< By Certainty.
 };
 
 EvaluationFigures FiguresOf(const std::vector<EvaluatedRun>& runs,

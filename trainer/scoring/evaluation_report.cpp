@@ -65,6 +65,9 @@ Json RunJson(const EvaluatedRun& run) {
   for (const int fault : Outcome(run)) {
     json["final_set"].push_back(FaultName(fault));
   }
+  const Wording* wording = AnswerWording(run);
+  json["certainty"] =
+      wording == nullptr ? Json() : Json(CertaintyName(wording->certainty));
   json["t_exact"] = run.indices.t_exact;
   json["episodes"] = run.indices.episodes;
   json["wrong_isolations"] = run.indices.wrong_isolations;
@@ -84,6 +87,20 @@ Json HoursJson(const std::vector<EvaluatedRun>& runs) {
   for (std::size_t q = 0; q < kQualityCount; ++q) {
     if (hours[q] > 0.0) {
       json[std::string(QualityName(static_cast<Quality>(q)))] = hours[q];
+    }
+  }
+  return json;
+}
+
+// By certainty, the highest first: answers, and those that hold the fault.
+Json AnswersJson(const EvaluationFigures& figures) {
+  Json json = Json::array();
+  for (std::size_t c = figures.by_certainty.size(); c-- > 0;) {
+    const AnswerCount& count = figures.by_certainty[c];
+    if (count.answers > 0) {
+      json.push_back({{"certainty", CertaintyName(static_cast<Certainty>(c))},
+                      {"answers", count.answers},
+                      {"right", count.right}});
     }
   }
   return json;
@@ -147,6 +164,7 @@ Json SummaryJson(const Detector& detector,
                {"fault_free_runs", s.fault_free_runs},
                {"fault_free_hours", s.fault_free_hours},
                {"fault_free_episodes", s.fault_free_episodes},
+               {"answers", AnswersJson(figures)},
                {"hours_by_quality", HoursJson(runs)},
                {"runs_without_truth", figures.without_truth},
                {"confusion", ConfusionJson(BuildConfusion(runs))},
@@ -220,6 +238,11 @@ std::vector<report::Column> RunColumns() {
                      .key = "wrong_isolations",
                      .meaning = "times at which one wrong fault was named"});
   columns.push_back(
+      {.heading = "said to be",
+       .key = "certainty",
+       .meaning = "how certain the final set was called: sure, likely, one of, "
+                  "not known, not yet"});
+  columns.push_back(
       {.heading = "final set",
        .key = "final_set",
        .text = [](const Json& run) { return SetText(run["final_set"]); },
@@ -272,6 +295,16 @@ report::Report EvaluationReport(const Detector& detector,
   const Json summary = SummaryJson(detector, runs);
   report.document["summary"] = summary;
   report.Heading("summary").Fields("summary", SummaryFields());
+  if (!summary.at("answers").empty()) {
+    report.Heading("how right the answers are")
+        .Table(
+            "summary/answers",
+            {{.heading = "said to be", .key = "certainty"},
+             {.heading = "answers", .key = "answers", .align = Align::kRight},
+             {.heading = "hold the fault",
+              .key = "right",
+              .align = Align::kRight}});
+  }
   std::vector<report::Column> hours;
   for (const auto& [quality, value] : summary.at("hours_by_quality").items()) {
     hours.push_back({quality, quality});

@@ -130,10 +130,15 @@ std::vector<Indication> Rescore(const std::shared_ptr<const ModelSet>& models,
     }
     start_ns = all.empty() ? stored.sample.stamp_ns : start_ns;
     settled = settled || verdict.quality == Quality::kLive;
+    const std::vector<int> isolated = FaultsIn(*models, verdict.isolated);
+    const bool stays =
+        !all.empty() && !isolated.empty() && isolated == all.back().isolated;
     all.push_back(
         {static_cast<double>(stored.sample.stamp_ns - start_ns) * kSecondsPerNs,
-         TruthOf(stored), settled, verdict.detected,
-         FaultsIn(*models, verdict.isolated), IsWithdrawn(*models, verdict)});
+         TruthOf(stored), settled, verdict.detected, isolated,
+         IsWithdrawn(*models, verdict),
+         stays ? all.back().wording
+               : WordingOf(*models, verdict, isolated, Layer::kObservers)});
     BackdateDetections(verdict, start_ns, all);
   }
   return all;

@@ -98,8 +98,16 @@ TEST(PlayPredictionGainTest, IsLargeForAPlayAndSmallWithout) {
     with[k] = 0.7 * with[k - 1] + 0.3 * play[k - 1] + noise;
     without[k] = 0.7 * without[k - 1] + 0.3 * op[k - 1] + noise;
   }
-  EXPECT_GT(PlayPredictionGain(op, with), 50.0);
-  EXPECT_LT(PlayPredictionGain(op, without), 3.0);
+  PlayFit fit;
+  fit.band_low = 4.8;
+  fit.band_high = 5.2;
+  fit.step = 0.3;
+  EXPECT_GT(PlayPredictionGain(op, with, fit), 50.0);
+  EXPECT_LT(PlayPredictionGain(op, without, fit), 3.0);
+  // A play of another width is no witness.
+  fit.band_low = 14.0;
+  fit.band_high = 15.0;
+  EXPECT_LT(PlayPredictionGain(op, with, fit), 0.0);
 }
 
 TEST(IncrementFitTest, ExplainsAnIntegral) {

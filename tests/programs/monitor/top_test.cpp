@@ -192,6 +192,22 @@ TEST_F(TopTest, WhoHasNotSpokenForAWhileIsSilent) {
   EXPECT_EQ(board_.valves(), 3U);
 }
 
+// The last vector of each valve comes at once to who starts `top`.
+TEST_F(TopTest, WhatWasSentLongAgoIsSilentAndNotNormal) {
+  // The clock of the monitor is 5 s behind.
+  const idl::Reception late{0, 65 * kSecond, 1, 1};
+  const idl::Reception fresh{60 * kSecond, 65 * kSecond, 1, 1};
+  board_.Hear(late);
+  board_.Add(Decision("stale", State::kNormal, 0, {0.9, 0, 0}), now_, late);
+  board_.Hear(fresh);
+  board_.Add(Decision("fresh", State::kNormal, 0, {0.9, 0, 0}), now_, fresh);
+
+  EXPECT_EQ(Row("stale")["silent"], true);
+  EXPECT_EQ(Row("stale")["state"], "NOT_JUDGED");
+  EXPECT_EQ(Row("fresh")["silent"], false);
+  EXPECT_EQ(Row("fresh")["state"], "NORMAL");
+}
+
 TEST_F(TopTest, AMonitorThatIsGoneIsNotHeard) {
   EXPECT_EQ(board_.Health(now_), "");
   idl::MonitorStatusMessage status;

@@ -113,7 +113,7 @@ std::vector<BadTable> BadTables() {
        "a quote is not closed"},
       {"time goes back", Plant("2026-01-05 09:59:02;41,5;34,1;22,05"), kMap, 3,
        ":4: time goes back or stands still"},
-      {"time stands still", Plant("2026-01-05 10:00:01;41,5;34,1;22,05"), kMap,
+      {"time stands still", Plant("2026-01-05 10:00:01;41,6;34,1;22,05"), kMap,
        3, ":4: time goes back or stands still"},
       {"a gap",
        Contract("2,41,3500,2500,130,41,22") + "9,41,3500,2500,130,41,22\n", "",

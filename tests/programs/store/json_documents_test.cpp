@@ -463,11 +463,13 @@ TEST_F(JsonDocumentsTest, SimulatorAndTrainerAreOnThePage) {
   Printed(page, "limits", "--valve U --runs " + more, "fdi-trainer");
 
   EXPECT_THAT(page.complaints(), IsEmpty());
-  // A set that learnt from labels has episodes, one of the preset `extended`
-  // has windows; limits are compared here without an alarm, and no fault shows
-  // at another strength.
-  EXPECT_THAT(page.Unseen(called_, {"training_episode", "window", "false_alarm",
-                                    "fault_visibility"}),
+  // A set that learnt from labels has episodes, and taught observers where it
+  // was onboarded; one of the preset `extended` has windows; limits are
+  // compared here without an alarm, and no fault shows at another strength.
+  EXPECT_THAT(page.Unseen(called_,
+                          {"training_episode", "taught_name", "taught_observer",
+                           "trained_set.names", "trained_set.taught", "window",
+                           "false_alarm", "fault_visibility"}),
               IsEmpty());
 }
 

@@ -74,22 +74,27 @@ TEST_F(AppEvaluateTest, JsonHasTheKeysOfTheContractAndFindsTheFault) {
   for (const auto& [key, value] : run.items()) {
     keys.push_back(key);
   }
-  EXPECT_THAT(keys, UnorderedElementsAre(
-                        "run_id", "fault", "strength", "detected", "t_dt_first",
-                        "t_dt", "t_it_first", "t_it", "r_fd", "r_td", "r_fi",
-                        "r_ti", "r_mi", "fs_d", "fs_i", "d_acc", "final_set",
-                        "t_exact", "episodes", "wrong_isolations"));
+  EXPECT_THAT(
+      keys, UnorderedElementsAre("run_id", "fault", "strength", "detected",
+                                 "t_dt_first", "t_dt", "t_it_first", "t_it",
+                                 "r_fd", "r_td", "r_fi", "r_ti", "r_mi", "fs_d",
+                                 "fs_i", "d_acc", "final_set", "certainty",
+                                 "t_exact", "episodes", "wrong_isolations"));
   EXPECT_EQ(run["run_id"], id);
   EXPECT_EQ(run["fault"], "f19");
   EXPECT_EQ(run["strength"], 0.5);
   EXPECT_EQ(run["detected"], true);
   EXPECT_EQ(run["t_dt"], 0.0);  // Half the flow shows in the first sample.
   EXPECT_EQ(run["final_set"], json::array({"f19"}));
+  EXPECT_EQ(run["certainty"], "sure");
   EXPECT_EQ(result["runs"][1]["fault"], "normal");
+  EXPECT_TRUE(result["runs"][1]["certainty"].is_null());
   const json& summary = result["summary"];
   EXPECT_EQ(summary["faulty_runs"], 1);
   EXPECT_EQ(summary["exact"], 1);
   EXPECT_EQ(summary["fault_free_episodes"], 0);
+  EXPECT_EQ(summary["answers"],
+            json::parse(R"([{"certainty":"sure","answers":1,"right":1}])"));
   EXPECT_EQ(summary["confusion"]["f19"]["f19"], 1.0);
   EXPECT_EQ(summary["confusion"]["normal"]["no_alarm"], 1.0);
 }

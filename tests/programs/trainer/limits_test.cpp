@@ -15,6 +15,7 @@
 #include "base/error.h"
 #include "base/time_units.h"
 #include "storage/history/history_editor.h"
+#include "storage/history/history_reader.h"
 #include "storage/models/model_codec.h"
 #include "storage/models/models.h"
 #include "storage/runs/run_recorder.h"
@@ -188,6 +189,41 @@ TEST_F(AppLimitsTest, TheNewSetIsAssignedWithItsLineageAndBaseline) {
   EXPECT_EQ(shown["lineage"]["parent"]["version"], 1);
   EXPECT_EQ(shown["lineage"]["settings"]["limits"]["fitted"], true);
   EXPECT_THAT(Run("show LV1@2").out, HasSubstr("with limits from 2.16 h"));
+}
+
+// A labelled fault becomes an observer, which is in use once it is activated
+// and stays when limits are set by more hours.
+TEST_F(AppLimitsTest, WhatALabelTaughtOfAFaultStays) {
+  RecordAlarm("f6");
+  const std::string id =
+      storage::HistoryReader(History()).List({}).front().episode_id;
+  const std::string train = "train --from-labels --strength " + id + "=0.06";
+
+  const json set = RunJson(train);
+
+  EXPECT_EQ(set["version"], 2);
+  EXPECT_EQ(set["taught"][0]["observer"], "f6 0.06 taught");
+  EXPECT_GT(set["taught"][0]["gain_over_normal"].get<double>(), 100.0);
+  EXPECT_EQ(set["names"][0]["label"], "f6");
+  storage::ModelStore store(Models(), storage::Access::kOccasionalWriter);
+  EXPECT_EQ(store.AssignedModelSet("LV1")->version, 1);
+  store.Activate({"LV1", 2});
+  EXPECT_EQ(store.AssignedModelSet("LV1")->version, 2);
+  EXPECT_EQ(store.FindValve("LV1")->baseline(), storage::BaselineState::kValid);
+  EXPECT_THAT(Run(train).err, HasSubstr("nothing to learn"));
+
+  Record(PlantRun(kTwoHours + 600, 2, kMadeNs + kNsPerDay));
+  EXPECT_EQ(RunJson("limits --valve LV1")["version"], 3);
+
+  EXPECT_EQ(Load("LV1@3").observers.back().name, "f6 0.06 taught");
+  const json shown = RunJson("show LV1@3");
+  EXPECT_EQ(shown["lineage"]["episodes"][0]["fault"], "f6");
+  // Of another label, the set learns that instead.
+  storage::HistoryEditor(History()).Label(id, "f3",
+                                          {"kim", "", "test", kMadeNs + 1});
+  const json again = RunJson(train);
+  ASSERT_THAT(again["taught"], SizeIs(1));
+  EXPECT_EQ(again["taught"][0]["fault"], "f3");
 }
 
 // Nothing of the first day is forgotten when the second one is added.

@@ -1,37 +1,27 @@
 // What an operator does to alarms: acknowledge, shelve, label. Each is a dialog
-// that asks who and why; the token is asked for once a session. Who is logged in
-// is asked for neither.
+// that asks why; who it was is known from the login.
 
-import {path, post, token} from './api.js';
+import {path, post} from './api.js';
 import {button, field, h, replace, select, showDialog} from './dom.js';
 import {faultTitle, members} from './faults.js';
 import {fromInput} from './format.js';
-import {settings} from './settings.js';
 import {store} from './store.js';
 
 /** Whether the monitor takes actions at all. */
 export const canAct = () => store.status?.write === true;
-const canLabel = () => [null, 'engineer'].includes(store.status.role);
+const canLabel = () => store.status.role === 'engineer';
 
 /**
- * A dialog with who and comment; `send` gets both and may throw.
+ * A dialog with a comment, which `send` gets; it may throw.
  * @returns a promise of whether it was sent.
  */
 function ask({title, subject, fields, verb, commentNeeded, send}) {
-  const {user} = store.status;
-  const who = h('input', {'value': user ?? settings.get('who'),
-    'required': true, 'autocomplete': 'name', 'maxlength': 100});
   const comment = h('textarea', {rows: 2, maxlength: 1000,
     required: commentNeeded});
-  const secret = user || token.get() ? null :
-    h('input', {type: 'password', required: true, autocomplete: 'off'});
   const wrong = h('p', {class: 'wrong', role: 'alert', hidden: true});
   const submit = h('button', {class: 'primary'}, verb);
   const form = h('form', {method: 'dialog'}, h('p', {}, subject), fields,
-      user ? null : field('Your name', who),
-      field(commentNeeded ? 'Reason' : 'Comment', comment),
-      secret ? field('Token of the monitor (file of --console-write)',
-          secret) : null, wrong,
+      field(commentNeeded ? 'Reason' : 'Comment', comment), wrong,
       h('div', {class: 'buttons'},
           button('Cancel', () => dialog.close()), submit));
   const dialog = h('dialog', {}, h('h2', {}, title), form);
@@ -40,24 +30,19 @@ function ask({title, subject, fields, verb, commentNeeded, send}) {
     form.addEventListener('submit', async (event) => {
       event.preventDefault();
       submit.disabled = true;
-      if (secret) token.set(secret.value);
-      if (!user) settings.set('who', who.value);
       try {
-        await send({who: who.value, comment: comment.value});
+        await send({comment: comment.value});
         sent = true;
         dialog.close();
       } catch (error) {
-        if (error.status === 401) token.clear();
         wrong.hidden = false;
-        replace(wrong, error.status === 401 && !secret && !user ?
-          'The token is no longer valid: close this and try again.' :
-          error.message);
+        replace(wrong, error.message);
         submit.disabled = false;
       }
     });
     dialog.addEventListener('close', () => resolve(sent));
     showDialog(dialog);
-    (who.value ? comment : who).focus();
+    comment.focus();
   });
 }
 

@@ -3,7 +3,6 @@
 import {queryText} from './route.js';
 
 const kBase = 'api/v1';
-const kTokenKey = 'fdi.token';
 
 export class ApiError extends Error {
   constructor(status, message, retryAfterS = null) {
@@ -73,20 +72,11 @@ export async function getOptional(where, query) {
   }
 }
 
-export const token = {
-  get: () => sessionStorage.getItem(kTokenKey),
-  set: (text) => sessionStorage.setItem(kTokenKey, text),
-  clear: () => sessionStorage.removeItem(kTokenKey),
-};
-
 export async function post(where, body) {
   const response = await request(url(where), {
     method: 'POST',
-    headers: {
-      'Content-Type': 'application/json',
-      // Authorization belongs to a proxy with passwords of its own.
-      ...(token.get() && {'X-FDI-Token': token.get()}),
-    },
+    // Authorization belongs to a proxy with passwords of its own.
+    headers: {'Content-Type': 'application/json'},
     body: JSON.stringify(body),
   });
   return response.json();

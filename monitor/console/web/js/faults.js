@@ -27,10 +27,15 @@ export function faultTitle(fault) {
     `${name} (${fault})` : name;
 }
 
-/** "likely", "one of 3"; empty for what needs no word. */
-export function certaintyText({certainty, faults, fault}) {
-  const count = members(faults?.join('|') || fault).length;
-  return certainty === 'one of' ? `one of ${count}` : certainty ?? '';
+/**
+ * "likely", "one of 3", "one of 2, or bypass valve open"; empty for what needs
+ * no word.
+ */
+export function certaintyText({certainty, faults, fault, look_alikes}) {
+  if (certainty !== 'one of') return certainty ?? '';
+  const others = look_alikes ?? [];
+  const count = members(faults?.join('|') || fault).length + others.length;
+  return [`one of ${count}`, ...others.map((f) => `or ${nameOf(f)}`)].join(', ');
 }
 
 /** The same as an element that tells experts the number behind it. */

@@ -96,9 +96,15 @@ export function strengthText(value) {
 /** "12 % (10 % to 14 %)"; an interval without width is not known. */
 export function intervalText({value, lowest, highest}, text, unit = '',
     end = text) {
+  const range = rangeText(lowest, highest, end);
+  return text(value) + unit + (range && ` (${range})`);
+}
+
+/** "17 % to 20 %"; empty without a width that can be seen. */
+export function rangeText(lowest, highest, end) {
   const known = lowest !== null && lowest !== undefined && lowest < highest;
-  return text(value) + unit +
-      (known ? ` (${end(lowest)} to ${end(highest)})` : '');
+  const [from, to] = known ? [end(lowest), end(highest)] : ['', ''];
+  return from === to ? '' : `${from} to ${to}`;
 }
 
 /** Names with digits in the order a reader expects: FV-2 before FV-10. */

@@ -1,7 +1,7 @@
 // What the user has chosen; kept in the browser. Emits 'change'.
 
 const kDefaults = {
-  theme: 'auto', utc: false, density: 'comfortable', shortcuts: true, who: '',
+  theme: 'auto', utc: false, density: 'comfortable', shortcuts: true,
 };
 
 function read(name) {

@@ -89,7 +89,8 @@ export function createShell(top, banner) {
   const theme = button('', nextTheme, {title: 'Light or dark (key T)'});
   const utc = button('', () => settings.set('utc', !settings.get('utc')),
       {title: 'Local time or UTC (key U)'});
-  const help = button('Keys', showHelp, {title: 'Keys (key ?)'});
+  const help = button('Keys', showHelp, {class: 'help',
+    title: 'Keys (key ?)'});
   replace(top, h('span', {class: 'brand'}, 'Valves'),
       h('nav', {'aria-label': 'Views'}, links), summary,
       h('div', {class: 'tools'}, health, clock, user, leave, utc,
@@ -120,7 +121,8 @@ export function createShell(top, banner) {
   };
   const tick = () => {
     const now = store.nowMs();
-    setText(clock, `${dateText(now)} ${clockText(now)} ${zoneName()}`);
+    setText(clock, `${clockText(now)} ${zoneName()}`);
+    clock.title = dateText(now);
     const lost = bannerText();
     const text = lost || historyText();
     banner.hidden = text === '';

@@ -9,11 +9,11 @@ import {compareAlarms, faultTitle, groupOf, groups} from '../faults.js';
 import {timeText} from '../format.js';
 import {link, rememberQuery} from '../route.js';
 import {store} from '../store.js';
-import {bodyRow, columns, dataTable, headRow} from './table.js';
+import {bodyRow, columns, dataTable, faultAndCheck, headRow} from './table.js';
 import {oncePerFrame, View} from './view.js';
 
 const kColumns = [
-  columns.priority, columns.detected, columns.valve, columns.fault,
+  columns.priority, columns.detected, columns.valve, faultAndCheck,
   columns.group, columns.lasted, columns.certainty, columns.strength,
   columns.label, columns.discipline, columns.namur,
 ];
@@ -110,7 +110,7 @@ class Alarms extends View {
     setText(this.#readOnly, store.status?.plant ? 'Read-only: acknowledge, ' +
       'shelve and label on the page of the monitor, or with fdi-store.' :
       store.status?.user ? 'Read-only: your role is view.' :
-      'Read-only: the monitor was started without --console-write.');
+      'Read-only: the monitor was started without --console-users.');
     replace(this.#head, headRow([
       ...(canAct() ? [{text: h('span', {class: 'sr-only'}, 'Selected')}] : []),
       ...kColumns, ...(canAct() ? [{text: 'Actions'}] : [])]));

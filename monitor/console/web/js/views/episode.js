@@ -10,11 +10,12 @@ import {button, errorNote, factList, h, replace, setText} from '../dom.js';
 import {certaintyNode, faultTitle, groupName, layerText, markWord, members, namurText,
   priorityNames, priorityOf, prioritySign, stateWord, unconfirmedText}
   from '../faults.js';
-import {durationText, intervalText, percentText, wholePercent, zoneName}
+import {durationText, intervalText, percentText, rangeText, wholePercent,
+  zoneName}
   from '../format.js';
 import {link} from '../route.js';
 import {store} from '../store.js';
-import {dataTable, labelText, lastedText, timeCell, valveLink}
+import {dataTable, forText, labelText, lastedText, timeCell, valveLink}
   from './table.js';
 import {View} from './view.js';
 
@@ -46,7 +47,7 @@ function facts({episode: row, model_hash: hash}) {
     ['Strength', intervalText({...row, value: row.strength}, percentText, '',
         wholePercent)],
     ['At its worst', percentText(row.worst_strength)],
-    ['For', row.discipline ?? '–'],
+    ['For', forText(row.discipline)],
     ['NE 107', namurText(row.namur)],
     ['Label', labelText(row.label)],
     ['Acknowledged', row.acked_by ?
@@ -63,7 +64,8 @@ function eventText(event) {
     isolated ? faultTitle(event.faults) : null,
     isolated ? `strength ${percentText(event.strength)}` : null,
     isolated ? layerText(event.layer) : null,
-    event.value, event.reason && (kEndWords[event.reason] ?? event.reason),
+    event.kind === 'LABEL' ? labelText(event.value) : event.value,
+    event.reason && (kEndWords[event.reason] ?? event.reason),
     event.comment,
   ].filter(Boolean).join(', ');
 }
@@ -79,8 +81,8 @@ const kEventColumns = [
 const kLookColumns = [
   {text: 'Fault', header: true, cell: ({fault}) => faultTitle(fault)},
   {text: 'Strength', cell: ({strength}) => percentText(strength)},
-  {text: '95 % interval', cell: ({lowest, highest}) => lowest < highest ?
-    `${wholePercent(lowest)} to ${wholePercent(highest)}` : 'not known'},
+  {text: '95 % interval', cell: ({lowest, highest}) =>
+    rangeText(lowest, highest, wholePercent) || 'not known'},
   {text: 'Begins', cell: ({begins_ms: begins, growing}) =>
     h('span', {}, timeCell(begins), growing ? ', growing' : '')},
 ];
@@ -191,7 +193,7 @@ class EpisodePage extends View {
         found.growth.map(growthPart),
         this.#data.words ? h('p', {class: 'words'}, this.#data.words) : null,
         checks.map(({name, check}) => h('p', {class: 'checks'},
-            h('strong', {}, `Check for ${name}: `), check)),
+            h('strong', {}, `${name}: `), check)),
         this.#timeline ? this.#timeline.element :
           h('p', {class: 'note'}, 'There is no recording of this episode.'),
         found.look ? lookParts(found.look) : null,

@@ -8,7 +8,7 @@ import {rememberQuery} from '../route.js';
 import {settings} from '../settings.js';
 import {store} from '../store.js';
 import {dataTable, timeCell} from './table.js';
-import {rankOf, Tile} from './tile.js';
+import {rankOf, tailLength, Tile} from './tile.js';
 import {oncePerFrame, View} from './view.js';
 
 const kFrameBudgetMs = 4;
@@ -40,6 +40,7 @@ class Plant extends View {
   #inDocument = new Set();
   #dirty = new Set();
   #needsOrder = true;
+  #tail = 0;  // Letters of an id that are never cut.
   #color = cssColor('--ink-soft');
   #filter;
   #words;
@@ -117,7 +118,7 @@ class Plant extends View {
 
   #controls(text) {
     this.#search = h('input', {'type': 'search', 'value': text,
-      'placeholder': 'Search valve or fault', 'aria-label':
+      'placeholder': 'Search', 'aria-label':
       'Search valve or fault', 'title': 'Key /', 'oninput': () => {
         this.#setWords(this.#search.value);
         this.#refilter();
@@ -159,6 +160,8 @@ class Plant extends View {
     if (ids === null) this.#ranks.clear();
     if (ids === null || ids.some((id) => !this.#ranks.has(id))) {
       this.#ids = [...store.tiles.keys()].sort(compareNames);
+      this.#tail = tailLength(this.#ids);
+      for (const tile of this.#tiles.values()) tile.showId(this.#tail);
     }
     for (const id of ids ?? this.#ids) {
       const [group, priority] = rankOf(store.tiles.get(id));
@@ -298,6 +301,7 @@ class Plant extends View {
     let tile = this.#tiles.get(id);
     if (!tile) {
       tile = new Tile(id, this.#color);
+      tile.showId(this.#tail);
       this.#tiles.set(id, tile);
     }
     return tile;

@@ -5,7 +5,7 @@ import {get, url} from '../api.js';
 import {button, errorNote, h, replace} from '../dom.js';
 import {timeText} from '../format.js';
 import {link} from '../route.js';
-import {dataTable, timeCell, valveLink} from './table.js';
+import {dataTable, forText, timeCell, valveLink} from './table.js';
 import {View} from './view.js';
 
 const number = (value, digits) => Number(value).toFixed(digits);
@@ -35,11 +35,11 @@ const kFinding = [
 ];
 
 const kWorst = [...kFinding,
-  {text: 'What to do', class: 'remark', cell: (row) => row.check},
-  {text: 'For', cell: (row) => row.discipline},
-  {text: 'Acknowledged, labelled', cell: (row) =>
+  {text: 'What to do', class: 'remark check', cell: (row) => row.check},
+  {text: 'For', cell: (row) => forText(row.discipline)},
+  {text: 'Seen by, label', class: 'wider', cell: (row) =>
     `${row.acked_by ?? '–'}, ${row.label ?? '–'}`},
-  {text: 'Shares', cell: (row) => row.shares ?? '–'},
+  {text: 'Shares', class: 'wider', cell: (row) => row.shares ?? '–'},
 ];
 
 const kShared = [

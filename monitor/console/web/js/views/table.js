@@ -2,7 +2,7 @@
 
 import {h} from '../dom.js';
 import {certaintyNode, faultName, faultTitle, groupName, members, namurText, priorityOf,
-  priorityNames, prioritySign, unconfirmedText} from '../faults.js';
+  priorityNames, prioritySign, qualityText, unconfirmedText} from '../faults.js';
 import {durationText, percentText, strengthText, timeText} from '../format.js';
 import {link} from '../route.js';
 import {store} from '../store.js';
@@ -57,9 +57,14 @@ function faultCell(row) {
     h('span', {class: 'number'}, ` ${numbers}`) : null);
 }
 
-/** What to check, where there is no room for a column of it. */
-const narrowCheck = ({check}) => check ?
-  h('div', {class: 'narrow'}, `Check: ${check}`) : null;
+/** A fault and what to check. */
+export const faultAndCheck = {text: 'Fault', class: 'fault', cell: (row) => [
+  faultCell(row), row.check ? h('div', {class: 'to-check', title: row.check},
+      row.check) : null]};
+
+/** "mechanical or instrument" */
+export const forText = (discipline) =>
+  discipline?.split('|').join(' or ') ?? '–';
 
 /** How long it lasted, or lasts. */
 export function lastedText(row) {
@@ -81,7 +86,9 @@ function personText(row) {
     return `until ${timeText(until)} by ${who}` +
         (comment ? `: ${comment}` : '');
   }
-  return [unconfirmedText(row),
+  const tile = store.tiles.get(row.valve);
+  const silent = tile?.episode === row.episode && tile.quality !== 'LIVE';
+  return [unconfirmedText(row) || (silent && qualityText(tile)),
     row.acked_by && `${row.acked_by}, ${timeText(row.acked_ms)}`]
       .filter(Boolean).join('; ');
 }
@@ -98,8 +105,7 @@ export const columns = {
   detected: {text: 'Detected', cell: (row) => timeCell(row.detected_ms)},
   valve: {text: 'Valve', header: true, cell: (row) =>
     valveCell(row.valve, row)},
-  fault: {text: 'Fault', class: 'fault', cell: (row) =>
-    [faultCell(row), narrowCheck(row)]},
+  fault: {text: 'Fault', class: 'fault', cell: faultCell},
   group: {text: 'State', class: 'remark', cell: (row) => [
     groupName(row), h('div', {class: 'number'}, personText(row))]},
   lasted: {text: 'Lasted', class: 'num', cell: lastedText},
@@ -107,8 +113,8 @@ export const columns = {
     certaintyNode(row, '')},
   strength: {text: 'Strength', cell: (row) =>
     h('span', {title: percentText(row.strength)}, strengthText(row.strength))},
-  discipline: {text: 'For', class: 'wider', cell: (row) =>
-    row.discipline ?? '–'},
+  discipline: {text: 'For', class: 'wider', cell: ({discipline}) =>
+    forText(discipline)},
   namur: {text: 'NE 107', class: 'wider', cell: (row) => namurText(row.namur)},
   label: {text: 'Label', class: 'wide', cell: (row) => labelText(row.label)},
 };

@@ -1,17 +1,25 @@
 // One valve of the plant view.
 
 import {drawSparkline} from '../charts/sparkline.js';
-import {h, setText} from '../dom.js';
+import {h, replace, setText} from '../dom.js';
 import {certaintyText, factorTitle, faultName, faultOfTile, faultTitle,
-  inAlarm, isAlarm, priorityNames, priorityOf, prioritySign, qualityText,
+  inAlarm, isAlarm, members, priorityNames, priorityOf, prioritySign, qualityText,
   stateWord, unconfirmedText} from '../faults.js';
 import {clockText, percentText, strengthText, timeText} from '../format.js';
 import {link} from '../route.js';
 import {store} from '../store.js';
 import {labelText} from './table.js';
 
-const kIdTail = 6;
+const kIdTail = [6, 12];
 const kDeviation = 0.3;  // Of 1 - d_0.
+
+/** How many letters at the ends of `ids` tell them apart, within limits. */
+export function tailLength(ids) {
+  let [length] = kIdTail;
+  while (length < kIdTail[1] &&
+      new Set(ids.map((id) => id.slice(-length))).size < ids.length) ++length;
+  return length;
+}
 
 /** How bad it is: [class, priority]; smaller is worse. */
 export function rankOf(tile) {
@@ -45,6 +53,7 @@ export class Tile {
   #position = 0;
   #count = 0;
   #sign = '';
+  #tail = 0;
   #signBox = h('span', {class: 'sign-box'});
   #id = h('span', {class: 'tile-id'});
   #what = h('span', {class: 'tile-what'});
@@ -62,11 +71,18 @@ export class Tile {
   constructor(id, color) {
     this.color = color;
     this.id = id;
-    // Cut in the middle: ids of a plant differ at their ends.
-    this.#id.append(h('span', {class: 'id-head'}, id.slice(0, -kIdTail)),
-        h('span', {}, id.slice(-kIdTail)));
+    this.showId(kIdTail[0]);
     this.#id.title = id;
     this.#link.href = link('valve', id);
+  }
+
+  /** Cut in the middle if need be: its last `tail` letters stay. */
+  showId(tail) {
+    if (tail === this.#tail) return;
+    this.#tail = tail;
+    replace(this.#id,
+        h('span', {class: 'id-head'}, this.id.slice(0, -tail)),
+        h('span', {}, this.id.slice(-tail)));
   }
 
   update(tile) {
@@ -83,7 +99,8 @@ export class Tile {
     this.element.className = 'tile' + (alarm ? ` alarm p${priority}` : '') +
         ` rank${rank}` + (tile.quality !== 'LIVE' ||
         tile.state === 'PARTLY_JUDGED' ? ' not-live' : '');
-    this.#showSign(alarm ? priority : 0, tile.state === 'ISOLATED');
+    this.#showSign(alarm ? priority : 0, tile.state === 'ISOLATED' ||
+        members(faultOfTile(tile)).length > 0);
     setText(this.#what, what);
     setText(this.#certainty, alarm ? certaintyText(tile) : '');
     setText(this.#how, alarm ? howText(tile) : '');

@@ -5,7 +5,7 @@ import {Timeline} from '../charts/timeline.js';
 import {TrendData} from '../charts/trend_data.js';
 import {button, h, replace, setText} from '../dom.js';
 import {certaintyNode, factorTitle, faultName, faultOfTile, faultTitle, inAlarm,
-  openText, priorityNames, priorityOf, prioritySign, qualityText,
+  members, openText, priorityNames, priorityOf, prioritySign, qualityText,
   stateWord} from '../faults.js';
 import {durationText, numberText, percentText, strengthText,
   timeText, unitText} from '../format.js';
@@ -59,9 +59,20 @@ function judged({residual, low, high}) {
   return residual > high ? 'above' : residual < low ? 'below' : 'within';
 }
 
+const kServices = {F: 'flow', P: 'pressure', L: 'level', T: 'temperature',
+  A: 'analysis'};
+
+/** "Level, globe DN100, grade 1, group north. "; empty if nothing is known. */
+function serviceText({service, type, grade, group}) {
+  const words = [kServices[service] ?? service, type,
+    grade && `grade ${grade}`, group && `group ${group}`]
+      .filter(Boolean).join(', ');
+  return words && `Service: ${words}. `;
+}
+
 const kResidualColumns = [
-  {text: 'Channel', header: true, cell: ({name, unit}) =>
-    unit ? `${name} [${unitText(unit)}]` : name},
+  {text: 'Channel', header: true, cell: ({name, unit, over}) =>
+    (unit ? `${name} [${unitText(unit)}]` : name) + (over ?? '')},
   {text: 'Residual', class: 'num', cell: (row) => numberText(row.residual)},
   {text: 'Thresholds', class: 'num', cell: ({low, high}) =>
     `${numberText(low)} … ${numberText(high)}`},
@@ -74,13 +85,13 @@ const kFitColumns = [
 ];
 
 // What this valve is judged by, and what that cannot see.
-function scopeText({model_set: set, missing}) {
+function scopeText({model_set: set, missing}, about) {
   const models = set && store.modelSet(set);
-  if (!models) return '';
+  if (!models) return serviceText(about);
   const unseen = [...store.faults.values()].filter(({fault, label}) =>
     label && !models.faults.includes(fault)).map(({name}) => name);
   const normal = (models.undetectable ?? []).map(faultName);
-  return `Judged by model set ${set}` +
+  return serviceText(about) + `Judged by model set ${set}` +
       (missing?.length ? `, without ${missing.join(', ')}` : '') +
       (unseen.length === 0 ? ', which knows every fault.' :
         `. Faults that it cannot name: ${unseen.join('; ')}.`) +
@@ -108,10 +119,16 @@ function explanations({faults, T}, state, d0, d) {
 
 /** Residuals against their thresholds, and what explains them. */
 function nowTables(data) {
-  const {channels, faults} = data.meta;
+  const {channels, faults, windows} = data.meta;
   const last = (name) => data.columns[name].at(-1);
-  const residuals =
-    channels.map((channel, c) => ({...channel, residual: last(`r${c}`)}));
+  // Behind a channel its windows that are beyond their limits: they raise the
+  // alarms of slow and small faults.
+  const residuals = channels.flatMap((channel, c) => [
+    {...channel, residual: last(`r${c}`)},
+    ...(windows ?? []).filter((window) => window.channel === channel.name)
+        .map(({samples, of, value, low, high}) => ({...channel,
+          over: `, ${of} over ${samples} samples`, residual: value, low,
+          high}))]);
   return [
     dataTable('Residuals now', kResidualColumns, residuals, {attributesOf:
       (row) => ({class:
@@ -138,6 +155,7 @@ class ValvePage extends View {
   #loading = true;
   #retry = 0;
   #news = '';
+  #about = {};
 
   #timeline;
   #shownState = '';
@@ -171,6 +189,7 @@ class ValvePage extends View {
       health.destroy();
     });
     this.#listen();
+    this.#loadAbout();
     this.#load(false);
   }
 
@@ -203,10 +222,20 @@ class ValvePage extends View {
           {seconds: 1});
       if (trend && !this.gone) {
         this.#data.words = trend.words ?? '';
-        setText(this.#words, this.#data.words);
+        this.#data.meta.windows = trend.windows;
+        this.#showNow();
       }
     } catch {
       // Asked again soon.
+    }
+  }
+
+  async #loadAbout() {
+    try {
+      this.#about = await getOptional(path('valves', this.id, 'about')) ?? {};
+      if (!this.gone) this.#showState();
+    } catch {
+      // What is known without it is shown.
     }
   }
 
@@ -294,20 +323,22 @@ class ValvePage extends View {
   #showState() {
     const tile = store.tiles.get(this.id);
     replace(this.#state, stateLine(tile));
-    setText(this.#scope, tile ? scopeText(tile) : '');
+    setText(this.#scope, tile ? scopeText(tile, this.#about) : '');
     const row = tile?.episode ? store.alarms.get(tile.episode) : null;
-    const key = JSON.stringify([row, tile?.faults, store.status?.write]);
+    const key = JSON.stringify([row, tile?.faults, tile?.fault,
+      store.status?.write]);
     if (key === this.#shownState) return;
     this.#shownState = key;
     // Work can be planned on a healthy valve, too.
     replace(this.#actions, row ? actionButtons(row) :
       canAct() && button('Shelve', () => shelve({valve: this.id}),
           {'aria-label': `Shelve ${this.id}`}));
-    const checks = (tile?.faults ?? [])
+    // Also while the valve is not judged: the alarm stands.
+    const checks = (tile ? members(faultOfTile(tile)) : [])
         .map((fault) => store.faults.get(fault)).filter((f) => f?.check);
     this.#checks.hidden = checks.length === 0;
     replace(this.#checks, checks.map(({fault, check}) => [
-      h('strong', {}, `Check for ${faultName(fault)}: `), check, ' ']));
+      h('strong', {}, `${faultName(fault)}: `), check, ' ']));
   }
 }
 

@@ -4,7 +4,7 @@ import {get, url} from '../api.js';
 import {button, errorNote, h, replace} from '../dom.js';
 import {faultTitle} from '../faults.js';
 import {link} from '../route.js';
-import {columns, dataTable, valveCell} from './table.js';
+import {columns, dataTable, forText, valveCell} from './table.js';
 import {View} from './view.js';
 
 const kColumns = [
@@ -16,8 +16,8 @@ const kColumns = [
   {text: 'Probable fault', cell: (row) => !row.fault ? row.name ?? '–' :
     row.episode_id ? h('a', {href: link('episode', row.episode_id)},
         faultTitle(row.fault)) : faultTitle(row.fault)},
-  {text: 'For', cell: (row) => row.discipline ?? '–'},
-  {text: 'What to check', class: 'remark', cell: (row) =>
+  {text: 'For', cell: (row) => forText(row.discipline)},
+  {text: 'What to check', class: 'remark check', cell: (row) =>
     row.check ?? '–'},
 ];
 

@@ -1,0 +1,15 @@
+#pragma once
+
+#include <cstddef>
+
+namespace fdi {
+
+/// Checks that the process may start so many more threads and map so many more
+/// bytes [B] at once, by doing it; all of it is given back. For what is in the
+/// hands of a library that ends the process when either fails half-way. Takes
+/// some milliseconds.
+/// @throws PassingError naming both figures, the reason and the limits to look
+///   at.
+void RequireHeadroom(int threads, std::size_t bytes);
+
+}  // namespace fdi

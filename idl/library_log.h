@@ -1,0 +1,13 @@
+#pragma once
+
+#include <cstdint>
+
+namespace fdi::idl {
+
+/// Number of participants, writers and readers, as seen by all participants of
+/// this process, that have a key of our authority without the right to be on
+/// this domain or to use their topic or partition. They are refused and logged
+/// (permission_refused).
+std::uint64_t RefusedPermissions();
+
+}  // namespace fdi::idl

@@ -1,0 +1,73 @@
+#include "base/headroom.h"
+
+#include <cstdio>
+#include <cstdlib>
+#include <iostream>
+
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+
+#include "base/passing_error.h"
+
+namespace fdi {
+namespace {
+
+constexpr std::size_t kMegabyte = 1U << 20U;
+
+// In a process of its own with so much address space beyond what it has: ends
+// with 0 if there is room, again and again, or says why not and ends with
+// kExitPassing.
+[[noreturn]] void TryWith(std::size_t megabytes, int threads,
+                          std::size_t bytes) {
+  std::size_t pages = 0;
+  if (std::FILE* const statm = std::fopen("/proc/self/statm", "r")) {
+    static_cast<void>(std::fscanf(statm, "%zu", &pages));
+    std::fclose(statm);
+  }
+  const rlim_t limit = pages * 4096 + megabytes * kMegabyte;
+  const rlimit limits{limit, limit};
+  setrlimit(RLIMIT_AS, &limits);
+  try {
+    for (int i = 0; i < 5; ++i) {
+      RequireHeadroom(threads, bytes);
+    }
+  } catch (const PassingError& error) {
+    std::cerr << error.what() << '\n';
+    std::_Exit(kExitPassing);
+  }
+  std::_Exit(0);
+}
+
+// A sanitizer ends the process itself where it gets no memory.
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+constexpr bool kSanitized = true;
+#elif defined(__has_feature)
+constexpr bool kSanitized = __has_feature(address_sanitizer);
+#else
+constexpr bool kSanitized = false;
+#endif
+
+TEST(HeadroomTest, ThreadsAndMemoryOfAnUnlimitedProcessAreThere) {
+  EXPECT_NO_THROW(RequireHeadroom(64, 64 * kMegabyte));
+}
+
+TEST(HeadroomTest, WithoutAddressSpaceTheFiguresAndLimitsAreNamed) {
+  if (kSanitized) {
+    GTEST_SKIP() << "under a sanitizer";
+  }
+  EXPECT_EXIT(TryWith(64, 64, kMegabyte), testing::ExitedWithCode(kExitPassing),
+              "no room for 64 threads and 1 MB of memory .*: see ulimit");
+  EXPECT_EXIT(TryWith(64, 1, 100 * kMegabyte),
+              testing::ExitedWithCode(kExitPassing),
+              "no room for 1 threads and 100 MB of memory");
+}
+
+TEST(HeadroomTest, WhatWasTriedIsGivenBack) {
+  if (kSanitized) {
+    GTEST_SKIP() << "under a sanitizer";
+  }
+  EXPECT_EXIT(TryWith(64, 1, 40 * kMegabyte), testing::ExitedWithCode(0), "");
+}
+
+}  // namespace
+}  // namespace fdi
