@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "diagnosis/fault_catalogue.h"
+#include "diagnosis/taught.h"
 
 namespace fdi {
 namespace {
@@ -194,6 +195,7 @@ Episode::Episode(std::shared_ptr<const FaultPlan> plan)
       floor_names_(FindingsOf(*models_)),
       faults_(std::move(plan)),
       isolation_(models_->decision, models_->faults.size()),
+      is_taught_(std::ranges::any_of(models_->observers, IsTaught)),
       recognition_(models_->decision, models_->faults.size()),
       clearing_(*models_),
       misfit_counts_(models_->faults.size()) {}
@@ -395,6 +397,9 @@ void Episode::Name(FaultSet faults, Verdict& verdict) {
 // explanation as any, in nearly all of t_k samples; once it is recognised, it
 // stays so until the evidence refutes it.
 void Episode::Recognise() {
+  if (!is_taught_) {
+    return;
+  }
   const DecisionParameters& decision = models_->decision;
   recognition_.Push(faults_.Recognised(decision.evidence_core, true));
   recognised_ =

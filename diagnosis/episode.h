@@ -174,7 +174,8 @@ class Episode {
   FaultSet floor_names_;  // bits of the findings
   FaultBank faults_;
   IsolationWindow isolation_;
-  IsolationWindow recognition_;  // of what labels have taught
+  bool is_taught_;               // labels have taught the set faults
+  IsolationWindow recognition_;  // of these
   FaultSet recognised_{0};
   ClearingWindow clearing_;
   bool isolation_held_{false};

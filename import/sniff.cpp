@@ -884,7 +884,7 @@ void SignalGuess::KeepFirst(Signal signal) {
     return !IsSwitch(*column) &&
            !(signal == Signal::kF && IsController(column->name));
   };
-  // Clang 14 knows no std::ranges::stable_partition of GCC's library.
+  // Not that of std::ranges, which Clang 14 does not compile.
   std::stable_partition(columns.begin(), columns.end(), comes_first);
   const auto sure = [&](SniffedColumn* column) {
     return std::ranges::find(sure_, column) != sure_.end();

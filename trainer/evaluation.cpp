@@ -158,6 +158,22 @@ Wording WordingOf(const ModelSet& models, const Verdict& verdict,
   return wording;
 }
 
+Indication IndicationOf(const ModelSet& models, const Verdict& verdict,
+                        const Indication* before) {
+  Indication now;
+  now.settled = (before != nullptr && before->settled) ||
+                verdict.quality == Quality::kLive;
+  now.detected = verdict.detected;
+  now.isolated = FaultsIn(models, verdict.isolated);
+  now.withdrawn = IsWithdrawn(models, verdict);
+  const bool stays = before != nullptr && !now.isolated.empty() &&
+                     now.isolated == before->isolated;
+  now.wording =
+      stays ? before->wording
+            : WordingOf(models, verdict, now.isolated, Layer::kObservers);
+  return now;
+}
+
 RunIndices ComputeIndices(const std::vector<Indication>& all,
                           double horizon_s) {
   RunIndices result;
@@ -215,14 +231,13 @@ std::vector<Indication> ScoreRun(const std::shared_ptr<const ModelSet>& models,
   ValveEngine engine(models);
   std::vector<Indication> all;
   all.reserve(run.samples.size());
-  bool settled = false;
   for (const LabelledSample& labelled : run.samples) {
     const Verdict& verdict = engine.Step(labelled.sample);
     if (sink) {
       sink(labelled.sample, verdict);
     }
-    settled = settled || verdict.quality == Quality::kLive;
-    Indication indication;
+    Indication indication =
+        IndicationOf(*models, verdict, all.empty() ? nullptr : &all.back());
     indication.time_s =
         static_cast<double>(labelled.sample.stamp_ns -
                             run.samples.front().sample.stamp_ns) *
@@ -232,15 +247,6 @@ std::vector<Indication> ScoreRun(const std::shared_ptr<const ModelSet>& models,
     if (indication.truth.strength == 0.0) {
       indication.truth.fault = 0;
     }
-    indication.settled = settled;
-    indication.detected = verdict.detected;
-    indication.isolated = FaultsIn(*models, verdict.isolated);
-    indication.withdrawn = IsWithdrawn(*models, verdict);
-    indication.wording = !all.empty() && !indication.isolated.empty() &&
-                                 indication.isolated == all.back().isolated
-                             ? all.back().wording
-                             : WordingOf(*models, verdict, indication.isolated,
-                                         Layer::kObservers);
     all.push_back(std::move(indication));
     // A detection takes several abnormal samples and carries the stamp of the
     // first. The samples since then are already stored, hence the way back.

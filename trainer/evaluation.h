@@ -73,6 +73,11 @@ bool IsWithdrawn(const ModelSet& models, const Verdict& verdict);
 /// scored, but for a loss of flow that stands beside a fault as another answer.
 std::vector<int> FaultsIn(const ModelSet& models, FaultSet set);
 
+/// What `verdict` indicates; without time and truth.
+/// @param before at the sample before; null: there is none.
+Indication IndicationOf(const ModelSet& models, const Verdict& verdict,
+                        const Indication* before);
+
 /// The wording of the name `faults` that an episode has, as the monitor's.
 ///
 /// @param layer what gave the name.

@@ -436,7 +436,8 @@ Json Optional(bool known, double value) {
 Json JudgedJson(const Judged& one) {
   const loop::Evidence& e = one.audit.evidence;
   const loop::PlayFit fit = e.fit.value_or(loop::PlayFit{});
-  const auto band = e.band();
+  const bool has_band = e.band().has_value();
+  const loop::Band band = e.band().value_or(loop::Band{});
   const loop::Oscillation wave = e.oscillation.value_or(loop::Oscillation{});
   const double period_s = one.window.period_s;
   const bool is_stiction = one.audit.verdict == Verdict::kStiction;
@@ -457,12 +458,9 @@ Json JudgedJson(const Judged& one) {
       {"hint", one.hint.empty() ? Json(nullptr) : Json(one.hint)},
       {"read_off", one.window.x.empty() ? "PV" : "X"},
       {"integrates", e.integrates},
-      {"band_pct",
-       Optional(band.has_value(), band.value_or(loop::Band{}).width)},
-      {"band_low_pct",
-       Optional(band.has_value(), band.value_or(loop::Band{}).low)},
-      {"band_high_pct",
-       Optional(band.has_value(), band.value_or(loop::Band{}).high)},
+      {"band_pct", Optional(has_band, band.width)},
+      {"band_low_pct", Optional(has_band, band.low)},
+      {"band_high_pct", Optional(has_band, band.high)},
       {"period_s", Optional(e.oscillation.has_value(), wave.period * period_s)},
       {"regularity", Optional(e.oscillation.has_value(), wave.regularity)},
       {"shape", Optional(e.oscillation.has_value(), wave.shape)},

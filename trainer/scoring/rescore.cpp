@@ -99,7 +99,6 @@ std::vector<Indication> Rescore(const std::shared_ptr<const ModelSet>& models,
   InitialisationWatch watch(run.info.run.period_s);
   std::vector<Indication> all;
   all.reserve(run.samples.size());
-  bool settled = false;
   std::int64_t start_ns = 0;
   for (const storage::StoredSample& stored : run.samples) {
     // Samples of a source that had been superseded never reached the live
@@ -129,16 +128,12 @@ std::vector<Indication> Rescore(const std::shared_ptr<const ModelSet>& models,
       continue;
     }
     start_ns = all.empty() ? stored.sample.stamp_ns : start_ns;
-    settled = settled || verdict.quality == Quality::kLive;
-    const std::vector<int> isolated = FaultsIn(*models, verdict.isolated);
-    const bool stays =
-        !all.empty() && !isolated.empty() && isolated == all.back().isolated;
-    all.push_back(
-        {static_cast<double>(stored.sample.stamp_ns - start_ns) * kSecondsPerNs,
-         TruthOf(stored), settled, verdict.detected, isolated,
-         IsWithdrawn(*models, verdict),
-         stays ? all.back().wording
-               : WordingOf(*models, verdict, isolated, Layer::kObservers)});
+    Indication indication =
+        IndicationOf(*models, verdict, all.empty() ? nullptr : &all.back());
+    indication.time_s =
+        static_cast<double>(stored.sample.stamp_ns - start_ns) * kSecondsPerNs;
+    indication.truth = TruthOf(stored);
+    all.push_back(std::move(indication));
     BackdateDetections(verdict, start_ns, all);
   }
   return all;
