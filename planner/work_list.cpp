@@ -33,11 +33,15 @@ void SortByWeight(std::vector<Reason>& reasons, const WorkOptions& options) {
   });
 }
 
-// "40 min", "5 h", "3 days"
+// "less than a minute", "40 min", "5 h", "3 days"
 std::string SpanText(std::int64_t span_ns) {
   const double hours = std::max(0.0, static_cast<double>(span_ns)) / kNsPerHour;
+  const std::int64_t minutes = std::lround(hours * 60.0);
+  if (minutes == 0) {
+    return "less than a minute";
+  }
   if (hours < 1.0) {
-    return std::to_string(std::lround(hours * 60.0)) + " min";
+    return std::to_string(minutes) + " min";
   }
   if (hours < 2.0 * 24.0) {
     return std::to_string(std::lround(hours)) + " h";

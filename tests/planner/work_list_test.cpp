@@ -180,6 +180,10 @@ TEST_F(ReadWorkTest, WhereOnlyTheDataEndedTheFaultStands) {
   EXPECT_FALSE(rows[0].work.faults[0].ended_ns);
   EXPECT_THAT(rows[0].why,
               HasSubstr("stands for 24 h, not confirmed for 24 h"));
+  query_.options.now_ns = kDetected + 80 * kSecond;
+  EXPECT_THAT(
+      Read()[0].why,
+      HasSubstr("stands for 1 min, not confirmed for less than a minute"));
 }
 
 TEST_F(ReadWorkTest, ALabelSaysWhatItReallyWas) {
