@@ -243,11 +243,11 @@ std::vector<std::string> LimitsOfRecord(const Onboarding& onboarding) {
         "no position (X): faults of the rod, the trim, the flow meter and the "
         "pressures are seen in F alone, which tells few of them apart; play, "
         "friction and the position transmitter are not told at all");
-    lines.push_back("nothing that changes F by less than " +
+    lines.push_back("a change of F by less than " +
                     LeastFlowChange(onboarding) +
-                    " % of its mean is beyond the limits: this record of the "
-                    "healthy valve shows no less. More hours, or P1 and P2, "
-                    "make them narrower");
+                    " % of its mean is within the limits: the healthy record "
+                    "varies by as much. More hours, or P1 and P2, make them "
+                    "narrower");
   }
   if (has(Signal::kF) && !(has(Signal::kP1) && has(Signal::kP2))) {
     lines.push_back(
@@ -292,7 +292,8 @@ report::Report ReportOf(const Onboarding& onboarding,
                 {.heading = "seen from", .key = "seen_from", .decimals = 3}});
   report.Line(
       "normal observer on data it was not fitted to; naive: X = CV, else the "
-      "mean; a lasting change is beyond the limits from \"seen from\" on\n");
+      "mean; seen from: the smallest lasting change that is beyond the "
+      "limits\n");
   report.Line("model set " + NameOf(models) + ", hash " +
               storage::HashHex(models.content_hash) + ", " +
               std::to_string(models.observers.size()) + " observers");
