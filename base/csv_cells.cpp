@@ -3,18 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
-#include <cerrno>
 #include <charconv>
 #include <cmath>
 #include <cstdlib>
-#include <cstring>
 #include <map>
-#include <memory>
 #include <ostream>
 #include <utility>
-
-#include <unistd.h>
-#include <zlib.h>
 
 #include "base/error.h"
 #include "base/text.h"
@@ -22,79 +16,11 @@
 namespace fdi {
 namespace {
 
-constexpr std::size_t kUnpackedAlways = 4U << 20U;
-constexpr std::size_t kUnpackedAtMost = 200U << 20U;
 constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
 
 // The CR of a CRLF counts as a blank.
 bool IsBlank(char c) {
   return c == ' ' || c == '\t' || c == '\r';
-}
-
-void AppendUtf8(char32_t code, std::string& out) {
-  const auto tail = [&](int shift) {
-    out += static_cast<char>(0x80U | ((code >> shift) & 0x3FU));
-  };
-  if (code < 0x80) {
-    out += static_cast<char>(code);
-  } else if (code < 0x800) {
-    out += static_cast<char>(0xC0U | (code >> 6U));
-    tail(0);
-  } else if (code < 0x10000) {
-    out += static_cast<char>(0xE0U | (code >> 12U));
-    tail(6);
-    tail(0);
-  } else {
-    out += static_cast<char>(0xF0U | (code >> 18U));
-    tail(12);
-    tail(6);
-    tail(0);
-  }
-}
-
-// A code point above U+FFFF less 0x10000 has twenty bits: a pair of units,
-// 0xD800 plus the upper and 0xDC00 plus the lower ten. A byte order mark is
-// dropped.
-std::string FromUtf16(std::string_view bytes, bool big_endian) {
-  const auto unit = [&](std::size_t i) {
-    const auto byte = [&](std::size_t at) {
-      return static_cast<unsigned char>(bytes[at]);
-    };
-    return static_cast<char32_t>(big_endian ? byte(i) << 8U | byte(i + 1)
-                                            : byte(i + 1) << 8U | byte(i));
-  };
-  std::string text;
-  for (std::size_t i = 0; i + 1 < bytes.size(); i += 2) {
-    char32_t code = unit(i);
-    if (code >= 0xD800 && code < 0xDC00 && i + 3 < bytes.size()) {
-      i += 2;
-      code = 0x10000 + ((code - 0xD800) << 10U) + (unit(i) - 0xDC00);
-    }
-    if (i > 0 || code != 0xFEFF) {
-      AppendUtf8(code, text);
-    }
-  }
-  return text;
-}
-
-// Checks the number of continuation bytes (10xxxxxx) after each first byte, not
-// whether the code point is valid. That is enough: in Latin-1 a letter with an
-// accent is rarely followed by just such bytes.
-bool IsUtf8(std::string_view text) {
-  std::size_t more = 0;
-  for (const char c : text) {
-    const auto byte = static_cast<unsigned char>(c);
-    const bool tail = (byte & 0xC0U) == 0x80U;
-    if (tail != (more > 0)) {
-      return false;
-    }
-    more = tail          ? more - 1
-           : byte < 0x80 ? 0
-           : byte < 0xE0 ? 1
-           : byte < 0xF0 ? 2
-                         : 3;
-  }
-  return more == 0;
 }
 
 // Whether a spreadsheet would evaluate the cell as a formula. Numbers are not
@@ -349,105 +275,6 @@ std::string PlainText(std::string_view text) {
     }
   }
   return plain;
-}
-
-// The order of the tests matters. A file in UTF-16 of ASCII text is also valid
-// UTF-8 with zeros in it, so UTF-16 is tested first. Latin-1 comes last,
-// because every sequence of bytes is valid in it.
-std::string ToUtf8(std::string bytes, const std::string& source) {
-  const auto zero_at = [&](std::size_t i) {
-    return bytes.size() > i && bytes[i] == '\0';
-  };
-  if (zero_at(0) && zero_at(1)) {
-    throw DataError(source + ": is binary, not text: export it as CSV");
-  }
-  std::string text;
-  if (bytes.starts_with("\xFF\xFE") || zero_at(1)) {
-    text = FromUtf16(bytes, false);
-  } else if (bytes.starts_with("\xFE\xFF") || zero_at(0)) {
-    text = FromUtf16(bytes, true);
-  } else if (IsUtf8(bytes)) {
-    text = std::move(bytes);
-    text.erase(0, text.starts_with(kByteOrderMark) ? kByteOrderMark.size() : 0);
-  } else {
-    for (const char c : bytes) {
-      AppendUtf8(static_cast<unsigned char>(c), text);
-    }
-  }
-  if (text.starts_with("PK\x03\x04")) {
-    throw DataError(source +
-                    ": is a spreadsheet or zip archive, not text: save it as "
-                    "CSV (or unpack it)");
-  }
-  if (text.starts_with("PAR1")) {
-    throw DataError(source +
-                    ": is a Parquet file: docs/import.md has the line of "
-                    "DuckDB that makes it a CSV");
-  }
-  if (text.find('\0') != std::string::npos) {
-    throw DataError(source + ": is binary, not text: export it as CSV");
-  }
-  // Without any LF, CR is taken as the line break (old Macintosh files).
-  if (text.find('\n') == std::string::npos) {
-    std::replace(text.begin(), text.end(), '\r', '\n');
-  }
-  return text;
-}
-
-std::string ReadTextFile(const std::filesystem::path& path) {
-  const bool is_stdin = path == "-";
-  const std::string source = is_stdin ? "stdin" : path.string();
-  std::error_code error;
-  if (!is_stdin && !std::filesystem::exists(path, error)) {
-    throw NotFoundError("no file " + source);
-  }
-  if (!is_stdin && std::filesystem::is_directory(path, error)) {
-    throw DataError(source + ": is a directory, not a file");
-  }
-  // zlib passes uncompressed files through.
-  const auto close = [](gzFile file) { gzclose(file); };
-  const std::unique_ptr<gzFile_s, decltype(close)> file(
-      // gzclose() closes the descriptor. stdin itself has to stay open, hence
-      // dup().
-      is_stdin ? gzdopen(dup(STDIN_FILENO), "rb") : gzopen(path.c_str(), "rb"),
-      close);
-  if (!file) {
-    throw DataError(source + ": cannot be opened: " + std::strerror(errno));
-  }
-  std::string bytes;
-  std::array<char, 65536> part;
-  int count = 0;
-  while ((count = gzread(file.get(), part.data(), part.size())) > 0) {
-    bytes.append(part.data(), static_cast<std::size_t>(count));
-    // Ordinary tables shrink to a fifth or a twentieth; a few kilobytes that
-    // unpack to gigabytes are an accident or an attack.
-    const bool is_packed = gzdirect(file.get()) == 0;
-    const z_off_t packed = gzoffset(file.get());  // -1 for a pipe.
-    const std::size_t limit =
-        packed < 0 ? kUnpackedAtMost
-                   : std::clamp(100 * static_cast<std::size_t>(packed),
-                                kUnpackedAlways, kUnpackedAtMost);
-    if (is_packed && bytes.size() > limit) {
-      throw DataError(
-          source + ": unpacks to more than " +
-          (limit == kUnpackedAtMost ? "200 MiB" : "100 times its size") +
-          "; if it is right, unpack it with gunzip first");
-    }
-    if (is_packed && bytes.size() > kUnpackedAtMost / 8) {
-      // In one step: doubling would need three times the memory at the end.
-      bytes.reserve(kUnpackedAtMost + 2 * part.size());
-    }
-  }
-  // gzread() returns 0 at the end of a truncated file, too; only gzerror() then
-  // says Z_BUF_ERROR.
-  int code = Z_OK;
-  const char* reason = gzerror(file.get(), &code);
-  if (count < 0 || code != Z_OK) {
-    throw DataError(source + ": cannot be read: " +
-                    (code == Z_ERRNO ? std::strerror(errno) : reason) +
-                    (code == Z_ERRNO ? "" : "; try gzip -t, or export again"));
-  }
-  return ToUtf8(std::move(bytes), source);
 }
 
 bool SameName(std::string_view a, std::string_view b) {

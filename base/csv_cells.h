@@ -103,7 +103,7 @@ std::string PlainText(std::string_view text);
 /// decompressed, UTF-16 (with a byte order mark, or recognised by its zeros) is
 /// converted, and anything that is neither UTF-8 nor UTF-16 is read as Latin-1.
 /// A gzip may unpack to a hundred times its size (4 MiB are always accepted)
-/// and to 200 MiB.
+/// and to 32 MiB; for tables see TextLines.
 /// @throws NotFoundError if there is no such file; DataError naming it and its
 ///   actual type (folder, spreadsheet, Parquet, damaged gzip, binary) or limit.
 std::string ReadTextFile(const std::filesystem::path& path);

@@ -1,6 +1,7 @@
 #include "base/headroom.h"
 
 #include <cerrno>
+#include <cstring>
 #include <latch>
 #include <new>
 #include <string>
@@ -8,7 +9,9 @@
 #include <thread>
 #include <vector>
 
+#include <fcntl.h>
 #include <sys/mman.h>
+#include <unistd.h>
 
 #include "base/passing_error.h"
 
@@ -63,6 +66,32 @@ class Crowd {
 }
 
 }  // namespace
+
+std::string LackOfDescriptors(int count) {
+  std::vector<int> files;
+  int error = 0;
+  while (error == 0 && files.size() < static_cast<std::size_t>(count)) {
+    const int file = open("/dev/null", O_RDONLY | O_CLOEXEC);
+    if (file >= 0) {
+      files.push_back(file);
+    } else {
+      error = errno;
+    }
+  }
+  for (const int file : files) {
+    close(file);
+  }
+  return MayPass(error) ? "no room for " + std::to_string(count) +
+                              " files and sockets (" + std::strerror(error) +
+                              "): see ulimit -n, or LimitNOFILE= of the service"
+                        : std::string();
+}
+
+void RequireDescriptors(int count) {
+  if (const std::string lack = LackOfDescriptors(count); !lack.empty()) {
+    throw PassingError(lack);
+  }
+}
 
 void RequireHeadroom(int threads, std::size_t bytes) {
   try {

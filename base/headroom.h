@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <string>
 
 namespace fdi {
 
@@ -11,5 +12,12 @@ namespace fdi {
 /// @throws PassingError naming both figures, the reason and the limits to look
 ///   at.
 void RequireHeadroom(int threads, std::size_t bytes);
+
+/// Why the process cannot open so many more files and sockets at once, found by
+/// doing it, and the limits to look at; empty if it can.
+std::string LackOfDescriptors(int count);
+/// For what is deaf or fails under another name without them.
+/// @throws PassingError with that reason.
+void RequireDescriptors(int count);
 
 }  // namespace fdi

@@ -181,17 +181,29 @@ bool ScanAmericanDate(Scanner& in, std::tm& fields) {
   return year && digits == 4 && TakeDate(*year, *month, *day, fields);
 }
 
-// "Tue, ", "Tue "
+// "Tue, ", "Tue ", "Di., ", "mardi ": in the six languages of MonthOf(). "mar"
+// is also a month, which a day and a year follow.
 void SkipWeekday(Scanner& in) {
   Scanner ahead = in;
-  const std::string word = Lower(ahead.Word()).substr(0, 3);
-  constexpr std::string_view kDays = "|mon|tue|wed|thu|fri|sat|sun|";
-  if (word.size() == 3 &&
-      kDays.find('|' + word + '|') != std::string_view::npos) {
-    ahead.Take(",");
-    ahead.Take(" ");
-    in = ahead;
+  const std::string word = Lower(ahead.Word());
+  constexpr std::string_view kDays =
+      "|mon|tue|wed|thu|fri|sat|sun|mo|di|mi|do|fr|sa|so|die|mit|don|fre|sam|"
+      "son|lun|mar|mer|jeu|ven|dim|mie|jue|vie|sab|dom|gio|pon|wto|sro|czw|pia|"
+      "sob|nie|pn|wt|sr|cz|pt|nd|";
+  if (word.size() < 2 ||
+      kDays.find('|' + word.substr(0, 3) + '|') == std::string_view::npos) {
+    return;
   }
+  ahead.Take(".");
+  ahead.Take(",");
+  ahead.Take(" ");
+  if (word.starts_with("mar")) {
+    Scanner day = ahead;
+    if (!day.Number() || !(day.next() == '/' || day.next() == '.')) {
+      return;
+    }
+  }
+  in = ahead;
 }
 
 // 2026-11-20, 20.11.2026, 20-Nov-2026, 20-Nov-26, 20.11.26, Nov 20, 2026;
@@ -505,22 +517,48 @@ std::optional<CivilTime> ScanTime(std::string_view text, DateOrder order) {
   return time;
 }
 
+namespace {
+
 // glibc takes an unknown TZ for UTC without an error. The name must therefore
 // be a file of the zone database, inside its folder.
-LocalClock::LocalClock(std::string zone) : zone_(std::move(zone)) {
+bool IsZoneFile(const std::string& zone) {
+  return zone.find("..") == std::string::npos &&
+         std::filesystem::is_regular_file("/usr/share/zoneinfo/" + zone);
+}
+
+// Debian 13 has moved names that are no places to the package tzdata-legacy.
+// Those of the time zone database 2024b (file backward) for what plants use.
+std::string PlaceOf(std::string zone) {
+  static constexpr std::pair<std::string_view, const char*> kPlaces[] = {
+      {"CET", "Europe/Brussels"},        {"MET", "Europe/Brussels"},
+      {"EET", "Europe/Athens"},          {"WET", "Europe/Lisbon"},
+      {"EST", "America/Panama"},         {"EST5EDT", "America/New_York"},
+      {"CST6CDT", "America/Chicago"},    {"MST", "America/Phoenix"},
+      {"MST7MDT", "America/Denver"},     {"HST", "Pacific/Honolulu"},
+      {"PST8PDT", "America/Los_Angeles"}};
+  for (const auto& [name, place] : kPlaces) {
+    if (name == zone && !IsZoneFile(zone)) {
+      return place;
+    }
+  }
+  return zone;
+}
+
+}  // namespace
+
+LocalClock::LocalClock(std::string zone) : zone_(PlaceOf(std::move(zone))) {
   CivilTime offset;
   Scanner scanner(zone_);
   // "CET" is a file with summer time, and a fixed offset only behind a time.
   if (!zone_.empty() && ZoneOf(zone_).value_or(0) == 0 &&
       ScanOffset(scanner, offset)) {
     fixed_s_ = offset.offset_s;
-  } else if (!zone_.empty() && (zone_.find("..") != std::string::npos ||
-                                !std::filesystem::is_regular_file(
-                                    "/usr/share/zoneinfo/" + zone_))) {
+  } else if (!zone_.empty() && !IsZoneFile(zone_)) {
     throw ConfigError("zone '" + zone_ +
                       "' is not known here; accepted are UTC, offsets such as "
                       "+01:00 and, with the package tzdata, names such as "
-                      "Europe/Warsaw");
+                      "Europe/Warsaw (with tzdata-legacy also old ones such as "
+                      "US/Central)");
   }
 }
 

@@ -10,6 +10,7 @@
 
 #include "base/error.h"
 #include "base/suggestion.h"
+#include "base/toml_limits.h"
 
 namespace fdi {
 
@@ -89,60 +90,8 @@ struct TomlReader::Place {
 
 namespace {
 
-// The parser and the destructors of its tree recurse: a key of 50 000 parts, or
-// as many brackets, would overflow the stack. Keys and nesting are therefore
-// bounded before anything is parsed. Outside of text and comments,
-//
-//     parts = dots since the last of  = , { } [ ] LF      nesting = open { and
-//     [
-void CheckDepth(std::string_view text, const std::string& name) {
-  constexpr std::size_t kMaxBytes = 16U << 20U;
-  constexpr int kMaxParts = 16;
-  constexpr int kMaxNesting = 32;
-  int line = 1;
-  const auto refuse = [&](const std::string& what) {
-    throw ConfigError(name + ':' + std::to_string(line) + ": " + what);
-  };
-  if (text.size() > kMaxBytes) {
-    refuse("the file has more than 16 MiB; accepted are smaller ones");
-  }
-  int parts = 1;
-  int nesting = 0;
-  for (std::size_t i = 0; i < text.size(); ++i) {
-    const char c = text[i];
-    if (c == '#') {
-      i = std::min(text.find('\n', i), text.size()) - 1;
-    } else if (c == '"' || c == '\'') {
-      const std::string_view rest = text.substr(i);
-      const std::string quote(
-          rest.size() > 2 && rest[1] == c && rest[2] == c ? 3 : 1, c);
-      // To the closing quote; in a text between " a backslash escapes it.
-      for (i += quote.size();
-           i < text.size() && !text.substr(i).starts_with(quote) &&
-           (quote.size() == 3 || text[i] != '\n');
-           ++i) {
-        line += text[i] == '\n' ? 1 : 0;
-        i += c == '"' && text[i] == '\\' ? 1U : 0U;
-      }
-      i += quote.size() - 1;
-    } else if (c == '.') {
-      if (++parts > kMaxParts) {
-        refuse("a key has more than " + std::to_string(kMaxParts) + " parts");
-      }
-    } else if (std::string_view("=,{}[]\n").find(c) != std::string_view::npos) {
-      parts = 1;
-      line += c == '\n' ? 1 : 0;
-      nesting += c == '{' || c == '[' ? 1 : c == '}' || c == ']' ? -1 : 0;
-      if (nesting > kMaxNesting) {
-        refuse("values are nested more than " + std::to_string(kMaxNesting) +
-               " deep");
-      }
-    }
-  }
-}
-
 toml::table ParseToml(std::string_view text, const std::string& name) {
-  CheckDepth(text, name);
+  CheckTomlLimits(text, name);
   try {
     return toml::parse(text, name);
   } catch (const toml::parse_error& error) {
@@ -157,12 +106,19 @@ std::string ReadAll(const std::filesystem::path& path) {
   if (!std::filesystem::exists(path)) {
     throw NotFoundError("no file " + path.string());
   }
-  std::ifstream in(path, std::ios::binary);
-  std::ostringstream text;
-  if (!std::filesystem::is_regular_file(path) || !(text << in.rdbuf())) {
+  // Asked before it is opened, because a FIFO would be waited for.
+  if (!std::filesystem::is_regular_file(path)) {
     throw DataError("cannot read " + path.string());
   }
-  return text.str();
+  std::ifstream in(path, std::ios::binary);
+  // A byte too many is refused with the other limits.
+  std::string text(std::min<std::uintmax_t>(std::filesystem::file_size(path),
+                                            kMaxTomlBytes + 1),
+                   '\0');
+  if (!in.read(text.data(), static_cast<std::streamsize>(text.size()))) {
+    throw DataError("cannot read " + path.string());
+  }
+  return text;
 }
 
 }  // namespace

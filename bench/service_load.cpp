@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <functional>
 #include <iostream>
+#include <span>
 #include <string>
 #include <thread>
 #include <vector>
@@ -15,6 +16,7 @@
 #include <CLI/CLI.hpp>
 
 #include "base/error.h"
+#include "base/time_text.h"
 #include "bench/cpu_seconds.h"
 #include "idl/endpoint.h"
 #include "simulator/valve_simulation.h"
@@ -28,7 +30,10 @@ using Clock = std::chrono::steady_clock;
 struct Options {
   int domain{61};
   int valves{1000};
-  int samples{300};  // per valve
+  int samples{300};   // per valve
+  bool loops{false};  // CV, F and SP in AUTO, as of a valve without a model.
+  int fill{0};        // Samples 10 s apart, before all others.
+  double publish_hz{0.0};  // Samples a second of each valve; 0: at once.
   double idle_s{5.0};
   int rounds{5000};
   double rate_hz{1000.0};
@@ -70,8 +75,55 @@ double SecondsBetween(Clock::time_point from, Clock::time_point to) {
   return std::chrono::duration<double>(to - from).count();
 }
 
+// What a data-only loop has of `samples`.
+void KeepLoop(std::vector<Sample>& samples) {
+  for (Sample& sample : samples) {
+    sample.present = static_cast<SignalMask>(
+        sample.present &
+        (MaskOf(Signal::kCv) | MaskOf(Signal::kF) | MaskOf(Signal::kSp)));
+    sample.mode = ValveMode::kAuto;
+  }
+}
+
+// Has the first sample after `fill` be of now, and those before it 10 s apart.
+void SetStamps(std::vector<Sample>& samples, std::size_t fill) {
+  constexpr std::int64_t kApart_ns = 10'000'000'000;
+  const std::int64_t now_ns = NowNs();
+  const std::int64_t later_ns = now_ns - samples[fill].stamp_ns;
+  for (std::size_t k = 0; k < samples.size(); ++k) {
+    samples[k].stamp_ns =
+        k < fill ? now_ns - static_cast<std::int64_t>(fill - k) * kApart_ns
+                 : samples[k].stamp_ns + later_ns;
+  }
+}
+
+// Publishes a sample of each valve, evenly over a period; at once without one.
+void PublishRound(const Options& options, double hz, const Sample& sample,
+                  std::vector<idl::ValveSampleMessage>& messages,
+                  idl::Publisher<idl::ValveSampleMessage>& publisher) {
+  constexpr std::size_t kParts = 100;
+  const auto begin = Clock::now();
+  const std::size_t part = std::max<std::size_t>(1, messages.size() / kParts);
+  for (std::size_t v = 0; v < messages.size(); ++v) {
+    messages[v].sample = sample;
+    publisher.Write(messages[v]);
+    if (hz > 0.0 && (v + 1) % part == 0) {
+      std::this_thread::sleep_until(
+          begin + std::chrono::duration_cast<Clock::duration>(
+                      std::chrono::duration<double>(
+                          static_cast<double>(v + 1) /
+                          (hz * static_cast<double>(options.valves)))));
+    }
+  }
+}
+
 int Publish(const Options& options) {
-  const std::vector<Sample> samples = Healthy(options.samples);
+  std::vector<Sample> samples = Healthy(options.fill + options.samples);
+  if (options.loops) {
+    KeepLoop(samples);
+  }
+  const auto fill = static_cast<std::size_t>(options.fill);
+  SetStamps(samples, fill);
   idl::Participant participant(DdsOf(options), {}, "fdi-bench-publish");
   idl::Publisher<idl::ValveSampleMessage> publisher(
       participant, {idl::Profile::kLossless, options.valves});
@@ -85,11 +137,17 @@ int Publish(const Options& options) {
   for (int v = 0; v < options.valves; ++v) {
     messages.push_back({ValveName(v), {}});
   }
-  for (const Sample& sample : samples) {
-    for (idl::ValveSampleMessage& message : messages) {
-      message.sample = sample;
-      publisher.Write(message);
-    }
+  const std::span all_samples(samples);
+  for (const Sample& sample : all_samples.first(fill)) {
+    PublishRound(options, 0.0, sample, messages, publisher);
+  }
+  if (fill > 0) {
+    publisher.WaitForAcknowledged(milliseconds(60000));
+    std::printf("filled %.1f s\n", SecondsBetween(start, Clock::now()));
+    std::fflush(stdout);
+  }
+  for (const Sample& sample : all_samples.subspan(fill)) {
+    PublishRound(options, options.publish_hz, sample, messages, publisher);
   }
   const bool all = publisher.WaitForAcknowledged(milliseconds(60000));
   const double seconds = SecondsBetween(start, Clock::now());
@@ -232,6 +290,11 @@ int main(int argc, char** argv) {
   app.add_option("--security", options.security, "Folder of a key");
   app.add_option("--samples", options.samples, "Samples of each valve");
   app.add_option("--rounds", options.rounds, "Round trips");
+  app.add_flag("--loops", options.loops, "Publish CV, F and SP only");
+  app.add_option("--fill", options.fill,
+                 "Samples of each valve 10 s apart, before the others");
+  app.add_option("--hz", options.publish_hz,
+                 "Samples a second of each valve; 0: as fast as it goes");
   int code = 0;
   const auto add = [&](const char* name, const std::function<int()>& role) {
     app.add_subcommand(name)->callback([&code, role] { code = role(); });

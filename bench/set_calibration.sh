@@ -3,16 +3,18 @@
 # of the observers, in the level loop of valves whose Kv, positioner gain,
 # viscous friction or supply is 15 % off the data sheet that onboarding starts
 # from; by name also valves that differ in kind, and valves of another medium,
-# trim or action in a loop of their own (gas, steam, linear, quick-opening,
-# to-close; onboarded as a valve of that type). Each valve is onboarded on two
-# healthy hours of its own; those of another kind also have two times four more.
+# trim or action in a loop of their own (gas, gas-linear, steam, linear,
+# quick-opening, to-close; onboarded as a valve of that type). Each valve is
+# onboarded on two healthy hours of its own; those of another kind also have two
+# times four more.
 # Prints a line for each valve and one for all; the answers go to FDI_RUNS, if
 # that is set.
 # FDI_SIGNALS=CV,F: the valve measures these alone. FDI_PERIOD=60: one sample in
 # so many seconds, and as many rows. FDI_EFFECTS="10 20": instead of the twenty,
 # every fault and sign at the least strengths that move F or X, at the recorded
 # inputs, by so many per cent of their mean (root mean square of four minutes);
-# faults that do not are left out.
+# faults that do not are left out. FDI_FAULTS="f2 f13-": these alone.
+# FDI_ROWS="600 810": the fault begins in row 600 of 810 instead of 1200 of 2400.
 #
 #     bench/set_calibration.sh build/release/bin [SEED [VALVE...]]
 set -euo pipefail
@@ -37,6 +39,11 @@ declare -A valves=(
   [integral30]=positioner.integral_time_s=30)
 # Type files of their own.
 declare -A types=([gas]='base = "gas-globe"' [steam]='base = "steam-globe"'
+  [gas-linear]=$'base = "gas-globe"
+[medium]\nmolar_mass_kg_kmol = 18.02\ncompressibility = 0.95
+isentropic_exponent = 1.3\n[trim]\nkv_m3_h = 400.0
+characteristic = "linear"
+[instruments]\nflow = { low = 0.0, high = 60.0, noise_sd = 0.085 }'
   [linear]=$'base = "liquid-globe"\n[trim]\ncharacteristic = "linear"'
   [quick-opening]=$'base = "liquid-globe"\n[trim]
 characteristic = "quick-opening"'
@@ -45,7 +52,9 @@ characteristic = "quick-opening"'
 faults=(f1=.6 f2=.35 f2=.85 f3=.4 f3=.9 f4=.6 f5=.85 f6=.35 f7=.6 f10=.4
   f11=.85 f12=.65 f13=.2 f13=-.4 f15=.35 f16=.6 f17=.35 f18=.35 f19=.2 f19=-.35)
 moving=(f{1..13} f{15..19} f{12,13,17,19}-)  # f14 moves neither F nor X.
+[ -z "${FDI_FAULTS:-}" ] || read -ra moving <<<"$FDI_FAULTS"
 period=${FDI_PERIOD:-1}
+read -r begin rows <<<"${FDI_ROWS:-1200 2400}"
 
 run_valve() {  # EXCITATION OPTION...
   local valve=(--set "parameters.${valves[$name]:-}")
@@ -117,7 +126,7 @@ sets_with_bars() {
 
 count() {  # NAME: of lines of `evaluate --csv`
   awk -F, -v name="$1" '
-    $2 == "normal" { healthy++; episodes += $19; next }
+    $2 == "normal" { healthy++; episodes += $20; next }
     { runs++; detected += $4 == "true" }
     $17 != "" && $17 != "unknown" {
       named++; held = index("|" $17 "|", "|" $2 "|") > 0
@@ -145,8 +154,8 @@ for name in "${names[@]}"; do
     # Of water alone it is known when it evaporates.
     [[ $fault != f7=* || ${types[$name]:-} != *gas* ]] || continue
     [[ $fault != f7=* || ${types[$name]:-} != *steam* ]] || continue
-    simulate "$work/$fault.csv" 2400 --fault \
-      "${fault%=*}:abrupt@$((1200 * period)):strength=${fault#*=}"
+    simulate "$work/$fault.csv" "$rows" --fault \
+      "${fault%=*}:abrupt@$((begin * period)):strength=${fault#*=}"
     files+=(--file "$work/$fault.csv")
   done
   if [ -n "${types[$name]:-}${FDI_SIGNALS:-}${FDI_PERIOD:-}" ]; then

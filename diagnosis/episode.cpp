@@ -216,6 +216,7 @@ void Episode::Step(const Sample& sample, const ObserverBank& bank,
     clearing_.Restart();
     begun_ = false;
     floor_ = 0;
+    over_.fill(0);
   }
   // The floor may open an episode before the observers have settled. What they
   // show meanwhile is a transient that the evidence would carry for the length
@@ -243,6 +244,9 @@ void Episode::Step(const Sample& sample, const ObserverBank& bank,
     Open(*findings.detected, verdict);
   }
   floor_ |= findings.floor;
+  if (findings.settled) {
+    ForgetFindings(findings.floor, verdict);
+  }
   // A fault isolated by this sample takes precedence over the findings of the
   // floor, so NameFloor() comes after Isolate().
   if (findings.settled) {
@@ -251,6 +255,7 @@ void Episode::Step(const Sample& sample, const ObserverBank& bank,
     JudgeUnknown(verdict);
   }
   NameFloor(verdict);
+  DropFindings(verdict);
   if (!findings.settled) {
     return;
   }
@@ -328,6 +333,39 @@ void Episode::NameFloor(Verdict& verdict) {
     return;
   }
   Name(floor_, verdict);
+}
+
+// What the floor found is what an episode is about for as long as it is there.
+// Where it has been over for longer than a fault may misfit, and normal
+// operation does not explain what is seen instead, the episode shows something
+// else by now. A valve that looks healthy keeps the name of what it had.
+void Episode::ForgetFindings(FaultSet present, const Verdict& verdict) {
+  const DecisionParameters& decision = models_->decision;
+  const int most = decision.isolation_samples * 3 / 2;
+  const bool abnormal = verdict.normal_factor < decision.isolation_threshold;
+  const std::size_t first =
+      models_->faults.size() -
+      static_cast<std::size_t>(std::popcount(floor_names_));
+  for (std::size_t i = 0; first + i < models_->faults.size(); ++i) {
+    const FaultSet bit = FaultSet{1} << (first + i);
+    int& over = over_.at(i);
+    over = (present & bit) != 0 ? 0 : std::min(over + (abnormal ? 1 : 0), most);
+    floor_ &= over == most ? ~bit : ~FaultSet{0};
+  }
+}
+
+// Not in a sample that changes the name already.
+void Episode::DropFindings(Verdict& verdict) const {
+  const FaultSet gone = verdict.isolated & floor_names_ & ~floor_;
+  if (gone == 0 || verdict.transition_count > 0) {
+    return;
+  }
+  verdict.isolated &= ~gone;
+  if (verdict.isolated == 0) {
+    verdict.state = State::kDetected;
+    verdict.unknown = Unknown::kTooEarly;
+  }
+  Emit(TransitionKind::kReisolated, verdict.stamp_ns, verdict);
 }
 
 FaultSet Episode::FactorsFrom(double threshold, const Verdict& verdict) const {
@@ -425,8 +463,9 @@ bool Episode::ExplainsLoss(FaultSet set, const Verdict& verdict) const {
 
 // Too little flow behind a rod that follows is more likely lost in the line
 // than in the valve, so it stands beside a fault of valve or sensor. A flow
-// transmitter stands alone while the command stays where it was: the loop would
-// answer a loss of flow.
+// transmitter stands alone while the command stays where it was, for the loop
+// would answer a loss of flow, and some flow is read: no flow at all is a dead
+// transmitter or a dead line.
 FaultSet Episode::LossBeside(FaultSet set, FaultSet floor, const Sample& sample,
                              const Verdict& verdict) const {
   const int index = FaultIndex(*models_, kLowFlow);
@@ -435,7 +474,9 @@ FaultSet Episode::LossBeside(FaultSet set, FaultSet floor, const Sample& sample,
     return 0;
   }
   bool of_process = true;
-  bool of_meter = models_->validity.cv.Contains(sample[Signal::kCv]);
+  const double none = models_->floor->flow_margin * models_->floor->flow_high;
+  bool of_meter = models_->validity.cv.Contains(sample[Signal::kCv]) &&
+                  sample[Signal::kF] > none;
   for (std::size_t i = 0; i < models_->faults.size(); ++i) {
     if (Has(set & ~floor_names_, i)) {
       const FaultFacts& facts = FaultFactsOf(models_->faults[i]);

@@ -161,6 +161,8 @@ class Episode {
                Verdict& verdict);
   void Name(FaultSet faults, Verdict& verdict);
   void NameFloor(Verdict& verdict);
+  void ForgetFindings(FaultSet present, const Verdict& verdict);
+  void DropFindings(Verdict& verdict) const;
   void ApplyFloorFindings(const Findings& findings, Verdict& verdict) const;
   void JudgeUnknown(Verdict& verdict);
   FaultSet FactorsFrom(double threshold, const Verdict& verdict) const;
@@ -180,9 +182,10 @@ class Episode {
   ClearingWindow clearing_;
   bool isolation_held_{false};
   std::int64_t detection_stamp_ns_{0};
-  FaultSet floor_{0};      // findings during this episode
-  bool begun_{false};      // gathering of evidence has begun
-  int age_{0};             // samples since the detection
+  FaultSet floor_{0};                      // findings that the episode shows
+  std::array<int, Floor::kTests> over_{};  // samples since each was there
+  bool begun_{false};                      // gathering of evidence has begun
+  int age_{0};                             // samples since the detection
   int without_fault_{0};   // samples since some factor reached T/2
   FaultSet proven_{0};     // the only fault that is not refuted
   int proven_run_{0};      // samples in a row

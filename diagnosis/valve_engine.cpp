@@ -14,6 +14,7 @@
 #include "diagnosis/observer_bank.h"
 #include "diagnosis/sample.h"
 #include "diagnosis/snapshot.h"
+#include "diagnosis/trained_signals.h"
 #include "diagnosis/verdict.h"
 
 namespace fdi {
@@ -104,6 +105,7 @@ bool SeesNoFault(const ModelSet& models) {
 struct Diagnosis {
   explicit Diagnosis(EngineParts parts)
       : plan(std::move(parts.plan)),
+        trained(TrainedSignals(plan->models())),
         bank(plan->observers(), std::move(parts.outputs), parts.instructions),
         coverage(plan->models()),
         detection(plan->models()),
@@ -113,6 +115,7 @@ struct Diagnosis {
         sees_no_fault(SeesNoFault(plan->models())) {}
 
   std::shared_ptr<const EnginePlan> plan;
+  SignalMask trained;  // Others are as if they were not measured.
   ObserverBank bank;
   Coverage coverage;
   Detection detection;
@@ -130,7 +133,7 @@ class ValveEngine::Impl {
     ClearVerdict();
   }
 
-  const Verdict& Step(const Sample& sample);
+  const Verdict& Step(const Sample& measured);
   std::optional<Transition> EndEpisode(EndReason reason);
   std::optional<Transition> Adopt(EngineParts parts);
   void HoldIsolation(bool hold);
@@ -168,7 +171,8 @@ void ValveEngine::Impl::ClearVerdict() {
   verdict_.residuals.fill(std::numeric_limits<double>::quiet_NaN());
 }
 
-const Verdict& ValveEngine::Impl::Step(const Sample& sample) {
+const Verdict& ValveEngine::Impl::Step(const Sample& measured) {
+  const Sample sample = WithOnly(measured, diagnosis_->trained);
   verdict_.stamp_ns = sample.stamp_ns;
   verdict_.source_id = sample.source_id;
   verdict_.seq = sample.seq;

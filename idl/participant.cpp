@@ -59,6 +59,8 @@ constexpr std::uint32_t kPortQueueCapacity = 8192;
 // (UDPTransportInterface::clean), and 2.9 may throw in a destructor.
 constexpr int kThreads = 16;
 constexpr std::size_t kHeadroomBytes = 32U << 20U;
+/// Sockets and pipes; with fewer the library opens what it can, and is deaf.
+constexpr int kDescriptors = 16;
 // Bounds topics, remote endpoints per topic, and participants without a key.
 constexpr std::size_t kMaxRemembered = 64;
 
@@ -381,6 +383,7 @@ Participant::Impl::Impl(const DdsOptions& options, LogSink log,
   if (options_.transport != "shm") {
     interfaces_.emplace(options_.interfaces, log_);
   }
+  RequireDescriptors(kDescriptors);
   RequireHeadroom(kThreads, kHeadroomBytes);
   const dds::DomainParticipantQos qos =
       MakeQos(options_, profiles_, datagrams_, log_, name);

@@ -7,6 +7,7 @@
 
 #include "base/csv_cells.h"
 #include "base/error.h"
+#include "base/text_lines.h"
 #include "import/layout.h"
 #include "import/quality.h"
 
@@ -16,6 +17,8 @@ namespace {
 // Lines that show the form of a table; see kSampleRows of layout.cpp. What all
 // rows have to show (decimal sign, order of dates) is found for each loop.
 constexpr std::size_t kHeadLines = 80;
+/// Bytes of the text and the index of a gzip.
+constexpr std::size_t kMaxPacked = 240U << 20U;
 
 std::string_view FirstLines(std::string_view text, std::size_t count) {
   std::size_t end = 0;
@@ -84,7 +87,15 @@ std::string_view Trimmed(std::string_view cell) {
 
 ColumnIndex::ColumnIndex(const std::filesystem::path& path,
                          const ColumnMap& map, std::size_t max_lines)
-    : source_(path.string()), text_(ReadTextFile(path)) {
+    : source_(path.string()) {
+  const TextLines lines = TextLines::OfFile(path);
+  packed_ = lines.packed();
+  text_.reserve(lines.bytes() + 1);
+  lines.ForEach([&](std::string_view line, std::size_t) {
+    text_ += line;
+    text_ += '\n';
+    return true;
+  });
   FindForm(map);
   // The first lines of a long table have few of its tags.
   if (max_lines > 0 && !form_.long_table) {
@@ -95,8 +106,8 @@ ColumnIndex::ColumnIndex(const std::filesystem::path& path,
 }
 
 void ColumnIndex::FindForm(const ColumnMap& map) {
-  const Layout layout =
-      FindLayout(LinesOf(FirstLines(text_, kHeadLines)), map, source_, true);
+  const Layout layout = FindLayout(
+      TextLines(FirstLines(text_, kHeadLines), source_), map, source_, true);
   names_ = layout.names;
   if (names_.empty()) {
     throw DataError(source_ + ": no header with rows below it");
@@ -148,6 +159,13 @@ void ColumnIndex::IndexRows() {
       }
     }
     TakeRecord(begin, end, first_line);
+    if (packed_ &&
+        (bytes() > kMaxPacked || rows_of_tag_.size() > kMaxColumns)) {
+      throw DataError(source_ +
+                      ": takes more than 240 MiB of memory, which a gzip may "
+                      "not; try to unpack it with gunzip first, or to export "
+                      "fewer tags at a time");
+    }
     begin = end + 1;
   }
   if (form_.long_table) {

@@ -19,7 +19,8 @@ class ColumnIndex {
  public:
   /// @param map the form of the file, as far as the user states it.
   /// @param max_lines 0: all; otherwise only the first lines are kept.
-  /// @throws NotFoundError, DataError as ReadTextFile() and FindLayout().
+  /// @throws NotFoundError, DataError as TextLines::OfFile() and FindLayout(),
+  ///   and if a gzip takes more than 240 MiB of memory.
   ColumnIndex(const std::filesystem::path& path, const ColumnMap& map,
               std::size_t max_lines = 0);
 
@@ -53,6 +54,7 @@ class ColumnIndex {
   std::string ProjectLong(const std::vector<std::string>& tags) const;
 
   std::string source_;
+  bool packed_{false};
   std::string text_;
   ColumnMap form_;
   std::vector<std::string> names_;

@@ -11,6 +11,7 @@
 #include "base/error.h"
 #include "base/text.h"
 #include "diagnosis/fault_catalogue.h"
+#include "import/elapsed.h"
 #include "import/layout.h"
 #include "import/tag_map.h"
 
@@ -281,17 +282,7 @@ std::optional<CsvRow> CsvReader::TakeLine(std::string_view line,
   if (!TakeTime(row)) {
     return std::nullopt;
   }
-  if (!pending_.empty() && rows_ > 0) {
-    if (header_again_) {
-      Refuse(
-          "another table begins here, with a header of its own; expected one "
-          "table, with a column for each signal, or with the tag in a column "
-          "of its own; try to export it so");
-    }
-    throw DataError(pending_);
-  }
-  pending_.clear();
-  header_again_ = false;
+  EndPage(row);
   sample.seq = rows_++;
   if (!tag_column_) {
     for (const Conversion& c : conversions_) {
@@ -307,6 +298,25 @@ std::optional<CsvRow> CsvReader::TakeLine(std::string_view line,
   return row;
 }
 
+// A title between two rows is that of the next page, if the header comes again
+// and the time goes on; otherwise that of another table.
+void CsvReader::EndPage(const CsvRow& row) {
+  const std::int64_t stamp_ns = row.labelled.sample.stamp_ns;
+  const bool page = header_again_ && stamp_ns > latest_ns_ && names_.size() > 2;
+  if (!pending_.empty() && rows_ > 0 && !page) {
+    if (header_again_) {
+      Refuse(
+          "another table begins here, with a header of its own; expected one "
+          "table, with a column for each signal, or with the tag in a column "
+          "of its own; try to export it so");
+    }
+    throw DataError(pending_);
+  }
+  latest_ns_ = stamp_ns;
+  pending_.clear();
+  header_again_ = false;
+}
+
 // Whether `line` ends a row of readings. Header and markers are taken here.
 bool CsvReader::EndsRow(std::string_view line) {
   if (line_ <= options_.map.skip && names_.empty()) {
@@ -319,7 +329,14 @@ bool CsvReader::EndsRow(std::string_view line) {
       !names_.front().starts_with('#')) {
     return false;
   }
-  if (!record_.TakeLine(line) || record_.blank()) {
+  const bool ended = record_.TakeLine(line);
+  record_bytes_ = record_.open() ? record_bytes_ + line.size() : 0;
+  if (record_bytes_ > kLongestRecord) {
+    Refuse(
+        "a record is longer than 2 MiB: a quote in it is not closed; "
+        "expected a closing \"");
+  }
+  if (!ended || record_.blank()) {
     return false;
   }
   if (names_.empty()) {
@@ -411,6 +428,11 @@ std::optional<double> CsvReader::Reading(const Conversion& c,
   if (!value) {
     value = Parsed(cell);
   }
+  if (!value && std::isfinite(c.mapping.lowest)) {
+    // "7.9 mA" of a column that the map has in currents.
+    const auto [number, unit] = SplitUnit(cell);
+    value = SameName(unit, "mA") ? Parsed(number) : std::nullopt;
+  }
   if (value && (*value < c.mapping.lowest || *value > c.mapping.highest)) {
     ++beyond_[Index(c.mapping.signal)];
     return std::nullopt;
@@ -432,7 +454,7 @@ std::optional<double> CsvReader::WithOwnUnit(const Conversion& c,
   const auto [number, unit] = SplitUnit(cell);
   const auto value = Parsed(number);
   if (!value || !IsUnit(unit)) {
-    return std::nullopt;
+    return std::nullopt;  // Number() says what is wrong.
   }
   const auto own = FindUnit(c.mapping.signal, unit);
   const auto stated = FindUnit(c.mapping.signal, c.mapping.unit);
@@ -760,6 +782,15 @@ void CsvReader::CheckHeader() const {
       require((header_.signals & MaskOf(signal)) != 0, ColumnNames(signal));
     }
   }
+  if (!map.columns.empty() && missing.empty() &&
+      (header_.signals & (MaskOf(Signal::kX) | MaskOf(Signal::kF))) == 0) {
+    Refuse(
+        "neither a position (X) nor a flow (F) is mapped: the command alone, "
+        "or a level, shows nothing about the valve; expected one of the two; "
+        "try to export the position transmitter or the flow behind the valve, "
+        "and [signal.X] or [signal.F] of --map; the header is " +
+        Quoted(Listed(names_)));
+  }
   require((header_.signals & (MaskOf(Signal::kX) | MaskOf(Signal::kF))) != 0,
           "one of X_pct, F_m3_h, F_t_h (position or flow: the command alone, "
           "or a level, shows nothing about the valve)");
@@ -888,6 +919,12 @@ void CsvReader::FindTimeForm(const std::string& cell) {
   const std::string& name = names_[*time_column_];
   const auto number =
       ParseNumber(cell, map.decimal == '\0' ? '.' : map.decimal);
+  if (!number && !ScanTime(cell, map.date_order) && ParseElapsed(cell)) {
+    time_form_ = TimeForm::kClock;
+    notes_.push_back("column " + name +
+                     " has times without a date: --start says when they begin");
+    return;
+  }
   // "20260310090000" is both.
   if (!number || ScanTime(cell, map.date_order)) {
     time_form_ = TimeForm::kText;
@@ -957,8 +994,12 @@ std::optional<std::int64_t> CsvReader::UtcOf(const std::string& cell) {
     throw DataError(NoTime(cell));
   }
   if (time->fields.tm_sec == 60) {
-    notes_.push_back("the row of the leap second " + cell +
-                     " left out: the clock of the bus has no instant for it");
+    // Leap seconds are rare: a table full of them needs no note for each.
+    constexpr std::size_t kMaxNotes = 100;
+    if (notes_.size() < kMaxNotes) {
+      notes_.push_back("the row of the leap second " + cell +
+                       " left out: the clock of the bus has no instant for it");
+    }
     return std::nullopt;
   }
   if (!time->offset_s && !first_ns_ && options_.map.zone.empty()) {
@@ -968,6 +1009,10 @@ std::optional<std::int64_t> CsvReader::UtcOf(const std::string& cell) {
   }
   // Of an hour that the clock shows twice, the time of the row before decides
   // which one it is (LocalClock::Utc).
+  if (last_ns_.size() > kMaxColumns) {
+    Refuse("more than " + std::to_string(kMaxColumns) +
+           " tags; try to export fewer at a time");
+  }
   std::int64_t& last_ns =
       last_ns_[tag_column_ ? Cell(*tag_column_) : std::string()];
   const auto utc = clock_.Utc(*time, last_ns);
@@ -978,6 +1023,24 @@ std::optional<std::int64_t> CsvReader::UtcOf(const std::string& cell) {
   }
   last_ns = *utc;
   return utc;
+}
+
+// What is less than the row before by more than half a round has begun a new
+// one: the clock passed midnight.
+double CsvReader::ClockOf(const std::string& cell) {
+  const auto time = ParseElapsed(cell);
+  if (!time) {
+    throw DataError(NoTime(cell));
+  }
+  std::int64_t& last_ns =
+      last_ns_[tag_column_ ? Cell(*tag_column_) : std::string()];
+  const double behind = static_cast<double>(last_ns) * 1e-9 - time->seconds;
+  double seconds = time->seconds;
+  if (time->wraps_s > 0.0 && behind > 0.5 * time->wraps_s) {
+    seconds += time->wraps_s * std::ceil(behind / time->wraps_s - 0.5);
+  }
+  last_ns = std::llround(seconds * 1e9);
+  return seconds;
 }
 
 bool CsvReader::TakeTime(CsvRow& row) {
@@ -1016,6 +1079,9 @@ bool CsvReader::TakeTime(CsvRow& row) {
                    ? *count * std::llround(time_scale_ * 1e9)
                    : std::llround(row.t_s * 1e9);
     stamp_ns += time_form_ == TimeForm::kElapsed ? options_.start_ns : 0;
+  } else if (time_form_ == TimeForm::kClock) {
+    row.t_s = ClockOf(cell);
+    stamp_ns = std::llround(row.t_s * 1e9) + options_.start_ns;
   } else if (const auto utc = UtcOf(cell)) {
     stamp_ns = *utc;
   } else {

@@ -16,6 +16,7 @@
 
 #include "base/csv_cells.h"
 #include "base/log.h"
+#include "base/text_lines.h"
 #include "base/time_text.h"
 #include "diagnosis/sample_series.h"
 #include "import/quality.h"
@@ -68,6 +69,14 @@ struct ColumnMapping {
   bool clamped{false};  ///< To 0..100 %: half of a split range.
 };
 
+/// Of a wide table; as many tags may a long one have.
+inline constexpr std::size_t kMaxColumns = 20'000;
+/// Bytes of lines in one pair of quotes; of what has more, one is not closed.
+inline constexpr std::size_t kLongestRecord = 2U << 20U;
+/// Of a table in a gzip, so that a small file does not take much memory; one
+/// that is not packed may have more, at some 170 bytes each.
+inline constexpr std::size_t kMaxPackedRows = 1'000'000;
+
 /// Format of the time column.
 enum class TimeForm {
   kFindOut,
@@ -81,6 +90,7 @@ enum class TimeForm {
   kJulian,      ///< Julian days, 2440587.5 being 1970-01-01, UTC.
   kModifiedJulian,  ///< Julian days less 2400000.5, UTC.
   kText,            ///< As ScanTime() reads it.
+  kClock,  ///< Without a date, as ParseElapsed() reads it, from start_ns.
 };
 
 /// Form of a time column, and the unit of its numbers [s].
@@ -243,7 +253,8 @@ class CsvReader {
   const CsvHeader& header() const { return header_; }
   const CsvOptions& options() const { return options_; }
   bool dated() const {
-    return time_form_ != TimeForm::kElapsed && time_form_ != TimeForm::kFindOut;
+    return time_form_ != TimeForm::kElapsed && time_form_ != TimeForm::kClock &&
+           time_form_ != TimeForm::kFindOut;
   }
   const std::vector<std::string>& notes() const { return notes_; }
   const std::vector<std::string>& names() const { return names_; }
@@ -292,6 +303,8 @@ class CsvReader {
   void FindTimeForm(const std::string& cell);
   bool TakeTime(CsvRow& row);
   std::optional<std::int64_t> UtcOf(const std::string& cell);
+  double ClockOf(const std::string& cell);
+  void EndPage(const CsvRow& row);
   FaultTruth Truth() const;
   ValveMode Mode() const;
 
@@ -316,10 +329,12 @@ class CsvReader {
   TimeForm time_form_{TimeForm::kFindOut};
   double time_scale_{1.0};
   std::optional<std::int64_t> first_ns_;
+  std::int64_t latest_ns_{0};  // Of the row before.
   // Per tag, because a table may be sorted by tag; a wide table uses "".
   std::map<std::string, std::int64_t, std::less<>> last_ns_;
   std::uint64_t rows_{0};
   std::int64_t line_{0};
+  std::size_t record_bytes_{0};  // While a quote is open.
   int header_left_{0};
   bool header_again_{false};  // Behind the row of pending_.
   // Marker rows that were left out, and what is wrong with the last of them if
@@ -336,8 +351,9 @@ class CsvReader {
 /// @throws DataError as CsvReader, or naming the line of a step that is not the
 ///   sample period; if there are fewer than two rows and no period is given; if
 ///   the decimal sign is ambiguous; if most values of a mapped signal are
-///   impossible.
+///   impossible; if a gzip has more than kMaxPackedRows rows.
 CsvTable ReadCsv(std::string_view text, const CsvOptions& options = {});
+CsvTable ReadCsv(const TextLines& lines, const CsvOptions& options);
 
 /// Reads `path`, or stdin for `-`; CsvOptions::source is set to its name.
 /// @throws as above and as ReadTextFile().
@@ -351,12 +367,9 @@ TimeUnit TimeUnitOf(std::string_view name, double first);
 /// questionable or substituted; nothing for other cells.
 std::optional<std::string> Unflagged(std::string_view cell);
 
-/// Lines of `text`, without their breaks.
-std::vector<std::string_view> LinesOf(std::string_view text);
-
 /// Feeds whole tables to `reader`, from the end if they are newest first, and
 /// calls take(row) for each row.
-void ForEachRow(const std::vector<std::string_view>& lines, CsvReader& reader,
+void ForEachRow(const TextLines& lines, CsvReader& reader,
                 const std::function<void(CsvRow&&)>& take);
 
 /// Median of the steps of `times_s`, of two middle ones the shorter.

@@ -2,18 +2,22 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <deque>
 #include <limits>
 #include <map>
+#include <unordered_map>
 #include <utility>
+
+#include <malloc.h>
 
 #include "base/correlation.h"
 #include "base/error.h"
+#include "base/local_sense.h"
 #include "base/log.h"
 #include "base/median.h"
 #include "base/usual_period.h"
 #include "import/csv.h"
 #include "import/layout.h"
-#include "import/local_sense.h"
 
 // Whole tables: properties that only all rows reveal, i.e. the form (layout.h),
 // the time grid, and what the readings are like.
@@ -44,33 +48,27 @@ SampleSeries EmptyRun(const CsvHeader& header, double period_s) {
 
 }  // namespace
 
-std::vector<std::string_view> LinesOf(std::string_view text) {
-  std::vector<std::string_view> lines;
-  while (!text.empty()) {
-    const std::size_t end = text.find('\n');
-    lines.push_back(text.substr(0, end));
-    text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
-  }
-  return lines;
-}
-
 // From the end, a clock that goes back in autumn is read in the right order,
 // too.
-void ForEachRow(const std::vector<std::string_view>& lines, CsvReader& reader,
+void ForEachRow(const TextLines& lines, CsvReader& reader,
                 const std::function<void(CsvRow&&)>& take) {
-  const std::size_t count = lines.size();
-  std::size_t begin = 0;
-  while (begin < count && reader.options().map.newest_first &&
-         !reader.in_rows()) {
-    reader.TakeLine(lines[begin++]);
-  }
-  for (std::size_t k = begin; k < count; ++k) {
-    const std::size_t at = begin > 0 ? count - 1 - (k - begin) : k;
-    if (auto row =
-            reader.TakeLine(lines[at], static_cast<std::int64_t>(at) + 1)) {
+  const auto take_line = [&](std::string_view line, std::size_t number) {
+    if (auto row = reader.TakeLine(line, static_cast<std::int64_t>(number))) {
       take(std::move(*row));
     }
+    return true;
+  };
+  if (!reader.options().map.newest_first) {
+    lines.ForEach(take_line);
+    return;
   }
+  std::size_t begin = 1;
+  lines.ForEach([&](std::string_view line, std::size_t number) {
+    reader.TakeLine(line, static_cast<std::int64_t>(number));
+    begin = number + 1;
+    return !reader.in_rows();
+  });
+  lines.ForEachBackwards(take_line, begin);
 }
 
 double MedianStep(const std::vector<double>& times_s) {
@@ -105,20 +103,21 @@ struct TimedReading {
 // Reads the rows of a whole table and aligns them to a time grid.
 class TableReader {
  public:
-  TableReader(std::string_view text, const CsvOptions& options)
-      : lines_(LinesOf(text)), reader_(Settled(lines_, options)) {}
+  TableReader(const TextLines& lines, const CsvOptions& options)
+      : lines_(lines), reader_(Settled(lines_, options)) {}
 
   CsvTable Read();
 
  private:
-  static CsvOptions Settled(const std::vector<std::string_view>& lines,
-                            CsvOptions options) {
+  static CsvOptions Settled(const TextLines& lines, CsvOptions options) {
     options.map =
         FindLayout(lines, std::move(options.map), options.source, false).map;
     return options;
   }
   void TakeRows();
-  void JoinTags();
+  bool Joined(const CsvRow& row);
+  void CheckCount() const;
+  void OrderTags();
   void CheckOrder() const;
   void FindPeriod();
   bool IsSteady() const;
@@ -126,6 +125,7 @@ class TableReader {
   std::array<std::vector<TimedReading>, kSignalCount> Readings() const;
   void NoteResampling(const std::array<std::size_t, kSignalCount>& filled,
                       std::size_t samples);
+  void CheckResampled(std::size_t samples) const;
   void Resample();
   void NoteForm();
   void DropImpossible(const ColumnMapping& mapping);
@@ -148,9 +148,11 @@ class TableReader {
     return options().split_gaps || options().map.resampling;
   }
 
-  std::vector<std::string_view> lines_;
+  const TextLines& lines_;
   CsvReader reader_;
-  std::vector<CsvRow> rows_;
+  std::deque<CsvRow> rows_;  // Unlike a vector, never in memory twice.
+  // Of a long table: where the row of an instant is.
+  std::unordered_map<std::int64_t, std::size_t> row_at_;
   double period_s_{0.0};
   CsvTable table_;
 };
@@ -179,7 +181,7 @@ CsvTable TableReader::Read() {
     }
   }
   if (reader_.options().map.long_table) {
-    JoinTags();
+    OrderTags();
   }
   CheckOrder();
   if (options().check_values) {
@@ -211,15 +213,17 @@ CsvTable TableReader::Read() {
 void TableReader::TakeRows() {
   std::size_t repeated = 0;
   ForEachRow(lines_, reader_, [&](CsvRow&& row) {
-    if (!rows_.empty() &&
+    const bool is_long = options().map.long_table.has_value();
+    if (!is_long && !rows_.empty() &&
         rows_.back().labelled.sample.stamp_ns == row.labelled.sample.stamp_ns &&
-        (options().skip_repeats ||
-         (!options().map.long_table && Repeats(rows_.back(), row)))) {
+        (options().skip_repeats || Repeats(rows_.back(), row))) {
       ++repeated;
-    } else {
+    } else if (!is_long || !Joined(row)) {
+      CheckCount();
       rows_.push_back(std::move(row));
     }
   });
+  row_at_.clear();
   reader_.Finish();
   if (repeated > 0) {
     table_.notes.push_back(std::to_string(repeated) +
@@ -252,38 +256,50 @@ void TableReader::NoteForm() {
   }
 }
 
-// Merges rows of the same instant; a long table may be sorted by tag.
-void TableReader::JoinTags() {
-  std::ranges::stable_sort(rows_, {}, [](const CsvRow& row) {
-    return row.labelled.sample.stamp_ns;
-  });
-  std::vector<CsvRow> joined;
-  for (const CsvRow& row : rows_) {
-    const Sample& part = row.labelled.sample;
-    if (joined.empty() ||
-        joined.back().labelled.sample.stamp_ns != part.stamp_ns) {
-      joined.push_back(row);
+// Whether the row of a long table went into an earlier one of that instant; the
+// table may be sorted by tag.
+bool TableReader::Joined(const CsvRow& row) {
+  const Sample& part = row.labelled.sample;
+  const auto [at, is_new] = row_at_.try_emplace(part.stamp_ns, rows_.size());
+  if (is_new) {
+    return false;
+  }
+  Sample& whole = rows_[at->second].labelled.sample;
+  for (std::size_t i = 0; i < kSignalCount; ++i) {
+    const auto signal = static_cast<Signal>(i);
+    if (!part.Has(signal)) {
       continue;
     }
-    Sample& whole = joined.back().labelled.sample;
-    for (std::size_t i = 0; i < kSignalCount; ++i) {
-      const auto signal = static_cast<Signal>(i);
-      if (!part.Has(signal)) {
-        continue;
-      }
-      if (whole.Has(signal) && whole[signal] != part[signal]) {
-        RefuseAt(row.line, "signal " + std::string(SignalName(signal)) +
-                               " has two values at this time, " +
-                               NumberText(whole[signal]) + " and " +
-                               NumberText(part[signal]) +
-                               "; expected one; try another zone, or remove "
-                               "one of the rows");
-      }
-      whole.Set(signal, part[signal]);
-      whole.quality[i] = part.quality[i];
+    if (whole.Has(signal) && options().skip_repeats) {
+      continue;
     }
+    if (whole.Has(signal) && whole[signal] != part[signal]) {
+      RefuseAt(row.line, "signal " + std::string(SignalName(signal)) +
+                             " has two values at this time, " +
+                             NumberText(whole[signal]) + " and " +
+                             NumberText(part[signal]) +
+                             "; expected one; try another zone, or remove "
+                             "one of the rows");
+    }
+    whole.Set(signal, part[signal]);
+    whole.quality[i] = part.quality[i];
   }
-  rows_ = std::move(joined);
+  return true;
+}
+
+void TableReader::CheckCount() const {
+  if (lines_.packed() && rows_.size() >= kMaxPackedRows) {
+    throw DataError(options().source + ": has more than " +
+                    std::to_string(kMaxPackedRows) +
+                    " rows, which a gzip may not have; try to unpack it with "
+                    "gunzip first, or to cut it into parts");
+  }
+}
+
+void TableReader::OrderTags() {
+  std::ranges::sort(rows_, {}, [](const CsvRow& row) {
+    return row.labelled.sample.stamp_ns;
+  });
   // The reader counted from the first row of the file, which need not be the
   // earliest.
   const double first_s = rows_.empty() ? 0.0 : rows_.front().t_s;
@@ -371,8 +387,8 @@ void TableReader::PutOnGrid() {
   const double begin_s = rows_.front().t_s + Phase();
   std::int64_t last = 0;
   double largest = 0.0;
-  // A copy, so that RefuseStep() shows the times that the file has.
-  std::vector<CsvRow> placed = rows_;
+  // Applied at the end, so that RefuseStep() shows the times of the file.
+  std::vector<double> placed_s;
   for (std::size_t k = 0; k < rows_.size(); ++k) {
     const std::int64_t at = std::llround((rows_[k].t_s - begin_s) / period_s_);
     const double grid_s = begin_s + static_cast<double>(at) * period_s_;
@@ -384,13 +400,14 @@ void TableReader::PutOnGrid() {
       RefuseStep(k);
     }
     last = at;
-    CsvRow& row = placed[k];
-    row.t_s = grid_s;
-    const double moved_s = row.t_s - rows_[k].t_s;
-    largest = std::max(largest, std::abs(moved_s));
-    row.labelled.sample.stamp_ns += std::llround(moved_s * 1e9);
+    placed_s.push_back(grid_s);
   }
-  rows_ = std::move(placed);
+  for (std::size_t k = 0; k < rows_.size(); ++k) {
+    const double moved_s = placed_s[k] - rows_[k].t_s;
+    rows_[k].t_s = placed_s[k];
+    rows_[k].labelled.sample.stamp_ns += std::llround(moved_s * 1e9);
+    largest = std::max(largest, std::abs(moved_s));
+  }
   table_.notes.push_back("rows up to " + NumberText(std::round(largest * 1e3)) +
                          " ms early or late put onto a grid of " +
                          NumberText(period_s_) + " s");
@@ -467,6 +484,15 @@ void TableReader::NoteResampling(
       (shares.empty() ? "" : "; kept out of fits and thresholds"));
 }
 
+void TableReader::CheckResampled(std::size_t samples) const {
+  if (lines_.packed() && samples >= kMaxPackedRows) {
+    throw DataError(options().source + ": --resample " + NumberText(period_s_) +
+                    "s: more than " + std::to_string(kMaxPackedRows) +
+                    " samples, which a gzip may not have; try a longer "
+                    "period, or to unpack it with gunzip first");
+  }
+}
+
 // One pass over the grid with one cursor per signal: O(samples + readings).
 // Each signal is resampled from its own readings, because the tags of a long
 // table are read at different times. Truth and mode are those of the last row
@@ -483,7 +509,7 @@ void TableReader::Resample() {
   const auto readings = Readings();
   std::array<std::size_t, kSignalCount> next{};
   std::array<std::size_t, kSignalCount> filled{};
-  std::vector<CsvRow> grid;
+  std::deque<CsvRow> grid;
   std::size_t row = 0;
   const CsvRow origin = rows_.front();
   for (std::int64_t k = 0; static_cast<double>(k) * period_s_ <= length_s;
@@ -526,6 +552,7 @@ void TableReader::Resample() {
       continue;
     }
     sample.seq = grid.size();
+    CheckResampled(grid.size());
     for (std::size_t i = 0; i < kSignalCount; ++i) {
       filled[i] += is_filled[i] ? 1U : 0U;
     }
@@ -803,6 +830,7 @@ void TableReader::Cut() {
   std::size_t gaps = 0;
   double missing_s = 0.0;
   double longest_s = 0.0;
+  std::vector<std::size_t> lengths;
   for (std::size_t k = 0; k < rows_.size(); ++k) {
     const double step = k == 0 ? 0.0 : rows_[k].t_s - rows_[k - 1].t_s;
     // The limit between jitter and a gap is that of IsSteady().
@@ -813,9 +841,22 @@ void TableReader::Cut() {
       longest_s = std::max(longest_s, step - period_s_);
     }
     if (k == 0 || gap) {
-      table_.runs.push_back(EmptyRun(table_.header, period_s_));
+      lengths.push_back(0);
     }
-    table_.runs.back().samples.push_back(std::move(rows_[k].labelled));
+    ++lengths.back();
+  }
+  // Rows leave as samples come, or there would be two of each for a while.
+  for (const std::size_t length : lengths) {
+    SampleSeries& run =
+        table_.runs.emplace_back(EmptyRun(table_.header, period_s_));
+    run.samples.reserve(length);
+    for (std::size_t k = 0; k < length; ++k) {
+      run.samples.push_back(rows_.front().labelled);
+      rows_.pop_front();
+      if (rows_.size() % 65536 == 0) {
+        malloc_trim(0);
+      }
+    }
   }
   if (gaps > 0) {
     table_.notes.push_back(std::to_string(gaps) + " gaps, " +
@@ -827,13 +868,17 @@ void TableReader::Cut() {
 
 }  // namespace
 
+CsvTable ReadCsv(const TextLines& lines, const CsvOptions& options) {
+  return TableReader(lines, options).Read();
+}
+
 CsvTable ReadCsv(std::string_view text, const CsvOptions& options) {
-  return TableReader(text, options).Read();
+  return ReadCsv(TextLines(text, options.source), options);
 }
 
 CsvTable ReadCsvFile(const std::filesystem::path& path, CsvOptions options) {
   options.source = path == "-" ? "stdin" : path.string();
-  return ReadCsv(ReadTextFile(path), options);
+  return ReadCsv(TextLines::OfFile(path), options);
 }
 
 }  // namespace fdi::importer

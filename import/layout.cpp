@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "base/error.h"
+#include "import/elapsed.h"
 #include "import/tag_map.h"
 
 namespace fdi::importer {
@@ -16,6 +17,8 @@ using WordCounts = std::map<std::string, std::size_t>;
 
 /// Rows that the form of a table is found from; signs and words come from all.
 constexpr std::size_t kSampleRows = 200;
+/// Of tables with many columns fewer rows, which are kept.
+constexpr std::size_t kSampleCells = 500'000;
 /// Different cells that are counted in a column of words.
 constexpr std::size_t kMaxWords = 500;
 /// Share of the rows that decides.
@@ -31,7 +34,7 @@ struct Column {
   std::size_t full{0};
   std::size_t numbers{0};  ///< Also with a unit.
   std::size_t dates{0};    ///< Text with a date.
-  std::size_t clocks{0};   ///< "14:56:11" alone.
+  std::size_t clocks{0};   ///< "14:56:11" alone, or "12 sec".
   std::vector<double> values;
   std::map<std::string, std::size_t> words;  ///< In all rows.
 
@@ -52,10 +55,12 @@ std::optional<CivilTime> AnyTime(std::string_view cell) {
   return std::nullopt;
 }
 
+// Also "14:56:11Z", which belongs to a date.
 bool IsClock(std::string_view cell) {
-  return cell.find(':') != std::string_view::npos && !cell.empty() &&
-         std::isdigit(static_cast<unsigned char>(cell.front())) != 0 &&
-         ScanTime("2000-01-01 " + std::string(cell)).has_value();
+  return ParseElapsed(cell) ||
+         (cell.find(':') != std::string_view::npos &&
+          std::isdigit(static_cast<unsigned char>(cell.front())) != 0 &&
+          ScanTime("2000-01-01 " + std::string(cell)));
 }
 
 // Before the decimal sign is known: with either sign, and with a unit behind.
@@ -92,22 +97,26 @@ bool IsUnitCell(std::string_view cell) {
 
 // Reads records from a line on; comments (#) and blank lines do not count.
 template <typename Take>
-void ForEachRecord(std::span<const std::string_view> lines, std::size_t begin,
-                   char separator, const Take& take) {
+void ForEachRecord(const TextLines& lines, std::size_t begin, char separator,
+                   const Take& take) {
   CsvCells reader(separator);
   std::size_t first = begin;
-  for (std::size_t i = begin; i < lines.size(); ++i) {
-    if (!reader.open()) {
-      first = i;
-      if (lines[i].starts_with('#') || lines[i].starts_with("sep=")) {
-        continue;
-      }
-    }
-    if (reader.TakeLine(lines[i]) && !reader.blank() &&
-        !take(first + 1, reader.cells())) {
-      return;
-    }
-  }
+  std::size_t bytes = 0;
+  lines.ForEach(
+      [&](std::string_view line, std::size_t number) {
+        if (!reader.open()) {
+          first = number;
+          if (line.starts_with('#') || line.starts_with("sep=")) {
+            return true;
+          }
+        }
+        // What is wrong with a record without an end, the reader says.
+        const bool ended = reader.TakeLine(line);
+        bytes = reader.open() ? bytes + line.size() : 0;
+        return ended && !reader.blank() ? take(first, reader.cells())
+                                        : bytes <= kLongestRecord;
+      },
+      begin);
 }
 
 /// What the first rows of a table have in common.
@@ -136,8 +145,8 @@ struct Signs {
 
 class LayoutFinder {
  public:
-  LayoutFinder(std::span<const std::string_view> lines, ColumnMap map,
-               const std::string& source, bool choose)
+  LayoutFinder(const TextLines& lines, ColumnMap map, const std::string& source,
+               bool choose)
       : lines_(lines), source_(source), choose_(choose) {
     layout_.map = std::move(map);
   }
@@ -191,7 +200,7 @@ class LayoutFinder {
   void FindDirection();
   template <typename Take>
   void ForEachRow(const Take& take) const {
-    ForEachRecord(lines_, data_line_ - 1, layout_.map.separator,
+    ForEachRecord(lines_, data_line_, layout_.map.separator,
                   [&](std::size_t line, const Cells& cells) {
                     if (cells.size() == columns_.size()) {
                       take(line, cells);
@@ -200,7 +209,7 @@ class LayoutFinder {
                   });
   }
 
-  std::span<const std::string_view> lines_;
+  const TextLines& lines_;
   const std::string& source_;
   bool choose_;
   Layout layout_;
@@ -212,18 +221,23 @@ class LayoutFinder {
 };
 
 void LayoutFinder::FindSeparatorSign() {
-  std::vector<std::string_view> first;
-  for (std::size_t i = static_cast<std::size_t>(map().skip);
-       i < lines_.size() && first.size() < 50; ++i) {
-    if (lines_[i].starts_with("sep=") && first.empty()) {
-      map().separator = lines_[i].size() > 4 ? lines_[i][4] : ',';
-    } else if (!lines_[i].starts_with('#') &&
-               lines_[i].find_first_not_of(" \t\r") != std::string_view::npos) {
-      first.push_back(lines_[i]);
-    }
-  }
+  std::vector<std::string> first;
+  std::size_t bytes = 0;
+  lines_.ForEach(
+      [&](std::string_view line, std::size_t) {
+        if (line.starts_with("sep=") && first.empty()) {
+          map().separator = line.size() > 4 ? line[4] : ',';
+        } else if (!line.starts_with('#') &&
+                   line.find_first_not_of(" \t\r") != std::string_view::npos) {
+          first.emplace_back(line);
+          bytes += line.size();
+        }
+        return first.size() < 50 && bytes < kSampleCells;
+      },
+      static_cast<std::size_t>(map().skip) + 1);
   if (map().separator == '\0') {
-    map().separator = FindSeparator(first);
+    const std::vector<std::string_view> shown(first.begin(), first.end());
+    map().separator = FindSeparator(shown);
   }
 }
 
@@ -311,16 +325,42 @@ bool RowShape::IsHeader(const Record& record) const {
          (width == 1 || record.cells.size() > 1) && NamesColumns(record.cells);
 }
 
+// "Samples;720;720" and "X0;0.0;0.0" in front of the names are settings. Names
+// come behind them if nothing but values follows.
+template <typename At>
+void SkipSettings(std::vector<Record>& records, const RowShape& shape,
+                  At& names, At& data) {
+  const auto is_data = [&](const Record& r) { return shape.IsData(r); };
+  for (auto at = data; at + 1 < records.end(); ++at) {
+    const auto rows = records.end() - (at + 1);
+    if (rows > at - records.begin() && shape.IsHeader(*at) && is_data(at[1]) &&
+        10 * std::count_if(at + 1, records.end(), is_data) >= 9 * rows) {
+      names = at;
+      data = at + 1;
+      return;
+    }
+  }
+}
+
 // The header ends where the values begin: in the columns that hold numbers and
 // times in most rows, a row of the header holds something else. Its first row
 // with names that are not units counts; titles and comments in front have fewer
 // cells.
 bool LayoutFinder::FindHeader() {
   std::vector<Record> records;
-  ForEachRecord(lines_, static_cast<std::size_t>(map().skip), map().separator,
-                [&](std::size_t line, const Cells& cells) {
+  std::size_t count = 0;
+  ForEachRecord(lines_, static_cast<std::size_t>(map().skip) + 1,
+                map().separator, [&](std::size_t line, const Cells& cells) {
+                  if (cells.size() > kMaxColumns) {
+                    throw DataError(source_ + ":" + std::to_string(line) +
+                                    ": " + std::to_string(cells.size()) +
+                                    " columns; expected at most " +
+                                    std::to_string(kMaxColumns) +
+                                    "; try to export fewer tags at a time");
+                  }
                   records.push_back({line, cells});
-                  return records.size() < kSampleRows;
+                  count += cells.size();
+                  return records.size() < kSampleRows && count < kSampleCells;
                 });
   if (records.size() < 2) {
     return false;
@@ -342,6 +382,9 @@ bool LayoutFinder::FindHeader() {
   if (names == records.end()) {
     names = std::find_if(records.begin(), data,
                          [&](const Record& r) { return shape.IsHeader(r); });
+    if (names == data) {
+      SkipSettings(records, shape, names, data);
+    }
     if (names == data) {
       throw DataError(source_ + ":" + std::to_string(data->line) +
                       ": the first row holds values, not names: a header is "
@@ -443,6 +486,8 @@ void LayoutFinder::FindTimeColumn() {
     int score = 0;
     if (column.Mostly(column.dates)) {
       score = 40;
+    } else if (column.Mostly(column.clocks)) {
+      score = 15;  // Of a day that nothing says.
     } else if (column.Mostly(column.numbers) && !column.values.empty()) {
       const TimeForm form = TimeUnitOf(Name(c), column.values.front()).form;
       const auto backwards = static_cast<std::size_t>(std::ranges::count_if(
@@ -471,6 +516,12 @@ void LayoutFinder::FindTimeColumn() {
     }
   }
   time_ = time_ ? time_ : At(map().time_column);
+  // "Time (UTC)", "timestamp_utc"
+  if (time_ && map().zone.empty() &&
+      HasWord(' ' + PlainText(Name(*time_)) + ' ',
+              " utc |(utc)|[utc]|_utc |utc time|utctime|.utc | gmt |(gmt)")) {
+    map().zone = "UTC";
+  }
   CheckTimeColumns();
   clock_ = At(map().clock_column);
   if (!time_ || clock_ || !map().clock_column.empty() || rows_.empty() ||
@@ -724,12 +775,19 @@ void LayoutFinder::FindDecimal() {
   }
   const bool comma = decimal.empty() && !either.empty() &&
                      map().separator != ',' && !either.contains('.');
-  if (decimal.empty() && either.contains(',') && map().separator == ',') {
+  // In quotes, between commas: whoever wrote points would not need them.
+  const bool quoted = decimal.empty() && either.size() == 1 &&
+                      either.contains(',') && map().separator == ',';
+  if (quoted && choose_) {
+    layout_.choices["decimal"] =
+        "every number may have three decimals or thousands";
+  } else if (decimal.empty() && either.contains(',') &&
+             map().separator == ',') {
     RefuseSign(either.at(','), kUnknown);
   }
-  const char sign = !decimal.empty() ? decimal.begin()->first
-                    : comma          ? ','
-                                     : '.';
+  const char sign = !decimal.empty()  ? decimal.begin()->first
+                    : comma || quoted ? ','
+                                      : '.';
   const char other = sign == '.' ? ',' : '.';
   if (either.contains(other)) {
     RefuseSign(either.at(other), " seems to have a thousands separator");
@@ -740,7 +798,7 @@ void LayoutFinder::FindDecimal() {
 Signs LayoutFinder::FindSigns() const {
   Signs signs;
   ForEachRecord(
-      lines_, data_line_ - 1, layout_.map.separator,
+      lines_, data_line_, layout_.map.separator,
       [&](std::size_t line, const Cells& cells) {
         for (const std::string& whole : cells) {
           const bool has_unit =
@@ -866,7 +924,9 @@ void LayoutFinder::FindDirection() {
     std::string cell = row.cells[*time_];
     cell += clock_ ? ' ' + row.cells[*clock_] : "";
     auto at = AnyNumber(cell);
-    if (const auto time = ScanTime(cell, map().date_order)) {
+    if (const auto elapsed = ParseElapsed(cell)) {
+      at = elapsed->seconds;
+    } else if (const auto time = ScanTime(cell, map().date_order)) {
       std::tm fields = time->fields;
       at = static_cast<double>(timegm(&fields)) +
            1e-9 * static_cast<double>(time->fraction_ns);
@@ -885,16 +945,21 @@ void LayoutFinder::FindDirection() {
 }  // namespace
 
 void NumberRepeated(std::vector<std::string>& names) {
-  const std::vector<std::string> before = names;
-  for (std::size_t c = 0; c < names.size(); ++c) {
-    const auto same = [&](const std::string& name) {
-      return SameName(name, before[c]);
-    };
-    const auto self = before.begin() + static_cast<std::ptrdiff_t>(c);
-    const auto number = std::count_if(before.begin(), self, same) + 1;
-    if (number > 1 ||
-        std::find_if(self + 1, before.end(), same) != before.end()) {
-      names[c] += " (" + std::to_string(number) + ")";
+  const auto plain = [](std::string name) {
+    std::ranges::transform(name, name.begin(), [](unsigned char c) {
+      return static_cast<char>(std::tolower(c));
+    });
+    return name;
+  };
+  std::map<std::string, std::pair<int, int>> times;  // In all, and so far.
+  for (const std::string& name : names) {
+    ++times[plain(name)].first;
+  }
+  for (std::string& name : names) {
+    auto& [all, number] = times[plain(name)];
+    ++number;
+    if (all > 1) {
+      name += " (" + std::to_string(number) + ")";
     }
   }
 }
@@ -903,7 +968,7 @@ std::string UnnamedAs(const std::string& cell, std::size_t index) {
   return cell.empty() ? "column " + std::to_string(index + 1) : cell;
 }
 
-Layout FindLayout(std::span<const std::string_view> lines, ColumnMap map,
+Layout FindLayout(const TextLines& lines, ColumnMap map,
                   const std::string& source, bool choose) {
   return LayoutFinder(lines, std::move(map), source, choose).Find();
 }

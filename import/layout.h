@@ -1,11 +1,11 @@
 #pragma once
 
 #include <map>
-#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "base/text_lines.h"
 #include "import/csv.h"
 
 namespace fdi::importer {
@@ -28,8 +28,8 @@ struct Layout {
 /// @param choose what the evidence leaves open is chosen and named in
 ///   Layout::choices; otherwise it is left open, or refused.
 /// @throws DataError if there is no header, or if the decimal sign is
-///   ambiguous.
-Layout FindLayout(std::span<const std::string_view> lines, ColumnMap map,
+///   ambiguous; if there are more than 20 000 columns.
+Layout FindLayout(const TextLines& lines, ColumnMap map,
                   const std::string& source, bool choose);
 
 /// Names that occur more than once get numbers: "Value (1)", "Value (2)".

@@ -358,7 +358,12 @@ RawTable ReadToml(TomlReader& file, PlantTable& table) {
 }
 
 RawTable ReadCells(const std::string& text, const PlantTable& table) {
-  const std::vector<std::string_view> lines = LinesOf(text);
+  std::vector<std::string_view> lines;
+  for (std::string_view rest = text; !rest.empty();) {
+    const std::size_t end = std::min(rest.find('\n'), rest.size() - 1);
+    lines.push_back(rest.substr(0, end + (rest[end] == '\n' ? 0 : 1)));
+    rest.remove_prefix(end + 1);
+  }
   std::vector<std::string_view> first;
   for (const std::string_view line : lines) {
     if (!line.empty() && !line.starts_with('#') && first.size() < 50) {

@@ -153,10 +153,14 @@ std::optional<SignalQuality> QualityOf(std::string_view cell,
   switch (code) {
     case QualityCode::kUnknown:
       return std::nullopt;
-    case QualityCode::kOpcDa:
-      return *number >= 192  ? SignalQuality::kGood
-             : *number >= 64 ? SignalQuality::kUncertain
-                             : SignalQuality::kBad;
+    case QualityCode::kOpcDa: {
+      // Above the first byte are those of the vendor, and of OPC HDA whether
+      // the reading is raw or interpolated.
+      const std::uint32_t status = *number & 0xFFU;
+      return status >= 192  ? SignalQuality::kGood
+             : status >= 64 ? SignalQuality::kUncertain
+                            : SignalQuality::kBad;
+    }
     case QualityCode::kOpcUa:
       return kGrade[std::min(*number >> 30U, 2U)];
     case QualityCode::kConfidence:

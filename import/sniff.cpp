@@ -12,10 +12,10 @@
 
 #include "base/correlation.h"
 #include "base/error.h"
+#include "base/local_sense.h"
 #include "base/text.h"
 #include "base/usual_period.h"
 #include "import/layout.h"
-#include "import/local_sense.h"
 #include "import/tag_map.h"
 
 namespace fdi::importer {
@@ -68,13 +68,13 @@ constexpr RoleWords kRoleWords[] = {
      "command|demand|output|stellgr|stellwert|stellsig|stellbefehl|ansteuer|"
      "reglerausgang|sortie|salida|uscita|mando|sterow|sterujac|wyjsci|setpos|"
      "manipul|writevalue",
-     "|op|out|co|cv|mv|cmd|dem|ao|lmn|mn|yout|wyj|"},
+     "|op|out|co|cv|mv|cmd|dem|ao|lmn|mn|yout|ysoll|wyj|y|u|"},
     {Role::kPosition,
      "position|posizion|travel|stem|opening|offnung|oeffnung|stellung|"
      "ruckmeld|rueckmeld|ruckfuhr|rueckfuehr|feedback|readback|readvalue|"
      "recopie|ouverture|posicion|apertura|corsa|carrera|polozen|pozycj|"
-     "otwarci|hub|lift|skok|course",
-     "|x|pos|zt|zi|zit|gt|gi|zso|zsc|fb|fbk|rb|rbv|lmnr|"},
+     "otwarci|hub|lift|skok|course|posn",
+     "|x|pos|zt|zi|zit|gt|gi|zso|zsc|fb|fbk|rb|rbv|lmnr|vp|yist|xist|"},
     {Role::kLevel, "level|fullstand|niveau|nivel|livello|poziom",
      "|lt|li|lit|"},
     {Role::kTemperature, "temp", "|t1|"},
@@ -90,7 +90,7 @@ constexpr RoleWords kRoleWords[] = {
     {Role::kFlow,
      "flow|durchfl|menge|strom|debit|caudal|flujo|portata|przeplyw|natezeni|"
      "strumien",
-     ""},
+     "|q|qist|"},
 };
 /// What a valve is called, and a valve that flow has given its name to.
 constexpr std::string_view kValveWords =
@@ -169,9 +169,22 @@ NamedUnit UnitIn(const std::string& name) {
        at = name.find_first_of(" _", at + 1)) {
     std::string unit = name.substr(at + 1);
     std::ranges::replace(unit, '_', '/');
-    if (known(unit, false)) {
+    // Not "1]" of "[page 1]".
+    const bool cut = unit.find_first_of("[(") == std::string::npos &&
+                     unit.find_first_of("])") != std::string::npos;
+    if (!cut && known(unit, false)) {
       return {name.substr(0, at), unit};
     }
+  }
+  // "Y/%", "p1/kPa" (DIN 1313), "OUT%"
+  for (std::size_t at = name.find('/'); at != std::string::npos && at > 0;
+       at = name.find('/', at + 1)) {
+    if (known(name.substr(at + 1), false)) {
+      return {name.substr(0, at), name.substr(at + 1)};
+    }
+  }
+  if (name.size() > 1 && name.ends_with('%')) {
+    return {name.substr(0, name.size() - 1), "%"};
   }
   return {name, {}};
 }
@@ -179,6 +192,65 @@ NamedUnit UnitIn(const std::string& name) {
 bool HasDigit(const std::string& token) {
   return std::ranges::any_of(
       token, [](unsigned char c) { return std::isdigit(c) != 0; });
+}
+
+bool HasForm(std::string_view text, std::string_view form) {
+  for (std::size_t k = 0; k < form.size(); ++k) {
+    const auto c = static_cast<unsigned char>(k < text.size() ? text[k] : '\0');
+    if (form[k] == 'a' ? std::isalpha(c) == 0 : std::isdigit(c) == 0) {
+      return false;
+    }
+  }
+  return true;
+}
+
+// Of an equipment by KKS (VGB-B 105: 10LAB30AA101 is a valve, CF a flow) or by
+// the older AKZ (RL30S101, RL30F001). What comes behind a valve says which of
+// its signals it is: XQ01 is read from it, YQ01 written to it.
+std::optional<Role> RoleOfPlantCode(const std::vector<std::string>& tokens) {
+  struct Code {
+    std::string_view form;
+    std::size_t kind_at;
+    std::string_view kinds;
+    Role role;
+  };
+  static constexpr Code kCodes[] = {
+      {"aaa00aa000", 5, "|aa|", Role::kValve},
+      {"aaa00aa000", 5, "|cf|", Role::kFlow},
+      {"aaa00aa000", 5, "|cp|", Role::kPressure},
+      {"aaa00aa000", 5, "|ct|", Role::kTemperature},
+      {"aaa00aa000", 5, "|cl|", Role::kLevel},
+      {"aaa00aa000", 5, "|cg|", Role::kPosition},
+      {"aaa00aa000", 5, "|ap|an|ac|ae|cq|cs|cd|ce|", Role::kOther},
+      {"aa00a000", 4, "|s|", Role::kValve},
+      {"aa00a000", 4, "|f|", Role::kFlow},
+      {"aa00a000", 4, "|p|", Role::kPressure},
+      {"aa00a000", 4, "|t|", Role::kTemperature},
+      {"aa00a000", 4, "|l|", Role::kLevel}};
+  std::string joined;
+  for (const std::string& token : tokens) {
+    joined += token;
+  }
+  for (std::size_t at = 0; at < joined.size(); ++at) {
+    const std::string rest = joined.substr(at);
+    if (at > 0 &&
+        std::isalpha(static_cast<unsigned char>(joined[at - 1])) != 0) {
+      continue;
+    }
+    for (const Code& code : kCodes) {
+      const std::size_t letters = code.kind_at == 5 ? 2 : 1;
+      if (!HasForm(rest, code.form) ||
+          !IsToken(rest.substr(code.kind_at, letters), code.kinds)) {
+        continue;
+      }
+      const char behind = rest[std::min(code.form.size(), rest.size())];
+      return code.role != Role::kValve ? code.role
+             : behind == 'y'           ? Role::kCommand
+             : behind == 'x'           ? Role::kPosition
+                                       : Role::kValve;
+    }
+  }
+  return std::nullopt;
 }
 
 // The role of the letters of a tag by ISA 5.1 (Z position; Y relay or
@@ -195,6 +267,10 @@ std::optional<Role> RoleOfLetters(const std::string& letters) {
       std::string_view("fptl").find(letters.front()) !=
           std::string_view::npos) {
     return Role::kCommand;
+  }
+  // Functions of ISA 5.1: "tag" and "pump" are no tags.
+  if (letters.find_first_not_of("cdefghikqrstvxyz", 1) != std::string::npos) {
+    return std::nullopt;
   }
   switch (letters.front()) {
     case 'f':
@@ -216,6 +292,9 @@ std::optional<Role> RoleOfLetters(const std::string& letters) {
 // Of a tag, from its last part to its first: "fic" of "20.FIC101.PV", "fv" of
 // "AO_FV17". The part with the number of the loop comes first.
 std::optional<Role> RoleOfTag(const std::vector<std::string>& tokens) {
+  if (const auto role = RoleOfPlantCode(tokens)) {
+    return role;
+  }
   for (const bool numbered : {true, false}) {
     for (std::size_t i = tokens.size(); i-- > 0;) {
       const std::string letters = Letters(tokens[i]);
@@ -223,7 +302,8 @@ std::optional<Role> RoleOfTag(const std::vector<std::string>& tokens) {
       // an unknown one, and "pid1" a block of it.
       if (HasDigit(tokens[i]) != numbered || letters.empty() ||
           letters.size() > 4 || letters.starts_with("pid") ||
-          IsToken(letters, "|ai|ao|di|do|fb|daca|daci|") ||
+          IsToken(letters,
+                  "|ai|ao|di|do|fb|daca|daci|pct|plc|feed|test|zeit|") ||
           (letters == tokens[i] &&
            (IsToken(letters, "|pv|sv|") ||
             (tokens.size() > 1 &&
@@ -328,10 +408,11 @@ NameGuess RoleOf(const std::string& name, const std::string& about) {
     const std::string& token = tokens[i];
     const std::string letters = Letters(token);
     // "MV101" and "CV7" are valves, "51_03CV" is an attribute.
+    // So are "Y1" and "U2" units of a plant, and "Y" is the command.
     const bool numbered =
         token.size() > letters.size() &&
         std::isalpha(static_cast<unsigned char>(token.front())) != 0 &&
-        letters.ends_with('v');
+        (letters.ends_with('v') || (letters.size() == 1 && letters != "x"));
     for (const RoleWords& known : kRoleWords) {
       if (!IsToken(token, known.tokens) &&
           (numbered || !IsToken(letters, known.tokens))) {
@@ -346,6 +427,13 @@ NameGuess RoleOf(const std::string& name, const std::string& about) {
   }
   if (!tag && HasWord(plain, kValveWords)) {
     return {Role::kValve, false};
+  }
+  // What a card reads of a valve.
+  if (tag == Role::kValve &&
+      std::ranges::any_of(tokens, [](const std::string& token) {
+        return Letters(token) == "ai";
+      })) {
+    return {Role::kPosition, false};
   }
   return {tag, false};
 }
@@ -458,12 +546,12 @@ std::vector<std::string> DistinctParts(
       name.resize(name.size() - ending(name).size());
     }
   }
-  // "PV" of a valve is told by the tag in front of it.
+  // "PV" and "SP" are told by the tag in front of them.
   if (common(beginning)) {
     for (std::string& name : names) {
       const std::string tag = beginning(name);
-      if (!SameName(name.substr(tag.size()), "pv") ||
-          RoleOfTag(Tokens(PlainText(tag))) != Role::kValve) {
+      if (!IsToken(PlainText(name.substr(tag.size())), "|pv|sp|sv|") ||
+          !RoleOfTag(Tokens(PlainText(tag)))) {
         name.erase(0, tag.size());
       }
     }
@@ -532,17 +620,33 @@ bool FitsPercent(SniffedColumn& column) {
   return IsWithin(column, low, high);
 }
 
-// Whether the numbers are those of an analog card, 27648 at 100 %.
-bool AreCounts(const SniffedColumn& column) {
-  return std::ranges::all_of(column.values,
-                             [](double v) { return v == std::floor(v); }) &&
-         IsWithin(column, -5000.0, 33000.0) &&
-         !IsWithin(column, -5000.0, 2000.0);
+// What cards and registers have at 100 %: tenths and hundredths of a per cent,
+// 12, 15 and 16 bits, and the 27648 of Siemens.
+constexpr double kFullScales[] = {1000.0,  4095.0,  10000.0,
+                                  27648.0, 32767.0, 65535.0};
+
+// The counts at 100 % of an analog card: the smallest usual ones that the
+// readings fit; nothing if the numbers are no counts.
+std::optional<double> FullScale(const SniffedColumn& column) {
+  if (!std::ranges::all_of(column.values,
+                           [](double v) { return v == std::floor(v); }) ||
+      IsWithin(column, -15.0, 115.0)) {
+    return std::nullopt;
+  }
+  for (const double full : kFullScales) {
+    if (IsWithin(column, -0.1 * full, 1.1 * full)) {
+      return full;
+    }
+  }
+  return std::nullopt;
 }
 
 // Whether most values fit a signal in a unit, or without one; sets unit, raw
 // and span. Most, because a few states and outliers are in every export.
-bool FitsSignal(SniffedColumn& column, Signal signal, const std::string& unit) {
+//
+// @param full the counts at 100 %, if the table has counts; else 0.
+bool FitsSignal(SniffedColumn& column, Signal signal, const std::string& unit,
+                double full) {
   const double median = std::abs(column.Quantile(0.5));
   column.unit = unit;
   column.raw.clear();
@@ -551,15 +655,16 @@ bool FitsSignal(SniffedColumn& column, Signal signal, const std::string& unit) {
   if (!unit.empty() && !current && !FindUnit(signal, unit)) {
     return false;
   }
-  const bool counts = unit.empty() && AreCounts(column);
+  const bool counts = full > 0.0 && unit.empty() && FullScale(column);
   if (IsPercent(signal) && !counts) {
     return FitsPercent(column);
   }
   if (current || counts) {
-    column.raw = current ? std::vector{4.0, 20.0} : std::vector{0.0, 27648.0};
+    column.raw = current ? std::vector{4.0, 20.0} : std::vector{0.0, full};
     if (IsPercent(signal)) {
       column.unit = "%";
-      Say(column, "counts of an analog card, 27648 at 100 %");
+      Say(column, "counts of an analog card; " + NumberText(full) +
+                      " at 100 % is the smallest usual range that they fit");
       return true;
     }
     column.span = {0.0, 100.0};
@@ -572,7 +677,7 @@ bool FitsSignal(SniffedColumn& column, Signal signal, const std::string& unit) {
   if (unit.empty()) {
     const bool pressure =
         signal != Signal::kF && signal != Signal::kT1 && signal != Signal::kCvi;
-    column.unit = signal == Signal::kF ? "m3/h"
+    column.unit = signal == Signal::kF ? (median > 2e3 ? "kg/h" : "m3/h")
                   : signal == Signal::kT1
                       ? (median > 250.0 && median < 450.0 ? "K" : "degC")
                   : pressure ? (median > 2e4     ? "Pa"
@@ -699,6 +804,7 @@ class SignalGuess {
 
   void Guess() {
     GuessNames();
+    SettleControllers();
     SettleValves();
     SettlePressures();
     for (std::size_t i = 0; i < kSignalCount; ++i) {
@@ -720,6 +826,9 @@ class SignalGuess {
   }
   void GuessNames();
   void GuessName(SniffedColumn& column, const std::string& part);
+  void FindCounts(const std::vector<SniffedColumn*>& numbers,
+                  const std::vector<std::string>& parts);
+  void SettleControllers();
   bool TakeKnown(SniffedColumn& column, const std::string& unit);
   void SettleValves();
   void SettlePressures();
@@ -731,6 +840,7 @@ class SignalGuess {
   std::vector<SniffedColumn*> valves_;  // Command or position.
   std::vector<SniffedColumn*> sure_;    // By a word or the contract.
   std::vector<SniffedColumn*> sides_;   // In front of the valve, by a word.
+  double full_{0.0};                    // Counts at 100 %; 0: no counts.
 };
 
 void SignalGuess::GuessNames() {
@@ -743,8 +853,23 @@ void SignalGuess::GuessNames() {
     }
   }
   const std::vector<std::string> parts = DistinctParts(numbers);
+  FindCounts(numbers, parts);
   for (std::size_t i = 0; i < numbers.size(); ++i) {
     GuessName(*numbers[i], parts[i]);
+  }
+}
+
+// Command and position come over one kind of card: a flow of whole numbers
+// beside percentages is no count.
+void SignalGuess::FindCounts(const std::vector<SniffedColumn*>& numbers,
+                             const std::vector<std::string>& parts) {
+  for (std::size_t i = 0; i < numbers.size(); ++i) {
+    const auto role = RoleOf(UnitIn(parts[i]).rest, numbers[i]->about).role;
+    const auto signal = role ? SignalOf(*role) : std::nullopt;
+    if ((signal == Signal::kCv || signal == Signal::kX) &&
+        StatedUnit(*numbers[i]).empty()) {
+      full_ = std::max(full_, FullScale(*numbers[i]).value_or(0.0));
+    }
   }
 }
 
@@ -782,11 +907,13 @@ void SignalGuess::GuessName(SniffedColumn& column, const std::string& part) {
   }
   if (IsGasUnit(unit)) {
     Say(column, "a flow of gas at standard conditions, which needs molar_mass");
+    column.unit = unit;
     found_.findings.push_back(
         column.name +
         " is a flow of gas at standard conditions, which becomes t/h by the "
         "molar mass: state [signal.F] with column, unit and molar_mass = 28.96 "
-        "(air; kg/kmol), and onboard with a --type of that gas. Without it F "
+        "(air; kg/kmol; the map that sniff writes has these lines, to be "
+        "uncommented), and onboard with a --type of that gas. Without it F "
         "is left out; CV and X still show what the rod does");
     return;
   }
@@ -808,7 +935,7 @@ void SignalGuess::GuessName(SniffedColumn& column, const std::string& part) {
     return;
   }
   const Signal signal = *SignalOf(*role);
-  if (!FitsSignal(column, signal, unit)) {
+  if (!FitsSignal(column, signal, unit, full_)) {
     column.unit.clear();
     column.raw.clear();
     column.guessed = std::string(SignalName(signal)) +
@@ -823,6 +950,25 @@ void SignalGuess::GuessName(SniffedColumn& column, const std::string& part) {
     valves_.push_back(&column);
   } else if (guess.by_word) {
     sure_.push_back(&column);
+  }
+}
+
+// "FC7" beside "FI7" is the output of the controller, where there is no other.
+void SignalGuess::SettleControllers() {
+  const auto flows = Of(Signal::kF);
+  if (!Of(Signal::kCv).empty() || !valves_.empty() || flows.size() != 2) {
+    return;
+  }
+  for (SniffedColumn* column : flows) {
+    SniffedColumn output = *column;
+    if (IsController(column->name) && StatedUnit(*column).empty() &&
+        !HasToken(Tokens(PlainText(column->name)), "|pv|") &&
+        FitsSignal(output, Signal::kCv, "", full_)) {
+      *column = std::move(output);
+      column->signal = Signal::kCv;
+      column->guessed = "a controller beside its flow: likely its output";
+      return;
+    }
   }
 }
 
@@ -1094,10 +1240,13 @@ std::vector<std::size_t> AboutColumns(const Layout& layout) {
   return columns;
 }
 
+// Cells that the guesses rest on; their times and values take 16 bytes each.
+constexpr std::size_t kMaxCells = 4'000'000;
+
 // The columns of a wide table or the tags of a long one, through the reader of
 // the importer.
-void ReadColumns(const std::vector<std::string_view>& lines,
-                 const Layout& layout, const std::string& source,
+void ReadColumns(const TextLines& lines, const Layout& layout,
+                 const std::string& source,
                  const std::vector<ColumnMapping>& given, Sniffed& found) {
   CsvReader reader({.source = source, .map = layout.map, .scan = true});
   std::map<std::string, SniffedColumn> tags;
@@ -1123,9 +1272,19 @@ void ReadColumns(const std::vector<std::string_view>& lines,
       found.columns.push_back({.name = names[c], .about = layout.about[c]});
     }
   }
+  std::size_t kept = 0;
   ForEachRow(lines, reader, [&](CsvRow&& row) {
     const std::vector<std::string>& cells = reader.cells();
+    ++found.rows;
+    if (kept > kMaxCells) {
+      return;
+    }
+    kept += tall ? 1 : columns.size();
     times.push_back(row.t_s);
+    if (tall && !tags.contains(cells[tag]) && tags.size() >= kMaxColumns) {
+      reader.Refuse("more than " + std::to_string(kMaxColumns) +
+                    " tags; try to export fewer at a time");
+    }
     if (tall) {
       SniffedColumn& column = tags[cells[tag]];
       for (const std::size_t c : abouts) {
@@ -1154,7 +1313,6 @@ void ReadColumns(const std::vector<std::string_view>& lines,
       }
     }
   }
-  found.rows = times.size();
   found.dated = reader.dated();
   found.time = reader.time_unit();
   SignalGuess(found).Guess();
@@ -1278,7 +1436,7 @@ std::string SignalToml(const ColumnMap& map, const SniffedColumn& column) {
 }
 
 // What the importer makes of the table with the guessed signals.
-void ReadWith(std::string_view text, const std::string& source,
+void ReadWith(const TextLines& lines, const std::string& source,
               Sniffed& found) {
   CsvOptions options{
       .source = source, .map = found.map, .required = 0, .split_gaps = true};
@@ -1313,7 +1471,7 @@ void ReadWith(std::string_view text, const std::string& source,
     options.map.columns.push_back(mapping);
   }
   try {
-    const CsvTable table = ReadCsv(text, options);
+    const CsvTable table = ReadCsv(lines, options);
     for (const std::string& note : table.notes) {
       found.findings.push_back(note);
     }
@@ -1342,7 +1500,11 @@ double SniffedColumn::Quantile(double share) const {
 }
 
 Sniffed Sniff(std::string_view text, const std::string& source, ColumnMap map) {
-  const std::vector<std::string_view> lines = LinesOf(text);
+  return Sniff(TextLines(text, source), source, std::move(map));
+}
+
+Sniffed Sniff(const TextLines& lines, const std::string& source,
+              ColumnMap map) {
   const std::vector<ColumnMapping> given = map.columns;
   Layout layout = FindLayout(lines, std::move(map), source, true);
   layout.map.columns.clear();
@@ -1374,7 +1536,7 @@ Sniffed Sniff(std::string_view text, const std::string& source, ColumnMap map) {
                             " stand where numbers were expected, and are taken "
                             "as no readings");
   }
-  ReadWith(text, source, found);
+  ReadWith(lines, source, found);
   return found;
 }
 
@@ -1402,6 +1564,10 @@ std::string MapText(const Sniffed& found, const std::string& file) {
   for (const SniffedColumn& column : found.columns) {
     if (column.signal) {
       text += SignalToml(found.map, column);
+    } else if (IsGasUnit(column.unit)) {
+      text += "\n# [signal.F]\n# column = " + TomlText(column.name) +
+              "\n# unit = " + TomlText(column.unit) +
+              "\n# molar_mass = 28.96  # air [kg/kmol]; that of the gas\n";
     }
   }
   return text;

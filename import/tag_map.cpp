@@ -127,6 +127,15 @@ std::string Plain(std::string_view name) {
        {"pct", "percent", "prozent", "%open", "%opening", "%auf"}) {
     plain = SameName(plain, percent) ? "%" : plain;
   }
+  static constexpr std::pair<std::string_view, std::string_view> kSpellings[] =
+      {{"tph", "t/h"},   {"to/h", "t/h"},    {"te/h", "t/h"},
+       {"kgph", "kg/h"}, {"pph", "lb/h"},    {"kpph", "klb/h"},
+       {"lpm", "l/min"}, {"lps", "l/s"},     {"lph", "l/h"},
+       {"m3ph", "m3/h"}, {"cmh", "m3/h"},    {"cbm/h", "m3/h"},
+       {"usgpm", "gpm"}, {"celsius", "degC"}};
+  for (const auto& [spelling, unit] : kSpellings) {
+    plain = SameName(plain, spelling) ? unit : plain;
+  }
   return plain;
 }
 
@@ -270,6 +279,7 @@ constexpr TimeName kTimeNames[] = {{"s", {TimeForm::kElapsed, 1.0}},
                                    {"jd", {TimeForm::kJulian, 1.0}},
                                    {"mjd", {TimeForm::kModifiedJulian, 1.0}},
                                    {"text", {TimeForm::kText, 1.0}},
+                                   {"clock", {TimeForm::kClock, 1.0}},
                                    {"auto", {TimeForm::kFindOut, 1.0}}};
 
 DateOrder ParseDateOrder(const std::string& text) {
@@ -385,6 +395,9 @@ std::pair<std::string_view, std::string_view> SplitUnit(std::string_view cell) {
 }
 
 bool IsUnit(std::string_view name) {
+  if (SameName(name, "mA")) {
+    return true;  // Of any signal, over a span.
+  }
   for (std::size_t i = 0; i < kSignalCount; ++i) {
     if (FindUnit(static_cast<Signal>(i), name)) {
       return true;

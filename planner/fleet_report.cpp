@@ -77,7 +77,8 @@ std::string QualityText(const std::string& quality) {
       {"INHIBITED", "its loop was not in automatic"},
       {"UNCOVERED", "it worked where its model set was not trained"},
       {"MODEL_UNSUITED", "its model set no longer fits it"},
-      {"UNASSIGNED", "it has no model set"},
+      {"UNASSIGNED",
+       "it has no model set, and no window of its loop was judged"},
   }};
   for (const auto& [name, text] : kTexts) {
     if (quality == name) {

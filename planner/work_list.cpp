@@ -14,6 +14,7 @@
 #include "base/time_units.h"
 #include "diagnosis/fault_catalogue.h"
 #include "report/text_table.h"
+#include "storage/history/certainty.h"
 #include "storage/history/health.h"
 
 namespace fdi::planner {
@@ -61,8 +62,9 @@ std::string FaultText(const FaultReason& reason, const WorkOptions& options) {
     text += ", not confirmed for " + SpanText(now_ns - *reason.unconfirmed_ns);
   }
   text += ", severity " + std::string(SeverityName(reason.words.severity));
-  if (reason.strength != 0.0) {
-    text += " at strength " + report::FormatNumber(reason.strength, 2);
+  if (const double percent = std::round(100.0 * reason.strength);
+      percent != 0.0) {
+    text += ", strength " + report::FormatNumber(percent, 0) + " %";
   }
   if (reason.episodes > 1) {
     text += ", " + std::to_string(reason.episodes) + " episodes";
@@ -93,7 +95,17 @@ std::string TrendText(const LimitTrend& trend) {
          ForecastText(trend.forecast);
 }
 
-// A reason of either kind, with its weight.
+// "Dead band of the valve: 1.40 over the last day, accepted up to 1.00"
+std::string FigureText(const FigureReason& reason) {
+  const report::FigureText& text = reason.text;
+  const bool low = text.lowest && reason.value < *text.lowest;
+  return text.name + ": " + report::FormatNumber(reason.value, 2) +
+         " over the last day, accepted " +
+         (low ? "from " + report::FormatNumber(*text.lowest, 2)
+              : "up to " + report::FormatNumber(*text.highest, 2));
+}
+
+// A reason of any kind, with its weight.
 struct WeightedText {
   double weight;
   std::string text;
@@ -111,6 +123,9 @@ std::vector<WeightedText> TextsOf(const ValveWork& work,
   for (const ChannelDrift& drift : work.drifts) {
     texts.push_back({WeightOf(drift, options), DriftText(drift)});
   }
+  for (const FigureReason& figure : work.figures) {
+    texts.push_back({WeightOf(figure, options), FigureText(figure)});
+  }
   return texts;
 }
 
@@ -124,10 +139,12 @@ double ScoreOf(const ValveWork& work, const WorkOptions& options) {
   return most + kOtherReasons * (sum - most);
 }
 
+constexpr const char* kUnknown = "unknown";
+
 // The fault of an episode according to its label, or else its diagnosis.
 std::string FaultOf(const Episode& episode) {
   const std::string label = episode.label.value_or("");
-  return ParseFault(label) ? label : episode.fault.value_or("unknown");
+  return ParseFault(label) ? label : episode.fault.value_or(kUnknown);
 }
 
 // How often labels in the plant confirmed or contradicted one diagnosis.
@@ -146,7 +163,7 @@ std::map<std::string, Record> RecordsOf(const std::vector<Episode>& episodes) {
     if (episode.label) {
       // Counted by what was diagnosed, not by what the label says: the record
       // is one of the diagnosis.
-      Record& record = records[episode.fault.value_or("unknown")];
+      Record& record = records[episode.fault.value_or(kUnknown)];
       const bool right =
           *episode.label == "true" || *episode.label == episode.fault;
       ++(right ? record.right : record.wrong);
@@ -168,6 +185,13 @@ void AddEpisode(const Episode& episode, const report::FaultTexts& texts,
   place->words =
       texts.Words(fault, episode.strength,
                   fault == episode.fault ? episode.priority : std::nullopt);
+  place->named = fault != kUnknown ||
+                 storage::CertaintyOf(episode) == Certainty::kNotKnown;
+  if (!place->named) {
+    place->words.name = episode.ended_ns && !episode.unconfirmed_ns
+                            ? "Fault that ended before it had a name"
+                            : "Fault without a name yet";
+  }
   place->strength = episode.strength;
   place->factor = episode.peak_factor;
   ++place->episodes;
@@ -205,7 +229,57 @@ std::vector<Episode> EpisodesOf(storage::History& history,
   return episodes;
 }
 
-void AddHealth(const std::vector<HealthHour>& hours, const WorkQuery& query,
+// Of how many events a figure is the mean; a share of the time needs none.
+std::int64_t EventsOf(loop::Figure figure, const loop::ValveCounts& counts) {
+  switch (figure) {
+    case loop::Figure::kAtLimit:
+      return std::numeric_limits<std::int64_t>::max();
+    case loop::Figure::kSlipJump:
+      return counts.slips;
+    case loop::Figure::kDeadBand:
+      return counts.turns;
+    case loop::Figure::kErrorBand:
+      return std::min(counts.opening, counts.closing);
+    case loop::Figure::kDelay:
+    case loop::Figure::kT63:
+    case loop::Figure::kT86:
+    case loop::Figure::kOvershoot:
+    case loop::Figure::kTravelGain:
+      break;
+  }
+  return counts.steps;
+}
+
+// The figures beyond their limits in the last day with this equipment. One
+// event may be chance.
+std::vector<FigureReason> FiguresOf(const std::vector<HealthHour>& hours,
+                                    const report::FaultTexts& texts) {
+  constexpr std::int64_t kDayHours = 24;
+  constexpr std::int64_t kFewest = 5;
+  loop::ValveCounts counts;
+  std::int64_t seen_ms = 0;
+  for (const HealthHour& hour : hours) {
+    if (hour.epoch == hours.back().epoch &&
+        hour.hour > hours.back().hour - kDayHours) {
+      counts.Add(hour.counts);
+      seen_ms += hour.seen_ms;
+    }
+  }
+  std::vector<FigureReason> reasons;
+  for (std::size_t i = 0; i < loop::kFigureCount; ++i) {
+    const auto figure = static_cast<loop::Figure>(i);
+    const auto value = loop::FigureOf(figure, counts, seen_ms);
+    if (value && EventsOf(figure, counts) >= kFewest &&
+        texts.Of(figure).Exceeded(*value)) {
+      reasons.push_back(
+          {texts.Of(figure), *value, hours.back().hour * kNsPerHour});
+    }
+  }
+  return reasons;
+}
+
+void AddHealth(const std::vector<HealthHour>& hours,
+               const report::FaultTexts& texts, const WorkQuery& query,
                ValveWork& work) {
   if (hours.empty()) {
     return;
@@ -227,6 +301,7 @@ void AddHealth(const std::vector<HealthHour>& hours, const WorkQuery& query,
   work.monitor = hours.back().monitor;
   work.trends = TrendsOf(hours, query.limits);
   work.drifts = DriftsOf(hours);
+  work.figures = FiguresOf(hours, texts);
 }
 
 void RequireDiscipline(const std::string& discipline) {
@@ -258,18 +333,25 @@ Json RowJson(const WorkRow& row) {
   }
   if (!work.faults.empty()) {
     const FaultReason& fault = work.faults.front();
-    json.update({{"fault", fault.fault},
-                 {"name", fault.words.name},
-                 {"discipline", fault.words.discipline},
-                 {"namur", NamurName(fault.words.namur)},
-                 {"severity", SeverityName(fault.words.severity)},
-                 {"check", fault.words.check},
-                 {"strength", SixDigits(fault.strength)},
-                 {"open", !fault.ended_ns},
-                 {"episodes", fault.episodes},
-                 {"episode_id", fault.episode_id},
-                 {"detected_utc", FormatTime(fault.detected_ns, true)},
-                 {"confirmed", fault.confirmed}});
+    json.update(
+        {{"fault", fault.named ? Json(fault.fault) : Json()},
+         {"name", fault.words.name},
+         {"discipline", fault.words.discipline},
+         {"namur", NamurName(fault.words.namur)},
+         {"severity", SeverityName(fault.words.severity)},
+         {"check", fault.words.check},
+         {"strength", fault.named ? Json(SixDigits(fault.strength)) : Json()},
+         {"open", !fault.ended_ns},
+         {"episodes", fault.episodes},
+         {"episode_id", fault.episode_id},
+         {"detected_utc", FormatTime(fault.detected_ns, true)},
+         {"confirmed", fault.confirmed}});
+  } else if (!work.figures.empty()) {
+    const report::FigureText& text = work.figures.front().text;
+    json.update({{"name", text.name},
+                 {"discipline", DisciplineName(text.discipline)},
+                 {"namur", NamurName(text.namur)},
+                 {"check", text.check}});
   }
   json["trends"] = TrendsJson(work.trends);
   json["travel_strokes"] = SixDigits(work.travel_strokes);
@@ -290,6 +372,10 @@ std::string RowText(const WorkRow& row) {
   if (!work.faults.empty()) {
     const report::FaultWords& words = work.faults.front().words;
     text += "\n   " + words.discipline + ": " + words.check;
+  } else if (!work.figures.empty()) {
+    const report::FigureText& figure = work.figures.front().text;
+    text.append("\n   ").append(DisciplineName(figure.discipline));
+    text += ": " + figure.check;
   }
   if (work.service_hours > 0.0) {
     text += "\n   " + report::FormatNumber(work.travel_strokes, 0) +
@@ -329,6 +415,10 @@ double WeightOf(const FaultReason& reason, const WorkOptions& options) {
 
 double WeightOf(const ChannelDrift& drift, const WorkOptions& options) {
   return SeverityPoints(Severity::kLow) * Fading(drift.last_ns, options);
+}
+
+double WeightOf(const FigureReason& figure, const WorkOptions& options) {
+  return SeverityPoints(Severity::kLow) * Fading(figure.last_ns, options);
 }
 
 double WeightOf(const LimitTrend& reason, const WorkOptions& options) {
@@ -405,7 +495,8 @@ std::vector<WorkRow> ReadWorkList(storage::History& history,
   // what speaks against a diagnosis.
   const std::map<std::string, Record> records = RecordsOf(episodes);
   for (const std::string& valve : history.HealthValves(query.valve_glob)) {
-    AddHealth(history.Health({valve, query.since_ns}), query, valves[valve]);
+    AddHealth(history.Health({valve, query.since_ns}), texts, query,
+              valves[valve]);
   }
   std::vector<ValveWork> work;
   for (auto& [valve, facts] : valves) {
@@ -422,6 +513,9 @@ std::vector<WorkRow> ReadWorkList(storage::History& history,
       // A limit or a drift belongs to no discipline.
       facts.trends.clear();
       facts.drifts.clear();
+      std::erase_if(facts.figures, [&query](const FigureReason& reason) {
+        return query.discipline != DisciplineName(reason.text.discipline);
+      });
     }
     work.push_back(std::move(facts));
   }

@@ -17,7 +17,9 @@ namespace fdi::planner {
 /// A reason to inspect a valve: one diagnosed fault, with all its episodes in
 /// the period.
 struct FaultReason {
-  std::string fault;  ///< As in fault_history, or from a label.
+  /// As in fault_history, or from a label; "unknown" also without a name yet.
+  std::string fault;
+  bool named{true};  ///< False: too early for a name, or over before it.
   report::FaultWords words;
   double strength{0.0};   ///< Estimated, in the newest episode.
   double factor{0.0};     ///< Peak factor of that episode.
@@ -35,12 +37,20 @@ struct FaultReason {
   std::int64_t last_ns{0};
 };
 
+/// A figure that was beyond its limit over the last day of the valve.
+struct FigureReason {
+  report::FigureText text;
+  double value{0.0};        ///< In its own unit, over that day.
+  std::int64_t last_ns{0};  ///< The newest hour.
+};
+
 /// Everything known of one valve.
 struct ValveWork {
   std::string valve_id;
   std::vector<FaultReason> faults;
   std::vector<LimitTrend> trends;
   std::vector<ChannelDrift> drifts{};
+  std::vector<FigureReason> figures{};
   /// Since the equipment was last replaced or repaired (its epoch).
   double travel_strokes{0.0};
   double service_hours{0.0};
@@ -76,7 +86,8 @@ struct WorkOptions {
 /// diagnosis. U urgency: 1 while the episode lasts or the limit is reached; it
 /// halves every half_life_days after the end; a limit in t days has 1 −
 /// t/horizon_days. R repetition: 1 + 0.1 per further episode, at most 2. A
-/// drift is low and halves like the end of an episode from its newest hour on.
+/// drift, and a figure beyond its limit, is low and halves like the end of an
+/// episode from its newest hour on.
 /// The score of a valve is its largest weight plus a quarter of the others.
 std::vector<WorkRow> RankWork(std::vector<ValveWork> valves,
                               const WorkOptions& options);
@@ -90,6 +101,7 @@ double ConfidenceOf(const FaultReason& reason);
 double WeightOf(const FaultReason& reason, const WorkOptions& options);
 double WeightOf(const LimitTrend& trend, const WorkOptions& options);
 double WeightOf(const ChannelDrift& drift, const WorkOptions& options);
+double WeightOf(const FigureReason& figure, const WorkOptions& options);
 
 /// The reasons in words, in order of decreasing weight.
 std::string ReasonText(const ValveWork& work, const WorkOptions& options);
@@ -117,8 +129,9 @@ std::vector<WorkRow> ReadWorkList(storage::History& history,
 /// "episode_id", "detected_utc", "confirmed", "trends": TrendsJson(),
 /// "travel_strokes", "service_hours", "live_share", "last_utc"}]}, for people
 /// as sentences. `fault` to `confirmed` are those of the weightiest fault; null
-/// where there is none. Rows of the plant's history also have "host" and
-/// "monitor".
+/// where there is none; "name", "discipline", "namur" and "check" are then
+/// those of the first figure beyond its limit. Rows of the plant's history also
+/// have "host" and "monitor".
 report::Report WorkListReport(std::span<const WorkRow> rows);
 
 }  // namespace fdi::planner

@@ -10,7 +10,9 @@
 #include <CLI/CLI.hpp>
 #include <toml++/toml.h>
 
+#include "base/error.h"
 #include "base/suggestion.h"
+#include "base/toml_limits.h"
 #include "fdi_version_config.h"
 
 namespace fdi::report {
@@ -198,7 +200,11 @@ class TomlConfig : public CLI::Config {
 
 std::vector<CLI::ConfigItem> TomlConfig::from_config(std::istream& in) const {
   try {
-    const toml::table table = toml::parse(in);
+    std::string text(kMaxTomlBytes + 1, '\0');
+    in.read(text.data(), static_cast<std::streamsize>(text.size()));
+    text.resize(static_cast<std::size_t>(in.gcount()));
+    CheckTomlLimits(text, "");
+    const toml::table table = toml::parse(text);
     std::vector<CLI::ConfigItem> result;
     std::vector<std::string> parents;
     Collect(root_, table, parents, result);
@@ -208,6 +214,8 @@ std::vector<CLI::ConfigItem> TomlConfig::from_config(std::istream& in) const {
     message << "line " << error.source().begin.line << ", column "
             << error.source().begin.column << ": " << error.description();
     throw CLI::ConfigError(message.str());
+  } catch (const fdi::ConfigError& error) {
+    throw CLI::ConfigError("line " + std::string(error.what()).substr(1));
   }
 }
 

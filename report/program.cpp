@@ -23,6 +23,7 @@
 #include "base/text.h"
 #include "report/help.h"
 #include "report/logging.h"
+#include "report/output_patience.h"
 
 namespace fdi::report {
 namespace {
@@ -346,6 +347,7 @@ int Program::RunVerb(int argc, const char* const* argv) {
 }
 
 int Program::Print(const Report& report) const {
+  const OutputPatience patience;
   if (options_.json) {
     report.PrintJson(std::cout);
   } else if (csv_) {
@@ -353,6 +355,7 @@ int Program::Print(const Report& report) const {
   } else {
     report.PrintText(std::cout, {StdoutStyle(), options_.utc});
   }
+  std::cout.flush();
   return report.exit_code;
 }
 

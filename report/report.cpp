@@ -119,11 +119,11 @@ dt{font-weight:600}dd{margin:0}
 .quiet{color:#767676}
 .good{background:#cce3f0}.warning{background:#fae7bf}.alarm{background:#f6d0bb;font-weight:600}
 svg{max-width:100%;height:auto;font-family:"DejaVu Sans",Verdana,sans-serif}
-@media screen and (max-width:45em){th{white-space:normal}}
+@media screen and (max-width:45em){th,td:not(.number){white-space:normal}td.wrap{min-width:10em}.blanks td{width:100%;min-width:0}}
 @media screen and (prefers-color-scheme:dark){body{background:#161616;color:#ddd}a{color:#56b4e9}th,td{border-color:#333}.quiet{color:#8c8c8c}.good{background:#123a52}.warning{background:#4d3a10}.alarm{background:#5c2a10}}
 @media print{:root{color-scheme:light}body{margin:0;padding:0;max-width:none;font-size:10pt;print-color-adjust:exact;-webkit-print-color-adjust:exact}
 table,dl{font-size:8pt}th,td{white-space:normal;padding:2px 5px}td.wrap{min-width:0}.scroll{overflow:visible}
-h1,h2,h3{break-after:avoid}tr,li,svg,dl{break-inside:avoid}.checks{break-before:avoid}svg{max-height:230mm}h2{margin-top:1.2em}.blanks td{width:100%;min-width:0}.blanks th{white-space:nowrap}a{color:inherit;text-decoration:none}}
+h1,h2,h3{break-after:avoid}tr,li,svg,dl{break-inside:avoid}.checks{break-before:avoid}svg{max-height:230mm}h2{margin-top:.9em}.checks li{margin:.25em 0}.blanks td{width:100%;min-width:0;height:1.6em}.blanks th{white-space:nowrap}a{color:inherit;text-decoration:none}}
 )";
 
 std::string HtmlText(std::string_view text) {

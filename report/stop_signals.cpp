@@ -15,6 +15,8 @@
 #include <sys/time.h>
 #include <unistd.h>
 
+#include "report/output_patience.h"
+
 namespace fdi::report {
 namespace {
 
@@ -86,6 +88,14 @@ void SetAlarm(std::int64_t after_ms) noexcept {
   setitimer(ITIMER_REAL, &timer, nullptr);
 }
 
+void SetAlarmHandler(bool ends) noexcept {
+  struct sigaction action {};
+  action.sa_flags = SA_RESTART;
+  sigemptyset(&action.sa_mask);
+  action.sa_handler = ends ? &FdiOnAlarm : SIG_DFL;
+  sigaction(SIGALRM, &action, nullptr);
+}
+
 extern "C" void FdiOnSignal(int signal) {
   if (signal == SIGHUP) {
     // Kernel and shell may both send it when a terminal is closed.
@@ -143,12 +153,8 @@ void StopSignals::EndWithin(std::chrono::milliseconds patience,
                             const char* last_words) {
   g_last_words = last_words;
   g_patience_ms = patience.count();
-  struct sigaction action {};
-  action.sa_flags = SA_RESTART;
-  sigemptyset(&action.sa_mask);
-  action.sa_handler = patience.count() > 0 ? &FdiOnAlarm : SIG_DFL;
   SetAlarm(0);
-  sigaction(SIGALRM, &action, nullptr);
+  SetAlarmHandler(patience.count() > 0);
   if (g_stop && patience.count() > 0) {
     SetAlarm(patience.count());
   }
@@ -200,6 +206,21 @@ StopSignals::Event StopSignals::WaitFor(std::chrono::milliseconds timeout) {
 
 int StopSignals::descriptor() const noexcept {
   return g_event;
+}
+
+OutputPatience::OutputPatience() {
+  if (g_stop) {
+    g_last_words = "";
+    SetAlarmHandler(true);
+    SetAlarm(1000);
+  }
+}
+
+OutputPatience::~OutputPatience() {
+  if (g_stop) {
+    SetAlarm(0);
+    SetAlarmHandler(false);
+  }
 }
 
 }  // namespace fdi::report

@@ -179,4 +179,13 @@ ProcessInputs InventoryLoop::Next(const FlowOfPressures& flow) {
   return last_;
 }
 
+InventoryLoopExcitation InventoryLoopOf(const Medium& medium) {
+  constexpr double kLiquidC = 43.0;  // As in the other excitations.
+  InventoryLoopExcitation loop;
+  if (!medium.is_gas()) {
+    loop.t1_degc = kLiquidC;
+  }
+  return loop;
+}
+
 }  // namespace fdi::simulator

@@ -4,6 +4,7 @@
 
 #include "simulator/excitation.h"
 #include "simulator/random.h"
+#include "simulator/valve_parameters.h"
 
 namespace fdi::simulator {
 
@@ -110,5 +111,9 @@ class InventoryLoop final : public Excitation {
   ProcessInputs last_;
   bool held_{false};
 };
+
+/// The default loop at a temperature at which `medium` is what its name says:
+/// at 1000 kPa, water boils at 180 degC and steam condenses.
+InventoryLoopExcitation InventoryLoopOf(const Medium& medium);
 
 }  // namespace fdi::simulator

@@ -215,6 +215,38 @@ Plausible ByCorrelation(const std::vector<double>& residuals, int length,
               0.5 * z * std::sqrt(kappa * CorrelationTime(squares) / samples)};
 }
 
+// Whole blocks, as near to that length as a series divides into; of one that is
+// shorter than half of it, none.
+std::vector<std::span<const double>> Blocks(const std::vector<double>& series,
+                                            std::size_t block) {
+  std::vector<std::span<const double>> blocks;
+  const std::size_t parts = (series.size() + block / 2) / block;
+  for (std::size_t i = 0; i < parts; ++i) {
+    const std::size_t from = i * series.size() / parts;
+    const std::size_t to = (i + 1) * series.size() / parts;
+    blocks.push_back(std::span(series).subspan(from, to - from));
+  }
+  return blocks;
+}
+
+std::vector<double> WithoutBlockMeans(const ResidualSeries& residuals,
+                                      std::size_t block) {
+  std::vector<double> fast;
+  for (const std::vector<double>& series : residuals) {
+    std::vector<std::span<const double>> blocks = Blocks(series, block);
+    if (blocks.empty()) {
+      blocks.emplace_back(series);
+    }
+    for (const std::span<const double> one : blocks) {
+      const double mean = Mean(one);
+      for (const double residual : one) {
+        fast.push_back(residual - mean);
+      }
+    }
+  }
+  return fast;
+}
+
 // @param bound What to take if the tail is not known, or poorly.
 double Level(const std::vector<double>& values, double share, int length,
              double bound) {
@@ -247,13 +279,15 @@ double Level(const std::vector<double>& values, double share, int length,
 // range beyond, 2 % at least.
 //
 // @param commanded The model reads CV: what it errs by hangs on how the loop
-//   moves. Of a short record its mean is given 0.75 deviations.
+//   moves. Of a short record its mean is given 0.75 deviations. σ and τ are
+//   those of its fast part, without the means of blocks: the slow part is
+//   allowed for by itself (SlowAllowance()), and would count twice.
 // @param commands CV at the samples of the residuals; empty: no slope.
 // @return Nothing if there are fewer than 100 full windows.
 std::optional<WindowLimits> FitWindowLimits(const ResidualSeries& residuals,
                                             const ResidualSeries& commands,
                                             int length, double share,
-                                            bool commanded) {
+                                            bool commanded, std::size_t block) {
   WindowHistory history = SlideWindow(residuals, commands, length);
   if (history.mean.size() < kMinValues) {
     return std::nullopt;
@@ -263,7 +297,8 @@ std::optional<WindowLimits> FitWindowLimits(const ResidualSeries& residuals,
   FitActivity(history, limits);
   const std::vector<double> joined = Joined(residuals);
   const double sd = std::sqrt(Variance(joined)) + 1e-6;
-  const Plausible plausible = ByCorrelation(joined, length, share);
+  const Plausible plausible = ByCorrelation(
+      commanded ? WithoutBlockMeans(residuals, block) : joined, length, share);
   const auto mean_level = [&] {
     const double seen =
         *std::max_element(history.mean.begin(), history.mean.end());
@@ -292,6 +327,7 @@ std::optional<WindowLimits> FitWindowLimits(const ResidualSeries& residuals,
 constexpr double kMinMeanOfInput = 2.0;
 
 constexpr double kBlockS = 600.0;     // of the slow part
+constexpr double kBlockRows = 600.0;  // of slow data: beyond all windows
 constexpr double kPriorDays = 4.0;    // ν₀
 constexpr double kOutputStray = 0.2;  // κ, deviations
 constexpr double kInputStray = 1.0;
@@ -391,12 +427,8 @@ double SlowAllowance(const ResidualSeries& residuals, std::size_t block,
                      double kappa, double share) {
   std::vector<double> means;
   for (const std::vector<double>& series : residuals) {
-    // Whole blocks, as near to that length as the series divides into.
-    const std::size_t parts = (series.size() + block / 2) / block;
-    for (std::size_t i = 0; i < parts; ++i) {
-      const std::size_t from = i * series.size() / parts;
-      const std::size_t to = (i + 1) * series.size() / parts;
-      means.push_back(Mean(std::span(series).subspan(from, to - from)));
+    for (const std::span<const double> one : Blocks(series, block)) {
+      means.push_back(Mean(one));
     }
   }
   const double blocks = std::max(static_cast<double>(means.size()), 1.0);
@@ -429,8 +461,8 @@ void FitThresholds(const std::vector<ResidualSeries>& residuals,
                       std::to_string(tests) + " tests and a sample period of " +
                       Digits(models.sample_period_s, 4) + " s");
   }
-  const auto block =
-      static_cast<std::size_t>(std::max(2.0, kBlockS / models.sample_period_s));
+  const auto block = static_cast<std::size_t>(
+      std::max(kBlockRows, kBlockS / models.sample_period_s));
   const double day = 24.0 * rate_per_hour / static_cast<double>(tests);
   for (std::size_t c = 0; c < channels; ++c) {
     ChannelSpec& channel = models.channels[c];
@@ -458,7 +490,7 @@ void FitThresholds(const std::vector<ResidualSeries>& residuals,
     for (const int length : windows[c]) {
       auto limits = FitWindowLimits(
           residuals[c], commands.empty() ? ResidualSeries() : commands[c],
-          length, share, ReadsCommand(models, c));
+          length, share, ReadsCommand(models, c), block);
       if (limits) {
         const double least = IsInput(channel.output)
                                  ? kMinMeanOfInput * std::sqrt(Variance(joined))

@@ -159,7 +159,7 @@ Wording WordingOf(const ModelSet& models, const Verdict& verdict,
 }
 
 Indication IndicationOf(const ModelSet& models, const Verdict& verdict,
-                        const Indication* before) {
+                        const Indication* before, Layer layer) {
   Indication now;
   now.settled = (before != nullptr && before->settled) ||
                 verdict.quality == Quality::kLive;
@@ -169,8 +169,7 @@ Indication IndicationOf(const ModelSet& models, const Verdict& verdict,
   const bool stays = before != nullptr && !now.isolated.empty() &&
                      now.isolated == before->isolated;
   now.wording =
-      stays ? before->wording
-            : WordingOf(models, verdict, now.isolated, Layer::kObservers);
+      stays ? before->wording : WordingOf(models, verdict, now.isolated, layer);
   return now;
 }
 

@@ -75,8 +75,10 @@ std::vector<int> FaultsIn(const ModelSet& models, FaultSet set);
 
 /// What `verdict` indicates; without time and truth.
 /// @param before at the sample before; null: there is none.
+/// @param layer what gave the name.
 Indication IndicationOf(const ModelSet& models, const Verdict& verdict,
-                        const Indication* before);
+                        const Indication* before,
+                        Layer layer = Layer::kObservers);
 
 /// The wording of the name `faults` that an episode has, as the monitor's.
 ///

@@ -2,8 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <utility>
+
+#include "diagnosis/loop/step_response.h"
 
 namespace fdi::loop {
 namespace {
@@ -12,6 +13,8 @@ constexpr double kAtEnd = 0.5;  // [%]
 constexpr double kStood = 0.1;  // Of a rod, or a command [%].
 constexpr double kSlip = 0.5;   // [%]
 constexpr double kRecentS = 10.0;
+constexpr double kUsualS = 60.0;
+constexpr double kUnusual = 5.0;    // Of the mean |ΔX|.
 constexpr double kTurn = 0.25;      // [%]
 constexpr double kFollowed = 0.25;  // [%]
 constexpr double kFast = 1.0;       // [%/s]
@@ -19,13 +22,15 @@ constexpr double kRateS = 10.0;
 constexpr double kSlowest = 0.01;  // Ramps [%/s].
 constexpr double kSteepest = 0.25;
 constexpr double kRampBegin = 2.0;  // Of a leg [%].
+// Of the largest change between two samples of late: noise has less in its
+// mean, and would be selected by the noise of the very sample that is counted.
+constexpr double kStraight = 0.25;
 constexpr std::int64_t kRampSamples = 60;
 constexpr double kStep = 2.0;  // [%]
 constexpr double kHoldS = 10.0;
 constexpr double kLongestS = 60.0;
 constexpr double kLeaves = 0.1;     // Of the step of CV.
 constexpr double kRealised = 0.25;  // Of the step of CV.
-constexpr double kMoved = 0.02;     // Of the realised step.
 
 std::int64_t Quanta(double value) {
   return std::llround(value / ValveCounts::kQuantum);
@@ -36,21 +41,6 @@ std::optional<double> MeanOf(std::int64_t sum, std::int64_t number,
   return number > 0 ? std::optional(static_cast<double>(sum) /
                                     static_cast<double>(number) * quantum)
                     : std::nullopt;
-}
-
-// When x has come to `level` from `begin`, 0 to 1 of the way [samples].
-double Crossing(const std::vector<float>& x, double begin, double level) {
-  double before = 0.0;
-  for (std::size_t k = 0; k < x.size(); ++k) {
-    const double now =
-        level != begin ? (double{x[k]} - begin) / (level - begin) : 1.0;
-    if (now >= 1.0) {
-      return k == 0 ? 0.0
-                    : static_cast<double>(k) - (now - 1.0) / (now - before);
-    }
-    before = now;
-  }
-  return static_cast<double>(x.size());
 }
 
 }  // namespace
@@ -126,6 +116,7 @@ void ValveCounters::Begin(const Reading& now) {
   turn_.reset();
   step_.reset();
   recent_cv_ = 0.0;
+  usual_x_ = usual_s_ = 0.0;
   rate_ = 0.0;
   held_cv_ = now.cv;
   held_s_ = 0.0;
@@ -135,11 +126,13 @@ void ValveCounters::CountSlip(const Reading& now, ValveCounts& counts) {
   recent_cv_ = std::max(recent_cv_ * kRecentS / (kRecentS + now.period_s),
                         std::abs(now.cv - cv_));
   const double jump = std::abs(now.x - x_);
-  if (jump >= kSlip && jump > 2.0 * recent_cv_ &&
-      std::abs(x_ - x_before_) <= kStood) {
+  if (jump >= kSlip && jump > 2.0 * recent_cv_ && jump > kUnusual * usual_x_ &&
+      usual_s_ >= 0.5 * kUsualS && std::abs(x_ - x_before_) <= kStood) {
     ++counts.slips;
     counts.slip_size += Quanta(jump);
   }
+  usual_s_ = std::min(usual_s_ + now.period_s, kUsualS);
+  usual_x_ += (jump - usual_x_) * std::min(1.0, now.period_s / usual_s_);
 }
 
 void ValveCounters::CountTurn(const Reading& now, ValveCounts& counts) {
@@ -172,6 +165,7 @@ void ValveCounters::CountRamp(const Reading& now, ValveCounts& counts) {
            (kRateS + now.period_s);
   const double onward = rate_ * leg_.direction;
   if (onward < kSlowest || onward > kSteepest ||
+      onward * now.period_s < kStraight * recent_cv_ ||
       std::abs(now.cv - leg_.begin) < kRampBegin) {
     return;
   }
@@ -213,31 +207,20 @@ void ValveCounters::CountStep(const Reading& now, ValveCounts& counts) {
 }
 
 void ValveCounters::FinishStep(double period_s, ValveCounts& counts) const {
-  const std::vector<float>& x = step_->x;
-  const auto rest =
-      static_cast<std::ptrdiff_t>(std::max<std::size_t>(1, x.size() / 4));
-  const double end =
-      std::accumulate(x.end() - rest, x.end(), 0.0) / static_cast<double>(rest);
-  const double realised = end - step_->x_before;
+  const StepResponse response = ResponseOf(step_->x, step_->x_before);
   const double step = step_->last_cv - step_->cv_before;
-  if (realised / step < kRealised) {
+  if (response.realised / step < kRealised) {
     return;
   }
-  double beyond = 0.0;
-  for (const float value : x) {
-    beyond = std::max(beyond, (double{value} - end) / realised);
-  }
-  const auto time_ms = [&](double share) {
-    return std::llround(
-        1e3 * period_s *
-        Crossing(x, step_->x_before, step_->x_before + share * realised));
+  const auto time_ms = [period_s](double samples) {
+    return std::llround(1e3 * period_s * samples);
   };
   ++counts.steps;
-  counts.delay_ms += time_ms(kMoved);
-  counts.t63_ms += time_ms(1.0 - std::exp(-1.0));
-  counts.t86_ms += time_ms(1.0 - std::exp(-2.0));
-  counts.overshoot += Quanta(100.0 * beyond);
-  counts.gain += Quanta(realised / step);
+  counts.delay_ms += time_ms(response.delay);
+  counts.t63_ms += time_ms(response.t63);
+  counts.t86_ms += time_ms(response.t86);
+  counts.overshoot += Quanta(100.0 * response.overshoot);
+  counts.gain += Quanta(response.realised / step);
 }
 
 }  // namespace fdi::loop

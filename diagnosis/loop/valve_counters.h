@@ -86,8 +86,9 @@ std::optional<double> FigureOf(Figure figure, const ValveCounts& counts,
 ///
 /// - Slip jump: X, which has stood (0.1 % in two samples), moves by 0.5 % or
 ///   more from one sample to the next, and by more than twice what CV moved
-///   between any two samples of late (a maximum that decays in 10 s): a rod
-///   that stuck and let go.
+///   between any two samples of late (a maximum that decays in 10 s), and by
+///   five times what X usually moves (a mean of a minute), which noise does
+///   not: a rod that stuck and let go.
 /// - Dead band: when CV turns (by 0.25 %) at c*, where X is x*, until X has
 ///   followed by 0.25 %: |CV − c*| − |X − x*|. Of a play that is its width,
 ///   whatever the sample at which it is told. Turns in which CV moves by more
@@ -154,6 +155,8 @@ class ValveCounters {
   double x_{kNone};
   double x_before_{kNone};  // Of the one before it.
   double recent_cv_{0.0};   // Decaying maximum of |ΔCV| [%].
+  double usual_x_{0.0};     // Leaky mean of |ΔX| [%],
+  double usual_s_{0.0};     // of so long.
   double rate_{0.0};        // Leaky mean of dCV/dt [%/s].
   double held_cv_{0.0};     // CV has stood there
   double held_s_{0.0};      // for so long.

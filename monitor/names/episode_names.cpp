@@ -16,6 +16,27 @@ constexpr double kMinMove = 0.02;
 
 }  // namespace
 
+std::optional<EpisodeName::Look> LookThatCounts(
+    const Verdict& engine, const ModelSet& models,
+    const simulator::LookAnswer* answer) {
+  const auto names = answer != nullptr
+                         ? simulator::NamesBeside(engine, models, *answer)
+                         : std::nullopt;
+  if (!names) {
+    return std::nullopt;
+  }
+  EpisodeName::Look look;
+  look.outside = answer->outcome == simulator::LookOutcome::kNoneFits;
+  for (const simulator::Explanation& e : answer->faults) {
+    const int index = FaultIndex(models, e.fault);
+    if (index >= 0 && std::ranges::count(*names, e.fault) > 0) {
+      look.faults.push_back(
+          {static_cast<std::size_t>(index), {e.strength, e.lowest, e.highest}});
+    }
+  }
+  return look;
+}
+
 EpisodeNames::EpisodeNames(std::string valve_id,
                            std::shared_ptr<const ModelSet> models,
                            LookWorker::Physics physics, LookWorker* worker,
@@ -41,7 +62,7 @@ const Verdict& EpisodeNames::Step(const Sample& sample, const Verdict& engine,
   if (looks_) {
     StepLooks(sample, engine, held);
     if (engine.detected && !held && in_order) {
-      inputs.look = LookThatCounts(engine);
+      inputs.look = TakeAnswer(engine);
       inputs.remembered = looks_->Observed(*models_, engine.isolated);
     }
   }
@@ -70,29 +91,14 @@ void EpisodeNames::StepLooks(const Sample& sample, const Verdict& engine,
   suspects_ = looks_->suspects() && !held;
 }
 
-// An answer counts until the next one does, but is recorded once. Faults that
-// the model set does not have cannot be recorded and stay out.
-std::optional<EpisodeName::Look> EpisodeNames::LookThatCounts(
+// An answer counts until the next one does, but is recorded once.
+std::optional<EpisodeName::Look> EpisodeNames::TakeAnswer(
     const Verdict& engine) {
   const simulator::LookAnswer* answer = looks_->Answer();
-  const auto names = answer != nullptr
-                         ? simulator::NamesBeside(engine, *models_, *answer)
-                         : std::nullopt;
-  if (!names) {
-    return std::nullopt;
-  }
-  if (std::exchange(look_ns_, answer->stamp_ns) != answer->stamp_ns) {
+  auto look = LookThatCounts(engine, *models_, answer);
+  if (look && std::exchange(look_ns_, answer->stamp_ns) != answer->stamp_ns) {
     look_ = RecordOf(*answer);
     RecordStrengths(*answer);
-  }
-  EpisodeName::Look look;
-  look.outside = answer->outcome == simulator::LookOutcome::kNoneFits;
-  for (const simulator::Explanation& e : answer->faults) {
-    const int index = FaultIndex(*models_, e.fault);
-    if (index >= 0 && std::ranges::count(*names, e.fault) > 0) {
-      look.faults.push_back(
-          {static_cast<std::size_t>(index), {e.strength, e.lowest, e.highest}});
-    }
   }
   return look;
 }
@@ -266,7 +272,7 @@ Transition EpisodeNames::End(Transition closed) {
 // destructors.
 void EpisodeNames::Reset() {
   if (physics_) {
-    looks_.emplace(*physics_);
+    looks_.emplace(*physics_, models_.get());
   }
   suspects_ = false;
   pending_looks_.clear();

@@ -18,6 +18,14 @@
 
 namespace fdi::monitor {
 
+/// What a look says beside the observers (simulator::NamesBeside()), in their
+/// order of likelihood. Faults that the set does not have cannot be recorded
+/// and stay out. @returns nothing where the look does not count.
+/// @param answer null: there is none.
+std::optional<EpisodeName::Look> LookThatCounts(
+    const Verdict& engine, const ModelSet& models,
+    const simulator::LookAnswer* answer);
+
 /// The episodes of one valve and what EpisodeName calls them: asks for second
 /// looks and for strengths when they are due, and gives it the answers. So what
 /// leaves the monitor is what `fdi-trainer evaluate` scores. Routine looks may
@@ -84,7 +92,7 @@ class EpisodeNames {
   };
 
   void StepLooks(const Sample& sample, const Verdict& engine, bool held);
-  std::optional<EpisodeName::Look> LookThatCounts(const Verdict& engine);
+  std::optional<EpisodeName::Look> TakeAnswer(const Verdict& engine);
   void FollowStrengths(const Verdict& engine);
   bool HasMoved(const std::vector<StrengthPoint>& points) const;
   void RequestLook(simulator::LookTask task);

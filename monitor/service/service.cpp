@@ -36,6 +36,8 @@
 #include "report/fault_texts.h"
 #include "report/logging.h"
 #include "storage/history/history_reader.h"
+#include "storage/models/models.h"
+#include "storage/models/plant_loops.h"
 
 namespace fdi::monitor {
 namespace {
@@ -409,8 +411,14 @@ void Service::ExpectAlarmedValves() {
   }
 }
 
+// Those with a model set, and those of the plant's table.
 void Service::ExpectAssignedValves() {
-  for (const std::string& valve_id : assignment_->AssignedValves()) {
+  std::vector<std::string> valves = assignment_->AssignedValves();
+  storage::ModelStore store(data_.models());
+  for (storage::PlantLoop& loop : store.Loops()) {
+    valves.push_back(std::move(loop.name));
+  }
+  for (const std::string& valve_id : valves) {
     if (GlobMatches(options_.valves, valve_id)) {
       console_->live().Expect(valve_id, 0);
     }

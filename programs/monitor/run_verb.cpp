@@ -17,6 +17,9 @@
 namespace fdi::monitor {
 namespace {
 
+/// What a monitor with console and records has open, and as much for clients.
+constexpr int kDescriptors = 96;
+
 struct RunArguments {
   std::string model_set;
   std::string shadow;
@@ -152,8 +155,9 @@ int Run(const RunArguments& arguments, const report::Context& context) {
   if (options.console) {
     options.console->routes = PlannerRoutes(arguments.groups, context);
   }
-  // Some 25 threads, 55 with the console: a lack is said before the bus or a
-  // file is touched.
+  // Some 25 threads, 55 with the console, and 50 files: a lack is said before
+  // the bus or a file is touched.
+  RequireDescriptors(kDescriptors);
   RequireHeadroom(options.console ? 64 : 32, 64U << 20U);
   // Before the service, so that a signal during its start requests an orderly
   // stop.

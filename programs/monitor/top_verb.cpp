@@ -121,7 +121,7 @@ int RunTop(const TopOptions& options, const report::Context& context) {
 void AddTopVerb(report::Program& program) {
   auto [top, options] = AddVerb(
       program, "top",
-      "A live table of valves and decision factors, the worst first, from what "
+      "A live table of valves and their faults, the worst first, from what "
       "monitors publish",
       RunTop);
   top.add_flag("--once", options.once,

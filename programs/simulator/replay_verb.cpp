@@ -73,7 +73,7 @@ std::optional<FlowTarget> FlowTargetOf(const std::string& valve,
 
 Recording LoadCsv(const ReplayOptions& options,
                   const report::Context& context) {
-  const importer::CsvTable table = importer::ReadCsvFile(
+  importer::CsvTable table = importer::ReadCsvFile(
       options.csv, {.map = options.stream.map,
                     .required = MaskOf(Signal::kCv),
                     .split_gaps = options.stream.split_gaps,
@@ -86,12 +86,16 @@ Recording LoadCsv(const ReplayOptions& options,
     ReportConversion(context.log, options.csv, own, to.unit);
   }
   FlowConversion conversion(to);
-  for (SampleSeries run : table.runs) {
+  for (SampleSeries& run : table.runs) {
     for (LabelledSample& labelled : run.samples) {
       conversion.Apply(labelled.sample);
     }
-    recording.samples.insert(recording.samples.end(), run.samples.begin(),
-                             run.samples.end());
+    if (recording.samples.empty()) {
+      recording.samples = std::move(run.samples);
+    } else {
+      recording.samples.insert(recording.samples.end(), run.samples.begin(),
+                               run.samples.end());
+    }
   }
   return recording;
 }

@@ -148,7 +148,6 @@ void WarnIfUnknown(const std::string& valve, HistoryReader& reader,
 }
 
 Report Shelve(const ShelveOptions& options, const Context& context) {
-  const auto path = DataOf(context).history();
   const OperatorNote note = options.note.Note();
   if (options.duration.find_first_not_of("0123456789.") == std::string::npos) {
     throw ConfigError("--for " + options.duration +
@@ -161,7 +160,8 @@ Report Shelve(const ShelveOptions& options, const Context& context) {
           : std::optional(ParseTime(options.from, context.options.utc));
   const std::int64_t until_ns =
       from_ns.value_or(note.now_ns) + ParseDuration(options.duration);
-  // Makes the history where no monitor has run yet.
+  // Makes folder and history where no monitor has run yet.
+  const auto path = WritableDataOf(context).history();
   HistoryEditor editor(path);
   HistoryReader reader(path);
   WarnIfUnknown(options.valve, reader, context);

@@ -9,6 +9,7 @@
 #include <iterator>
 #include <map>
 #include <span>
+#include <utility>
 
 #include "base/csv_cells.h"
 #include "base/error.h"
@@ -16,6 +17,7 @@
 #include "import/layout.h"
 #include "import/tag_map.h"
 #include "programs/store/loop_audits.h"
+#include "programs/store/strokes.h"
 #include "programs/store/verbs.h"
 #include "report/plot/loop_figure.h"
 #include "storage/runs/runs.h"
@@ -36,6 +38,7 @@ struct AuditOptions {
   std::string pv;
   std::string sp;
   std::string x;
+  std::string ps;
   std::string mode;
   std::string service;
   bool ignore_x{false};
@@ -53,8 +56,8 @@ struct Role {
   std::string AuditOptions::*column;
   std::vector<const char*> names;
 };
-const std::array<Role, 4>& Roles() {
-  static const std::array<Role, 4> roles{{
+const std::array<Role, 5>& Roles() {
+  static const std::array<Role, 5> roles{{
       {Signal::kCv,
        "--op",
        &AuditOptions::op,
@@ -65,6 +68,7 @@ const std::array<Role, 4>& Roles() {
        {"PV", "F_t_h", "F_m3_h", "F", "MEAS"}},
       {Signal::kSp, "--sp", &AuditOptions::sp, {"SP", "SV", "SETPOINT"}},
       {Signal::kX, "--x", &AuditOptions::x, {"X_pct", "X", "ZT", "POS"}},
+      {Signal::kPs, "--ps", &AuditOptions::ps, {"Ps_kPa", "PS"}},
   }};
   return roles;
 }
@@ -130,8 +134,7 @@ struct LoopRecord {
 };
 
 // A map of the loop's columns, so that the importer reads loops, too.
-importer::ColumnMap LoopMap(const std::string& text,
-                            const AuditOptions& options,
+importer::ColumnMap LoopMap(const TextLines& lines, const AuditOptions& options,
                             const std::string& source) {
   importer::ColumnMap map = options.table.Read(false);
   map.mode_column = options.mode;
@@ -139,7 +142,7 @@ importer::ColumnMap LoopMap(const std::string& text,
     return map;
   }
   const std::vector<std::string> header =
-      importer::FindLayout(importer::LinesOf(text), map, source, false).names;
+      importer::FindLayout(lines, map, source, false).names;
   for (const Role& role : Roles()) {
     if (role.signal == Signal::kX && options.ignore_x) {
       continue;
@@ -148,12 +151,21 @@ importer::ColumnMap LoopMap(const std::string& text,
             ColumnOf(role.names, role.option, options.*(role.column),
                      options.op, header, source)) {
       map.columns.push_back({*column, role.signal});
-    } else if (role.signal == Signal::kCv || role.signal == Signal::kF) {
+    }
+  }
+  const auto require = [&](Signal signal, Signal instead) {
+    const auto has = [&](const importer::ColumnMapping& mapping) {
+      return mapping.signal == signal || mapping.signal == instead;
+    };
+    if (std::ranges::none_of(map.columns, has)) {
+      const Role& role = *std::ranges::find(Roles(), signal, &Role::signal);
       throw DataError(source + ": no column for " + (role.option + 2) +
                       "; the header is " + Quoted(Listed(header)) + "; try " +
                       role.option + " COLUMN");
     }
-  }
+  };
+  require(Signal::kCv, Signal::kCv);
+  require(Signal::kF, Signal::kX);
   static constexpr const char* kMode[] = {"MODE"};
   map.mode_column =
       ColumnOf(kMode, "--mode", options.mode, options.op, header, source)
@@ -165,21 +177,21 @@ importer::ColumnMap LoopMap(const std::string& text,
 
 LoopRecord ReadLoop(const std::string& file, const AuditOptions& options,
                     const Context& context) {
-  const std::string text = ReadTextFile(file);
+  const TextLines lines = TextLines::OfFile(file);
   importer::CsvOptions csv;
   csv.source = file;
-  csv.map = LoopMap(text, options, file);
+  csv.map = LoopMap(lines, options, file);
   csv.split_gaps = true;
   csv.check_values = false;
   csv.skip_repeats = true;
   csv.log = context.log;
   csv.period_s = options.period_s;
-  importer::CsvTable table = importer::ReadCsv(text, csv);
+  importer::CsvTable table = importer::ReadCsv(lines, csv);
   // A lost sample or two would cut a window that is long enough otherwise.
   if (table.runs.size() > 1 && !csv.map.resampling) {
     const double period_s = table.runs.front().period_s;
     csv.map.resampling = importer::Resampling{period_s, false, 3.0 * period_s};
-    table = importer::ReadCsv(text, csv);
+    table = importer::ReadCsv(lines, csv);
   }
   LoopRecord record;
   record.loop = std::filesystem::path(file).stem().string();
@@ -572,13 +584,17 @@ void DrawAll(const std::vector<Judged>& judged, const std::string& path,
 // Files and runs, one after the other. One that cannot be read does not keep
 // the others from being judged.
 void JudgeAll(const AuditOptions& options, const Context& context,
-              std::vector<Judged>& judged, Json& skipped) {
+              std::vector<Judged>& judged, std::vector<FoundStroke>& strokes,
+              Json& skipped) {
   const auto judge = [&](const std::string& source, const auto& read) {
     const auto skip = [&](const std::exception& error) {
       skipped.push_back({{"source", source}, {"reason", error.what()}});
     };
     try {
-      JudgeRecord(read(), options, judged, skipped);
+      const LoopRecord record = read();
+      JudgeRecord(record, options, judged, skipped);
+      AddStrokes(record.loop, record.source, record.dated, record.stretches,
+                 strokes);
     } catch (const DataError& error) {
       skip(error);
     } catch (const NotFoundError& error) {
@@ -683,8 +699,9 @@ Report AuditLoops(const AuditOptions& options, const Context& context) {
     plot::FormatOf(options.plot);
   }
   std::vector<Judged> judged;
+  std::vector<FoundStroke> strokes;
   Json skipped = Json::array();
-  JudgeAll(options, context, judged, skipped);
+  JudgeAll(options, context, judged, strokes, skipped);
   Rank(judged);
   Report report;
   report.document["windows"] = Rows(judged, JudgedJson);
@@ -712,6 +729,7 @@ Report AuditLoops(const AuditOptions& options, const Context& context) {
                           {{"common period [s]", "period_s", Format::kPlain, 0},
                            {"loops", "loops"}});
   }
+  ReportStrokes(std::move(strokes), report);
   if (!skipped.empty()) {
     report.Line("").Table("skipped",
                           {{"not judged", "source"}, {"reason", "reason"}});
@@ -719,7 +737,7 @@ Report AuditLoops(const AuditOptions& options, const Context& context) {
   if (!options.plot.empty()) {
     DrawAll(judged, options.plot, report);
   }
-  if (judged.empty()) {
+  if (judged.empty() && report.document["strokes"].empty()) {
     report.exit_code = report::kExitData;
   }
   return report;
@@ -789,6 +807,7 @@ void AddAuditVerb(report::Program& program) {
   verb.add_option("--pv", options.pv, "Column of the controlled variable");
   verb.add_option("--sp", options.sp, "Column of the set point [as PV]");
   verb.add_option("--x", options.x, "Column of the position [%]");
+  verb.add_option("--ps", options.ps, "Column of the actuator pressure [kPa]");
   verb.add_option("--mode", options.mode,
                   "Column of the mode (MODE, or auto with 1 and 0)");
   verb.add_flag("--ignore-x", options.ignore_x,

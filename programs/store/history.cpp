@@ -39,7 +39,7 @@ Tone ToneOf(const Json& row) {
 
 // Of the list, where no terminal says how wide it is; of a fault's name.
 constexpr std::size_t kWidest = 100;
-constexpr std::size_t kLeastName = 12;
+constexpr std::size_t kLeastName = 15;
 
 // "20 s", or "-" if it has not happened yet.
 std::string After(std::int64_t from_ns, std::optional<std::int64_t> to_ns) {
@@ -64,7 +64,7 @@ std::string RowKey(const Json& row) {
 
 // What the text output shows beside the columns of fault_history.
 struct EpisodeText {
-  std::string detected;  // "2026-11-20 14:56:11", by the clock on the wall.
+  std::string detected;  // "2026-11-20 14:56", by the clock on the wall.
   std::string isolated_after;
   std::string lasted;
 };
@@ -73,7 +73,7 @@ using EpisodeTexts = std::map<std::string, EpisodeText>;  // By RowKey().
 std::string WallClock(std::int64_t stamp_ns, const Context& context) {
   const bool utc = context.options.utc;
   std::string text = FormatTime(stamp_ns / 1'000'000'000 * 1'000'000'000, utc);
-  text.resize(std::min(text.size(), std::size_t{19}));
+  text.resize(std::min(text.size(), std::size_t{16}));
   std::replace(text.begin(), text.end(), 'T', ' ');
   return text + (utc ? "Z" : "");
 }
@@ -120,19 +120,19 @@ Report ListEpisodes(const HistoryOptions& options, const Context& context) {
                  [of](const Json& row) { return of(row).detected; }),
       alarm,
       {"severity", "severity", Format::kPlain, 0, 1},
-      {"fault", "fault"},
+      {"fault", "fault", Format::kPlain, 0, 4},
       {"meaning", "fault_name", Format::kPlain, 0, 0, kLeastName},
-      {"how sure", "certainty", Format::kPlain, 0, 2},
-      {"now [-]", "strength", Format::kPlain, 2, 3},
-      {"worst [-]", "worst_strength", Format::kPlain, 2, 4},
+      {"how sure", "certainty", Format::kPlain, 0, 3},
+      {"now", "strength", Format::kPercent, 0, 2},
+      {"worst", "worst_strength", Format::kPercent, 0, 5},
       TextColumn(
           "isolated after",
-          [of](const Json& row) { return of(row).isolated_after; }, 5,
+          [of](const Json& row) { return of(row).isolated_after; }, 6,
           Align::kRight),
       TextColumn(
-          "lasted", [of](const Json& row) { return of(row).lasted; }, 3,
+          "lasted", [of](const Json& row) { return of(row).lasted; }, 5,
           Align::kRight),
-      TextColumn("end", end, 1),
+      TextColumn("end", end, 5),
       {"label", "label", Format::kPlain, 0, 6},
       {"acked by", "acked_by", Format::kPlain, 0, 7},
       {"model set", "model_set", Format::kPlain, 0, 8}};

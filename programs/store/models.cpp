@@ -3,6 +3,7 @@
 #include "storage/models/models.h"
 
 #include <algorithm>
+#include <filesystem>
 
 #include "base/error.h"
 #include "diagnosis/fault_catalogue.h"
@@ -267,10 +268,12 @@ const std::vector<report::Column> kTypeColumns = {
     {"bytes", "bytes"},
     {"summary", "summary"}};
 
-// Stored types, then those that are built in.
+// Stored types, then those that are built in, which need no data folder.
 Json AllTypes(const Context& context) {
-  Json types =
-      Rows(ModelStore(DataOf(context).models()).ListTemplates(), TypeJson);
+  const std::filesystem::path path = DataOf(context).models();
+  Json types = std::filesystem::exists(path)
+                   ? Rows(ModelStore(path).ListTemplates(), TypeJson)
+                   : Json::array();
   for (const std::string& name : simulator::ParameterSetNames()) {
     types.push_back(
         {{"name", name},

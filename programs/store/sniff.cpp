@@ -37,7 +37,7 @@ Json ColumnJson(const importer::SniffedColumn& column) {
 
 Report SniffFile(const SniffOptions& options, const Context& context) {
   const importer::Sniffed found =
-      importer::Sniff(ReadTextFile(options.file), options.file,
+      importer::Sniff(TextLines::OfFile(options.file), options.file,
                       options.table.Read(context.options.utc));
   Report report;
   report.document = {

@@ -194,7 +194,14 @@ void RequireAccepted(const Onboarding& onboarding) {
   }
 }
 
+// That show the errors of a valve of any size: 3 from 1 t/h on, more below.
+int FlowDecimals(const simulator::ValveParameters& valve) {
+  const double range = std::clamp(valve.instruments.flow.high, 1e-9, 1.0);
+  return 3 - static_cast<int>(std::floor(std::log10(range)));
+}
+
 void AddFit(const simulator::ValveFit& fit, report::Report& report) {
+  const int decimals = FlowDecimals(fit.parameters);
   // Coefficients of a relay are small, pressures large.
   const auto significant = [](const char* heading, const char* key) {
     return report::Column{
@@ -215,8 +222,8 @@ void AddFit(const simulator::ValveFit& fit, report::Report& report) {
               " samples after its stamp; simulation against record: X RMSE " +
               FormatNumber(fit.nominal.x_rmse_pct, 3) + " -> " +
               FormatNumber(fit.fitted.x_rmse_pct, 3) + " %, F RMSE " +
-              FormatNumber(fit.nominal.flow_rmse, 3) + " -> " +
-              FormatNumber(fit.fitted.flow_rmse, 3) + "\n");
+              FormatNumber(fit.nominal.flow_rmse, decimals) + " -> " +
+              FormatNumber(fit.fitted.flow_rmse, decimals) + "\n");
 }
 
 // The least lasting change of F that is beyond a limit, where F is all that
@@ -282,14 +289,16 @@ report::Report ReportOf(const Onboarding& onboarding,
   if (onboarding.fit) {
     AddFit(*onboarding.fit, report);
   }
-  report.Table("fit",
-               {{"channel", "channel"},
-                {"unit", "unit"},
-                {.heading = "RMSE", .key = "rmse", .decimals = 3},
-                {.heading = "bias", .key = "bias", .decimals = 3},
-                {.heading = "VAF [%]", .key = "vaf", .decimals = 1},
-                {.heading = "naive RMSE", .key = "naive_rmse", .decimals = 3},
-                {.heading = "seen from", .key = "seen_from", .decimals = 3}});
+  const int decimals = FlowDecimals(onboarding.type.parameters);
+  report.Table(
+      "fit",
+      {{"channel", "channel"},
+       {"unit", "unit"},
+       {.heading = "RMSE", .key = "rmse", .decimals = decimals},
+       {.heading = "bias", .key = "bias", .decimals = decimals},
+       {.heading = "VAF [%]", .key = "vaf", .decimals = 1},
+       {.heading = "naive RMSE", .key = "naive_rmse", .decimals = decimals},
+       {.heading = "seen from", .key = "seen_from", .decimals = decimals}});
   report.Line(
       "normal observer on data it was not fitted to; naive: X = CV, else the "
       "mean; seen from: the smallest lasting change that is beyond the "
@@ -311,7 +320,7 @@ report::Report ReportOf(const Onboarding& onboarding,
     report.Line("the valve has " + FormatNumber(onboarding.size, 3) +
                 " times the size of its type; the flow transmitter is taken to "
                 "end at " +
-                FormatNumber(i.flow.high, 1) + ' ' +
+                FormatNumber(i.flow.high, decimals - 2) + ' ' +
                 std::string(FlowUnitName(i.flow_unit)) +
                 ": --type FILE.toml states another end");
   }
@@ -518,9 +527,11 @@ report::Report Assess(const CoverageOptions& options,
   const SignalMask signals =
       report::ParseSignals(options.signals, kBasicSignals);
   const storage::DataDirectory directory{context.options.data_dir};
-  storage::EnsureExists(directory);
-  storage::ModelStore store(directory.models(),
-                            storage::Access::kOccasionalWriter);
+  // Only read, if there is one: types may also come from elsewhere.
+  std::optional<storage::ModelStore> store;
+  if (std::filesystem::exists(directory.models())) {
+    store.emplace(directory.models());
+  }
   OnboardingOptions settings;
   settings.name = "coverage";
   settings.threads = options.threads;
@@ -528,8 +539,8 @@ report::Report Assess(const CoverageOptions& options,
   stop.EndWithin(kOnboardPatience, "\nfdi-trainer: error: interrupted\n");
   report::Progress bar("coverage");
   const CoverageTable table =
-      AssessType(FindType(options.type, &store).type, signals, options.gains,
-                 settings, Reporting(bar, stop));
+      AssessType(FindType(options.type, store ? &*store : nullptr).type,
+                 signals, options.gains, settings, Reporting(bar, stop));
   bar.Finish();
   report::Report report;
   report.document = CoverageJson(table);

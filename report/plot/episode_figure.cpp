@@ -7,6 +7,7 @@
 #include <iterator>
 
 #include "base/error.h"
+#include "base/time_units.h"
 #include "diagnosis/fault_catalogue.h"
 #include "diagnosis/residual_windows.h"
 #include "storage/models/models.h"
@@ -462,12 +463,20 @@ Figure EpisodeFigure(const EpisodeEvidence& evidence,
   figure.title =
       episode.valve_id + ":  " + episode.fault.value_or("not isolated") + name;
   figure.subtitle = Subtitle(episode);
-  figure.x_label = "time from the first abnormal sample";
   figure.is_time = true;
   figure.x = TimesOf(evidence, trace);
   if (!figure.x.empty()) {
     figure.x_range = Range{figure.x.front(),
                            std::max(figure.x.back(), figure.x.front() + 1e-3)};
+  }
+  // Beyond a day, from the first abnormal sample on.
+  const bool is_clock =
+      figure.x_range &&
+      figure.x_range->to - figure.x_range->from < 1e-9 * kNsPerDay;
+  figure.x_label = is_clock ? "UTC of " + episode.detected_utc.substr(0, 10)
+                            : "time from the first abnormal sample";
+  if (is_clock) {
+    figure.clock_s = SecondsFrom(episode.detected_ns % kNsPerDay, 0);
   }
   figure.gap = evidence.models ? 1.5 * evidence.models->sample_period_s : 1.5;
   figure.panels = {FlowPanel(evidence, trace), TravelPanel(evidence, trace)};

@@ -214,7 +214,7 @@ void AddPicture(const EpisodeEvidence& evidence,
   figure.groups = kGroups;
   try {
     page.Picture("evidence",
-                 "Over the time from the first abnormal sample: signals, "
+                 "Over time: signals, "
                  "residuals with their thresholds, decision factors",
                  SvgElement(figure, limits));
   } catch (const DataError& error) {
@@ -292,9 +292,14 @@ std::string EventSentence(const HistoryEntry& event,
   std::string text = event.kind == "ISOLATED"     ? "Named "
                      : event.kind == "REISOLATED" ? "The name became "
                                                   : "Grown worse: ";
-  text += event.faults.empty() ? "none" : NameAndFault(event.faults, texts);
-  text.append(ByLayer(event.layer));
-  text += ", strength " + report::FormatNumber(event.strength, 2);
+  if (event.faults.empty()) {
+    text = event.kind == "REISOLATED" ? "The name was taken back: no" : "No";
+    text += " known fault explains the readings";
+  } else {
+    text += NameAndFault(event.faults, texts);
+    text.append(ByLayer(event.layer));
+    text += ", strength " + report::FormatNumber(event.strength, 2);
+  }
   const auto severity =
       event.priority ? SeverityOf(*event.priority) : std::nullopt;
   return text +

@@ -15,6 +15,8 @@
 namespace fdi::plot {
 namespace {
 
+constexpr double kDayS = 86400.0;
+
 // Sizes [px].
 constexpr double kPanelGap = 16.0;
 constexpr double kTitleHeight = 76.0;
@@ -88,11 +90,12 @@ Range RangeOf(const Figure& figure) {
 class PointWriter {
  public:
   PointWriter(const Figure& figure, const Series& series, double unit,
-              std::ostream& out)
+              double shift, std::ostream& out)
       : x_(series.x.empty() ? figure.x : series.x),
         y_(series.y),
         gap_(figure.gap),
         unit_(unit),
+        shift_(shift),
         out_(out) {}
 
   // Reduces groups of equal size to their extremes, in their original order. A
@@ -119,13 +122,16 @@ class PointWriter {
     }
     return true;
   }
+  std::string X(std::size_t i) const {
+    return GnuplotNumber((x_[i] + shift_) / unit_);
+  }
   void Point(std::size_t i) {
-    out_ << GnuplotNumber(x_[i] / unit_) << ' ' << GnuplotNumber(y_[i]) << '\n';
+    out_ << X(i) << ' ' << GnuplotNumber(y_[i]) << '\n';
   }
   void All(std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       if (IsGap(i)) {
-        out_ << GnuplotNumber(x_[i] / unit_) << " NaN\n";
+        out_ << X(i) << " NaN\n";
       }
       Point(i);
     }
@@ -146,6 +152,7 @@ class PointWriter {
   const std::vector<double>& y_;
   double gap_;
   double unit_;
+  double shift_;
   std::ostream& out_;
 };
 
@@ -166,8 +173,11 @@ class ScriptWriter {
       : figure_(figure),
         format_(format),
         range_(RangeOf(figure)),
-        unit_(figure.is_time ? UnitOf(range_.to - range_.from)
-                             : TimeUnit{1.0, ""}) {}
+        is_clock_(figure.clock_s.has_value()),
+        unit_(figure.is_time && !is_clock_ ? UnitOf(range_.to - range_.from)
+                                           : TimeUnit{1.0, ""}),
+        // From the day before on, so that no time is negative.
+        shift_(is_clock_ ? *figure.clock_s + kDayS : 0.0) {}
 
   std::string Write(const std::filesystem::path& output) {
     // First, because the rows of names decide the height of the picture, to
@@ -212,7 +222,18 @@ class ScriptWriter {
   std::string ScreenY(double from_top) const {
     return GnuplotNumber(1.0 - from_top / Height());
   }
-  std::string X(double x) const { return GnuplotNumber(x / unit_.seconds); }
+  std::string X(double x) const {
+    return GnuplotNumber((x + shift_) / unit_.seconds);
+  }
+  std::string XFormat(bool last, bool own_axis) const {
+    const bool clock = is_clock_ && !own_axis;
+    const bool seconds = range_.to - range_.from < 600.0;
+    return std::string(!last     ? "''"
+                       : !clock  ? "'%g'"
+                       : seconds ? "'%H:%M:%S'"
+                                 : "'%H:%M'") +
+           (clock ? " timedate" : " numeric");
+  }
   double PixelOf(double x) const {
     return kLeft +
            (Right() - kLeft) * (x - range_.from) / (range_.to - range_.from);
@@ -262,7 +283,8 @@ class ScriptWriter {
         // Bars are never thinned: gnuplot takes their width from the space
         // between them.
         const bool own = figure_.panels[p].own_axis.has_value();
-        PointWriter(figure_, series[s], own ? 1.0 : unit_.seconds, out_)
+        PointWriter(figure_, series[s], own ? 1.0 : unit_.seconds,
+                    own ? 0.0 : shift_, out_)
             .Write(own || series[s].shape == Shape::kBars
                        ? std::numeric_limits<std::size_t>::max()
                        : figure_.groups);
@@ -355,7 +377,8 @@ class ScriptWriter {
          << "\nset ylabel " << GnuplotText(panel.label)
          << (strip ? " rotate by 0 offset 2,0\nunset ytics\n"
                    : " rotate by 90 offset 0,0\nset ytics nomirror out\n")
-         << "set format x " << (last ? "'%g'" : "''") << '\n';
+         << "set format x " << XFormat(last, panel.own_axis.has_value())
+         << '\n';
     if (strip && panel.notes.empty()) {
       out_ << "unset key\n";
     } else {
@@ -385,7 +408,7 @@ class ScriptWriter {
   }
 
   std::string XLabel() const {
-    return figure_.is_time
+    return figure_.is_time && !is_clock_
                ? figure_.x_label + " [" + std::string(unit_.name) + "]"
                : figure_.x_label;
   }
@@ -441,7 +464,9 @@ class ScriptWriter {
   const Figure& figure_;
   Format format_;
   Range range_;
+  bool is_clock_;
   TimeUnit unit_;
+  double shift_;                   // [s]
   std::vector<Mark> marks_;        // Marks in range, ordered by x.
   std::vector<std::size_t> rows_;  // Rows of their names, from below.
   std::size_t mark_rows_{1};

@@ -105,6 +105,9 @@ struct Figure {
   /// The abscissae are seconds: the axis is scaled to s, min, h or d as
   /// suitable, and the unit is added to its label.
   bool is_time{false};
+  /// The second of the day that abscissa 0 stands for: the axis, which has to
+  /// be shorter than a day, shows the clock.
+  std::optional<double> clock_s{};
   double gap{1e300};        ///< Longer steps between abscissae break lines.
   std::vector<double> x{};  ///< Ascending.
   std::optional<Range> x_range{};  ///< Empty: from the first to the last x.

@@ -14,6 +14,7 @@
 #include "base/text.h"
 #include "base/time_text.h"
 #include "import/csv.h"
+#include "simulator/level_loop.h"
 #include "simulator/parameter_fields.h"
 
 // A scenario as TOML. The keys of a table are the member names of its struct,
@@ -164,11 +165,13 @@ void AppendDifferences(const std::string& prefix, Struct value, Struct defaults,
   }
 }
 
-void ReadParameterTable(TomlReader& table, const path& folder,
+// Returns the trim of the base.
+Trim ReadParameterTable(TomlReader& table, const path& folder,
                         ValveParameters& parameters) {
   if (const auto base = table.Text("base")) {
     table.At("base", [&] { parameters = FindParameters(*base, folder); });
   }
+  Trim start = parameters.trim;
   VisitFields(parameters, FieldReader(table));
   // As data sheets state the exponential characteristic: f = R^-X.
   constexpr const char* kRangeability = "rangeability";
@@ -179,6 +182,7 @@ void ReadParameterTable(TomlReader& table, const path& folder,
     }
     parameters.trim.exponent = std::log(*trim->Number(kRangeability, 1.2, 1e8));
   }
+  return start;
 }
 
 void ReadParameters(TomlReader& table, const path& folder,
@@ -364,7 +368,13 @@ ValveParameters FindParameters(const std::string& name, const path& folder) {
   TomlReader file(Resolve(folder, name));
   ValveParameters parameters;
   parameters.name = path(name).stem().string();
-  ReadParameterTable(file, Resolve(folder, name).parent_path(), parameters);
+  const Trim base =
+      ReadParameterTable(file, Resolve(folder, name).parent_path(), parameters);
+  const auto trim = file.Table("trim");
+  if (trim && trim->Has("kv_m3_h") && !trim->Has("bypass_kv_m3_h")) {
+    // A bypass has the size of its valve.
+    parameters.trim.bypass_kv_m3_h *= parameters.trim.kv_m3_h / base.kv_m3_h;
+  }
   file.Finish();
   Validate(parameters);
   return parameters;
@@ -381,6 +391,10 @@ void ChooseExcitation(const std::string& name, const path& folder,
     throw ConfigError("csv needs a file: csv:FILE");
   }
   scenario.config.excitation = DefaultExcitation(name);
+  if (auto* loop =
+          std::get_if<InventoryLoopExcitation>(&scenario.config.excitation)) {
+    *loop = InventoryLoopOf(scenario.config.parameters.medium);
+  }
   scenario.excitation_file.clear();
 }
 

@@ -4,11 +4,14 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <functional>
 #include <limits>
+#include <span>
 #include <utility>
 
 #include "base/time_units.h"
 #include "diagnosis/fault_catalogue.h"
+#include "diagnosis/trained_signals.h"
 #include "simulator/fault_effects.h"
 
 namespace fdi::simulator {
@@ -137,6 +140,12 @@ LookAnswer AnswerOf(const SecondLook& look, bool early) {
     }
   }
   AddIndistinguishable(look, nothing, answer.faults);
+  for (const Explanation& e : look.ranked) {
+    if (!look.complete && e.fault != 0 && e.distance <= kAlike * nothing &&
+        !Has(answer.faults, e.fault) && !Has(answer.beside, e.fault)) {
+      answer.beside.push_back(e);
+    }
+  }
   const bool healthy =
       nothing <= std::max(kLookMargin, kMinGain * look.readings);
   const double most = healthy ? kMaxHealthyMisfit : kMaxMisfit;
@@ -148,6 +157,44 @@ LookAnswer AnswerOf(const SecondLook& look, bool early) {
                        ? LookOutcome::kUnclear
                        : LookOutcome::kNamed;
   return answer;
+}
+
+void BindGroups(const FaultGroups& groups, LookAnswer& answer) {
+  const std::vector<Explanation> looked = answer.faults;
+  for (const Explanation& e : answer.beside) {
+    const bool bound =
+        std::ranges::any_of(groups, [&](const std::vector<int>& group) {
+          const auto is_in = [&](const Explanation& other) {
+            return std::ranges::count(group, other.fault) > 0;
+          };
+          return is_in(e) && std::ranges::any_of(looked, is_in);
+        });
+    if (bound) {
+      answer.faults.push_back(e);
+    }
+  }
+  if (answer.outcome == LookOutcome::kNamed &&
+      answer.faults.size() > kMaxNamedFaults) {
+    answer.outcome = LookOutcome::kUnclear;
+  }
+}
+
+void KeepMeterAndLine(const SecondLook& look, LookAnswer& answer) {
+  const auto none = std::ranges::find(look.ranked, 0, &Explanation::fault);
+  const auto is_left = [&](const Explanation& e) {
+    const ActsOn acts_on = FaultFactsOf(e.fault).acts_on;
+    return (acts_on == ActsOn::kFlowReading || acts_on == ActsOn::kInputs) &&
+           (none == look.ranked.end() || e.distance < none->distance);
+  };
+  const auto count =
+      static_cast<std::size_t>(std::ranges::count_if(answer.faults, is_left));
+  if ((answer.outcome == LookOutcome::kUnclear ||
+       answer.outcome == LookOutcome::kNothing) &&
+      count > 0 && count <= kMaxNamedFaults) {
+    std::erase_if(answer.faults, std::not_fn(is_left));
+    answer.beside.clear();
+    answer.outcome = LookOutcome::kNamed;
+  }
 }
 
 std::optional<LookAnswer> TakeLook(const ValvePhysics& physics,
@@ -175,6 +222,9 @@ std::optional<LookAnswer> TakeLook(const ValvePhysics& physics,
   }
   LookAnswer answer = AnswerOf(look, task.early());
   answer.late = task.late();
+  if (task.changed_unread) {
+    KeepMeterAndLine(look, answer);
+  }
   answer.without_fault = without_fault;
   if (task.occasion == LookOccasion::kRoutine &&
       answer.misfit + kRoutineGain > without_fault) {
@@ -234,7 +284,7 @@ void EpisodeLooks::AddRow(const Sample& sample) {
           : (sample.stamp_ns - rows_.back().stamp_ns + period_ns_ / 2) /
                 period_ns_;
   if (step < 1 || step > 1 + kMaxHeldSteps || sample.present != signals_) {
-    rows_.clear();
+    BeginRows(sample.stamp_ns);
   }
   signals_ = sample.present;
   // The simulation needs all inputs. One that is not measured is taken as
@@ -273,6 +323,35 @@ void EpisodeLooks::AddRow(const Sample& sample) {
   }
 }
 
+// F over what the healthy valve would pass, a mean of the first or last rows.
+double EpisodeLooks::FlowShare(bool last) const {
+  constexpr std::size_t kRows = 20;
+  const std::size_t count = std::min(rows_.size(), kRows);
+  const bool has_x = (signals_ & MaskOf(Signal::kX)) != 0;
+  double flow = 0.0;
+  double healthy = 0.0;
+  for (std::size_t k = 0; k < count; ++k) {
+    const RecordRow& row = rows_[last ? rows_.size() - 1 - k : k].row;
+    if (row.flow_measured) {
+      flow += row.flow;
+      healthy += FlowReading(physics_.parameters, {}, row.input,
+                             has_x ? row.x_pct : row.input.cv_pct);
+    }
+  }
+  return flow / std::max(healthy, 1e-3 * physics_.flow_mean);
+}
+
+void EpisodeLooks::BeginRows(std::int64_t stamp_ns) {
+  constexpr std::int64_t kOutageNs = 300 * kNsPerSecond;
+  constexpr std::size_t kFewRows = 10;
+  if (rows_.size() >= kFewRows && (signals_ & MaskOf(Signal::kF)) != 0) {
+    share_before_ = FlowShare(true);
+    before_ns_ = rows_.back().stamp_ns;
+  }
+  outage_end_ns_ = stamp_ns - before_ns_ >= kOutageNs ? stamp_ns : 0;
+  rows_.clear();
+}
+
 std::optional<LookTask> EpisodeLooks::Task() const {
   LookTask task;
   task.detection_stamp_ns = *detection_ns_;
@@ -297,6 +376,20 @@ std::optional<LookTask> EpisodeLooks::Task() const {
   if (MeasuredRows(task.window) < kMinMeasuredRows ||
       task.window.detection + 10 > task.window.rows.size()) {
     return std::nullopt;
+  }
+  constexpr double kLeastChange = 0.1;
+  constexpr double kUsual = 3.0;  // deviations of the slow part
+  const double change = std::max(
+      kLeastChange, kUsual * physics_.flow.slow_sd / physics_.flow_mean);
+  task.changed_unread = share_before_ && outage_end_ns_ != 0 &&
+                        rows_.front().stamp_ns == outage_end_ns_ &&
+                        std::abs(FlowShare(false) - *share_before_) > change;
+  if (task.changed_unread) {
+    // A transmitter that comes back does not read right at once.
+    constexpr std::size_t kComesBack = 5;
+    for (RecordRow& row : std::span(task.window.rows).first(kComesBack)) {
+      row.x_measured = row.flow_measured = false;
+    }
   }
   return task;
 }
@@ -351,13 +444,23 @@ std::optional<LookTask> EpisodeLooks::Step(const Sample& sample,
   }
   // With a clock that was set back the episode would be as young, or not have
   // begun, and no look would be due.
-  if (!rows_.empty() && sample.stamp_ns <= rows_.back().stamp_ns) {
+  const bool set_back =
+      !rows_.empty() && sample.stamp_ns <= rows_.back().stamp_ns;
+  if (set_back) {
     set_back_ns_ += rows_.back().stamp_ns + period_ns_ - sample.stamp_ns;
   }
+  const std::size_t rows = rows_.size();
   AddRow(sample);
   std::optional<LookTask> due;
   const std::int64_t age_ns =
       detection_ns_ ? sample.stamp_ns + set_back_ns_ - *detection_ns_ : 0;
+  // Behind a gap the valve may be another one: a look as after a detection, and
+  // behind a long one none before there are rows for it.
+  if (detection_ns_ && rows > 1 && rows_.size() == 1 && !set_back) {
+    const std::int64_t soon = age_ns / slowness_ + kFirstAge;
+    next_age_ns_ =
+        outage_end_ns_ == sample.stamp_ns ? soon : std::min(next_age_ns_, soon);
+  }
   const auto is_due = [&] { return age_ns >= slowness_ * next_age_ns_; };
   if (detection_ns_ && is_due()) {
     // After a gap one look stands for all that it passed over. A look for which
@@ -511,8 +614,12 @@ void ObserversMemory::Step(std::int64_t detection_stamp_ns,
   }
 }
 
-ValveLooks::ValveLooks(const ValvePhysics& physics)
-    : looks_(physics), period_ns_(PeriodOf(physics)) {}
+ValveLooks::ValveLooks(const ValvePhysics& physics, const ModelSet* models)
+    : looks_(physics),
+      models_(models),
+      trained_(models != nullptr ? TrainedSignals(*models)
+                                 : std::numeric_limits<SignalMask>::max()),
+      period_ns_(PeriodOf(physics)) {}
 
 std::optional<LookTask> ValveLooks::Step(const Sample& sample,
                                          const Verdict& verdict) {
@@ -522,7 +629,7 @@ std::optional<LookTask> ValveLooks::Step(const Sample& sample,
     stamp_ns_ = sample.stamp_ns;
   }
   const LookAnswer* found = suspicion_.found();
-  auto due = looks_.Step(sample, verdict, found != nullptr);
+  auto due = looks_.Step(WithOnly(sample, trained_), verdict, found != nullptr);
   open_ = verdict.detected;
   for (const Transition& transition : verdict.Transitions()) {
     detection_ns_ = transition.detection_stamp_ns;
@@ -558,6 +665,9 @@ void ValveLooks::EnterInBook(const LookTask& task, LookAnswer answer) {
 }
 
 void ValveLooks::Enter(const LookTask& task, LookAnswer answer) {
+  if (models_ != nullptr) {
+    BindGroups(models_->groups, answer);
+  }
   if (task.occasion != LookOccasion::kEpisode) {
     suspicion_.Enter(task.stamp_ns, std::move(answer));
   } else if (task.detection_stamp_ns == detection_ns_) {

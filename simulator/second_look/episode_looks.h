@@ -30,6 +30,8 @@ struct LookTask {
   LookOccasion occasion{LookOccasion::kEpisode};
   std::vector<Explanation> known{};  ///< Of kGrowth: EstimateStrengths().
   std::int64_t slowness{1};          ///< See SlownessOf().
+  /// The flow has changed while nothing was read, just before the window.
+  bool changed_unread{false};
   /// By how much the stamps of the valve were set back since the detection.
   std::int64_t set_back_ns{0};
 
@@ -62,6 +64,9 @@ struct LookAnswer {
   LookOutcome outcome{LookOutcome::kNoneFits};
   std::vector<Explanation>
       faults;  ///< One each, best first; of kNoneFits none.
+  /// Those beyond the margin by no more than the errors of a simulation that
+  /// lacks X or a pressure; none where it has them.
+  std::vector<Explanation> beside{};
   double misfit{0.0};
   /// Of an early look: its set is wider, it does not overrule the observers,
   /// and no later look is measured by it. It is there for faults that are over
@@ -109,6 +114,19 @@ std::optional<LookAnswer> TakeLook(const ValvePhysics& physics,
 /// The observers have isolated a fault, and not only what the floor finds.
 bool ObserversName(const ModelSet& models, FaultSet isolated);
 
+/// Faults that look the same to the observers of a set: ModelSet::groups.
+using FaultGroups = std::vector<std::vector<int>>;
+
+/// Adds to the faults of the answer those beside them that are of their groups:
+/// what is known to look alike binds a look that is not sure to know better.
+void BindGroups(const FaultGroups& groups, LookAnswer& answer);
+
+/// Where the flow has changed while nothing was read, and the look names
+/// nothing: the faults of a meter or the line that explain it better than none
+/// does, if they are a name. Trim and rod wear while they work; transmitters
+/// are set, and lines switched, during outages.
+void KeepMeterAndLine(const SecondLook& look, LookAnswer& answer);
+
 /// The faults that an answer names, ascending; empty: unknown. Nothing if what
 /// the engine says stands. @param observers_name see ObserversName().
 std::optional<std::vector<int>> NamesOf(const LookAnswer& answer,
@@ -149,6 +167,8 @@ class EpisodeLooks {
   };
 
   void AddRow(const Sample& sample);
+  void BeginRows(std::int64_t stamp_ns);
+  double FlowShare(bool last) const;
   std::optional<LookTask> Task() const;
   std::optional<LookTask> RoutineTask(bool suspected) const;
 
@@ -157,6 +177,11 @@ class EpisodeLooks {
   std::int64_t slowness_;
   SignalMask signals_{0};
   std::deque<Row> rows_{};
+  // Of the last time that the rows began anew: when, if nothing was read for
+  // five minutes or more before; the last stamp and FlowShare() before that.
+  std::int64_t outage_end_ns_{0};
+  std::int64_t before_ns_{0};
+  std::optional<double> share_before_{};
   std::optional<std::int64_t> detection_ns_{};
   std::int64_t next_age_ns_{0};
   std::int64_t set_back_ns_{0};  // See LookTask.
@@ -238,8 +263,10 @@ class ObserversMemory {
 /// of the open episode, and whether there should be one.
 class ValveLooks {
  public:
-  /// `physics` must outlive it.
-  explicit ValveLooks(const ValvePhysics& physics);
+  /// `physics` and `models` must outlive it; without a set, every signal counts
+  /// and no groups bind.
+  explicit ValveLooks(const ValvePhysics& physics,
+                      const ModelSet* models = nullptr);
 
   /// The next sample, whatever its intake, and what the engine said about it.
   std::optional<LookTask> Step(const Sample& sample, const Verdict& verdict);
@@ -268,6 +295,8 @@ class ValveLooks {
   void EnterInBook(const LookTask& task, LookAnswer answer);
 
   EpisodeLooks looks_;
+  const ModelSet* models_;
+  SignalMask trained_;
   std::int64_t period_ns_;
   LookBook book_;
   Suspicion suspicion_;

@@ -78,8 +78,10 @@ class Looker {
   Looker(const ValvePhysics& physics, const LookWindow& window)
       : physics_(physics),
         window_(window),
+        valve_(physics.parameters),
         rows_(static_cast<int>(window.rows.size())),
         detection_(static_cast<int>(window.detection)) {
+    valve_.instruments.flow.high = MeterEnd();
     // Before any fault: those of the flow alone are built on it, and the effect
     // of every fault is the difference from it.
     healthy_ = Simulate(0, 0.0, {0, false});
@@ -99,6 +101,7 @@ class Looker {
   // Rows that do not count, because the simulation starts at rest.
   int Settling() const { return std::min(10, detection_ / 2); }
   double StrengthAt(int row, double strength, Course course) const;
+  double MeterEnd() const;
   void FindUsualInputs();
   InputRow InputAt(int row, int fault, double strength) const;
   bool IsSeenInInputs(const Hypothesis& h) const;
@@ -130,12 +133,39 @@ class Looker {
 
   const ValvePhysics& physics_;
   const LookWindow& window_;
+  ValveParameters valve_;  // With the flow transmitter as the window shows it.
   int rows_;
   int detection_;
   InputRow usual_{};  // Mean inputs before the detection, or in onboarding.
   std::optional<double> command_away_{};
   Trajectory healthy_;
 };
+
+// Of a valve in another size than its type the range of the flow transmitter is
+// a guess. It ends where readings repeat that were not reached before the
+// fault: whatever the noise, a flow beyond the limit reads the limit.
+double Looker::MeterEnd() const {
+  constexpr double kLeastUse = 0.75;  // Of the guess; what is stuck is below.
+  constexpr int kMinReadings = 10;
+  const double end = valve_.instruments.flow.high;
+  double most = kLeastUse * end;
+  int equal = 0;
+  for (const RecordRow& row : window_.rows) {
+    if (row.flow_measured && row.flow >= most) {
+      equal = row.flow > most ? 1 : equal + 1;
+      most = row.flow;
+    }
+  }
+  const auto is_near = [&](const RecordRow& row) {
+    return row.flow_measured && row.flow > most - 3.0 * physics_.flow.sd;
+  };
+  const auto detected = window_.rows.begin() + detection_;
+  const bool ends =
+      equal >= kMinReadings &&
+      std::none_of(window_.rows.begin(), detected, is_near) &&
+      3 * equal >= std::count_if(detected, window_.rows.end(), is_near);
+  return ends ? most : std::max(end, most);
+}
 
 double Looker::StrengthAt(int row, double strength, Course course) const {
   if (row < course.start) {
@@ -211,7 +241,7 @@ Trajectory Looker::Simulate(int fault, double strength, Course course,
     excitation.rows.push_back(
         InputAt(k, fault, StrengthAt(k, strength, course)));
   }
-  config.parameters = physics_.parameters;
+  config.parameters = valve_;
   config.parameters.actuator.supply_pressure_gauge_pa *= supply;
   config.excitation = std::move(excitation);
   config.period_s = SimulatedPeriod(physics_.drive.period_s);
@@ -258,7 +288,7 @@ Trajectory Looker::FlowOnly(int fault, double strength, Course course) const {
       ApplyFault(fault, now, effects);
     }
     RecordAnswer& answer = answers[static_cast<std::size_t>(k)];
-    answer.flow = FlowReading(physics_.parameters, effects,
+    answer.flow = FlowReading(valve_, effects,
                               window_.rows[static_cast<std::size_t>(k)].input,
                               answer.x_pct);
   }
@@ -349,7 +379,7 @@ double Looker::Readings() const {
 // How unusual the inputs are, behind the detection, if the fault is there.
 double Looker::InputCost(int fault, double strength, Course course,
                          const Trajectory& answers) const {
-  const Instrumentation& i = physics_.parameters.instruments;
+  const Instrumentation& i = valve_.instruments;
   double cost = 0.0;
   const auto add = [&](Signal signal, double InputRow::*member,
                        const InputBand& band, const Transmitter& transmitter,
@@ -467,7 +497,7 @@ std::vector<Hypothesis> Looker::Hypotheses() const {
   for (int fault = 1; fault <= kLastFault; ++fault) {
     const FaultFacts& facts = FaultFactsOf(fault);
     if (facts.weak || !IsVisibleIn(fault, window_.signals) ||
-        !Exists(fault, physics_.parameters)) {
+        !Exists(fault, valve_)) {
       continue;
     }
     for (const double sign : {1.0, -1.0}) {
@@ -633,7 +663,7 @@ ChannelFit Looker::FitWithoutFault() const {
   const bool has_flow = Measures(Signal::kF);
   // A constant shift of one reading by some per cent: drift.
   constexpr double kDrift = 0.02;
-  const Instrumentation& i = physics_.parameters.instruments;
+  const Instrumentation& i = valve_.instruments;
   // What a drift of one reading changes; the rest of the cost stays.
   const auto drifted = [&](bool flow, const Transmitter& transmitter,
                            const Scatter& scatter) {

@@ -13,6 +13,7 @@
 #include <unistd.h>
 
 #include "base/error.h"
+#include "base/headroom.h"
 #include "base/text.h"
 #include "diagnosis/records/valve_glob.h"
 #include "storage/database/data_directory.h"
@@ -39,7 +40,10 @@ auto SqliteCall(std::string_view operation, Call&& call) {
 
 [[noreturn]] void Refuse(const std::filesystem::path& path,
                          const std::string& reason) {
-  throw DataError("database " + path.string() + ": " + reason);
+  // SQLite names other reasons where no descriptor is left.
+  const std::string lack = LackOfDescriptors(4);
+  throw DataError("database " + path.string() + ": " +
+                  (lack.empty() ? reason : lack));
 }
 
 /// Reports the reason that SQLite would hide behind "unable to open".
@@ -54,6 +58,10 @@ void CheckReachable(const std::filesystem::path& path, Access access) {
     Refuse(path, "is a directory, not a file");
   }
   const bool exists = std::filesystem::exists(path, error);
+  // SQLite would wait at a FIFO for ever.
+  if (exists && !std::filesystem::is_regular_file(path, error)) {
+    Refuse(path, "is a device, socket or FIFO, not a file");
+  }
   if (!exists && access != Access::kReader) {
     return;
   }

@@ -55,7 +55,7 @@ ExclusiveLock::ExclusiveLock(const std::filesystem::path& path,
 
 std::optional<std::string> ExclusiveLock::HolderOf(
     const std::filesystem::path& path) {
-  const int file = open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  const int file = open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
   if (file < 0) {
     return std::nullopt;
   }

@@ -80,7 +80,8 @@ bool RecorderLiveness::IsAlive(std::int64_t id) const {
 
 bool RecorderLiveness::IsAlive(const std::filesystem::path& database,
                                std::int64_t id) {
-  const int file = open(LivePath(database).c_str(), O_RDONLY | O_CLOEXEC);
+  const int file =
+      open(LivePath(database).c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
   if (file < 0) {
     return false;
   }
@@ -92,7 +93,8 @@ bool RecorderLiveness::IsAlive(const std::filesystem::path& database,
 std::vector<std::int64_t> RecorderLiveness::Alive(
     const std::filesystem::path& database) {
   std::vector<std::int64_t> ids;
-  const int file = open(LivePath(database).c_str(), O_RDONLY | O_CLOEXEC);
+  const int file =
+      open(LivePath(database).c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
   struct flock lock = ByteLock(0);
   while (file >= 0) {
     lock.l_type = F_WRLCK;

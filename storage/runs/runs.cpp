@@ -1,5 +1,6 @@
 #include "storage/runs/runs.h"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -103,20 +104,26 @@ void CheckLabel(int fault, double strength) {
 
 std::string ImportPart(Database& database, const SampleSeries& part,
                        const NewRun& run) {
-  std::vector<StoredSample> samples;
-  samples.reserve(part.samples.size());
-  RunCounters counters;
-  for (const LabelledSample& labelled : part.samples) {
-    StoredSample stored;
-    stored.sample = labelled.sample;
-    stored.sample.source_id = run.source_id;
-    stored.truth = labelled.truth;
-    counters.Count(stored);
-    samples.push_back(stored);
-  }
   std::string id = NewRunId();
   const std::int64_t run_id = InsertRun(database, id, run, std::nullopt);
-  InsertChunks(database, run_id, 0, samples, kImportChunk);
+  RunCounters counters;
+  ChunkHints hints;
+  // By chunks, so that there is no second copy of a long run.
+  for (std::size_t first = 0; first < part.samples.size();
+       first += kImportChunk) {
+    std::vector<StoredSample> samples;
+    const std::size_t end = std::min(first + kImportChunk, part.samples.size());
+    for (std::size_t k = first; k < end; ++k) {
+      StoredSample stored;
+      stored.sample = part.samples[k].sample;
+      stored.sample.source_id = run.source_id;
+      stored.truth = part.samples[k].truth;
+      counters.Count(stored);
+      samples.push_back(stored);
+    }
+    InsertChunk(database, run_id, static_cast<std::int64_t>(first), samples,
+                &hints);
+  }
   AddCounters(database, run_id, counters);
   return id;
 }

@@ -62,6 +62,27 @@ TEST(HeadroomTest, WithoutAddressSpaceTheFiguresAndLimitsAreNamed) {
               "no room for 1 threads and 100 MB of memory");
 }
 
+// In a process of its own that may have so many descriptors.
+[[noreturn]] void OpenWith(rlim_t limit, int count) {
+  const rlimit limits{limit, limit};
+  setrlimit(RLIMIT_NOFILE, &limits);
+  try {
+    for (int i = 0; i < 5; ++i) {
+      RequireDescriptors(count);
+    }
+  } catch (const PassingError& error) {
+    std::cerr << error.what() << '\n';
+    std::_Exit(kExitPassing);
+  }
+  std::_Exit(0);
+}
+
+TEST(HeadroomTest, WithoutDescriptorsTheirLimitIsNamed) {
+  EXPECT_EXIT(OpenWith(64, 80), testing::ExitedWithCode(kExitPassing),
+              "no room for 80 files and sockets .*: see ulimit -n");
+  EXPECT_EXIT(OpenWith(64, 32), testing::ExitedWithCode(0), "");
+}
+
 TEST(HeadroomTest, WhatWasTriedIsGivenBack) {
   if (kSanitized) {
     GTEST_SKIP() << "under a sanitizer";

@@ -2,6 +2,8 @@
 // actions, trends, a monitor that is killed, other hosts, accessibility.
 
 import assert from 'node:assert/strict';
+import {writeFileSync} from 'node:fs';
+import path from 'node:path';
 import {after, before, test} from 'node:test';
 
 import {accessibilityFaults, inkShare, launch, open, setScheme} from './browser.mjs';
@@ -157,7 +159,7 @@ test('what was done to alarms is there after the restart', async () => {
   await page.context().close();
 });
 
-test('a valve that is silent when the monitor starts is listed', async () => {
+test('valves that ought to be there are listed, silent or not', async () => {
   const page = await open(browser, address, '#/');
   const once = page.locator('.tile', {hasText: 'ONCE'});
   // Its publisher dies, so that the stream does not end: it falls silent.
@@ -165,6 +167,11 @@ test('a valve that is silent when the monitor starts is listed', async () => {
       '--speed', '20');
   await once.waitFor();
   publisher.kill('SIGKILL');
+  await plant.run('fdi-store', 'valves', 'assign', 'GIVEN', 'quick');
+  writeFileSync(path.join(plant.data, 'plant.csv'),
+      'name,service,op,pv\nTABLED,F,CV_pct,F_t_h\n');
+  await plant.run('fdi-store', 'valves', 'add', '--plant',
+      path.join(plant.data, 'plant.csv'));
 
   monitor.kill('SIGTERM');
   await monitor.ended;
@@ -172,6 +179,10 @@ test('a valve that is silent when the monitor starts is listed', async () => {
   await page.reload();
 
   await once.filter({hasText: /no data since \d/}).waitFor();
+  for (const id of ['GIVEN', 'TABLED']) {
+    await page.locator('.tile', {hasText: id}).filter({hasText: 'no data'})
+        .waitFor();
+  }
   await page.context().close();
 });
 

@@ -26,6 +26,7 @@ export class Plant {
   // A proxy, which the browser plays, names anna.
   access = ['--console-users', path.join(this.data, 'proxied'),
     '--console-proxy-user', 'X-User', '--console-proxy-from', '127.0.0.1'];
+  modelSet = 'quick';
   #domain = process.env.FDI_DOMAIN;
   #children = new Set();
 
@@ -39,10 +40,13 @@ export class Plant {
   }
 
   /** Runs a program to its end. @returns its stdout. */
-  async run(program, ...words) {
+  run(program, ...words) {
+    return this.#run(kPatienceMs, program, words);
+  }
+
+  async #run(timeout, program, words) {
     const {stdout} = await promisify(execFile)(path.join(bin, program),
-        ['--data', this.data, ...words],
-        {timeout: kPatienceMs, maxBuffer: 1 << 26});
+        ['--data', this.data, ...words], {timeout, maxBuffer: 1 << 26});
     return stdout;
   }
 
@@ -65,14 +69,14 @@ export class Plant {
     return child;
   }
 
-  train() {
-    return this.run('fdi-trainer', 'train', '--campaign',
-        process.env.FDI_CAMPAIGN, '--log-level', 'warning');
+  train(campaign = process.env.FDI_CAMPAIGN, patienceMs = kPatienceMs) {
+    return this.#run(patienceMs, 'fdi-trainer', ['train', '--campaign',
+      campaign, '--log-level', 'warning']);
   }
 
   /** A monitor with a console on `port`, and the address of its page. */
   async startMonitor(port = 0, ...words) {
-    const monitor = this.start('fdi-monitor', 'run', '--model-set', 'quick',
+    const monitor = this.start('fdi-monitor', 'run', '--model-set', this.modelSet,
         `--console=127.0.0.1:${port}`, ...this.access, ...words);
     await until(() => monitor.errors.includes('monitor_ready') ||
         monitor.exitCode !== null, `monitor_ready\n${monitor.errors}`);

@@ -15,6 +15,7 @@ const kTypes = {html: 'text/html', js: 'text/javascript', css: 'text/css',
   svg: 'image/svg+xml'};
 const kNowMs = Date.now();
 const kDayMs = 86400000;
+const kLongId = 'PLANT-HALL-NORTH-LIC-2107A';
 
 /** A monitor of canned `answers`, by path; `asked` are its last requests. */
 class Monitor {
@@ -311,13 +312,30 @@ test('what is judged in part only is said, with the reason', async () => {
       ['bar', 'half', 'mass', 'wide', 'well']);
   await page.getByRole('button', {name: /Not or partly judged 4/}).waitFor();
 
+  monitor.answers['valves/half/trend'] = {...trend({state: 'NORMAL', d0: 1,
+    d: [0, 0]}), words: 'as the normal model expects'};
   await page.goto(`${address}/#/valve/half`);
   await page.locator('.state-line').getByText('no P1; F not judged').waitFor();
+  await page.getByText('yes, as far as judged').waitFor();
+  await page.getByText('expects, as far as it is judged').waitFor();
   assert.doesNotMatch(await page.locator('.state-line').innerText(), /normal/);
   await close(page);
 });
 
-test('a label reaches alarm list, tile and valve page, at once', async () => {
+test('what ended before it had a name is not unlike any known fault',
+    async () => {
+      monitor.reset([], [alarm('0000000000000001', 'V', 'unknown',
+          {certainty: 'not yet', isa: 'RTN_UNACK', state: 'CLOSED'}),
+      alarm('0000000000000002', 'W', 'unknown', {certainty: 'not known'})]);
+      const page = await openShared(browser, address, '#/alarms');
+      await page.locator('tr', {hasText: 'V'}).getByText('not yet known which')
+          .waitFor();
+      await page.locator('tr', {hasText: 'W'})
+          .getByText('unlike any known fault').waitFor();
+      await close(page);
+    });
+
+test('a label reaches alarm list, tile and valve page, at any size', async () => {
   const episode = '0000000000000001';
   const row = alarm(episode, 'V', 'f19');
   monitor.reset([tile('V', 'ISOLATED', ['f19'], {episode})], [row]);
@@ -334,7 +352,11 @@ test('a label reaches alarm list, tile and valve page, at once', async () => {
   await page.reload();
   await page.locator('.state-line', {hasText: 'was Plug worn'}).waitFor();
   await page.goto(`${address}/#/alarms`);
-  await page.locator('tr[data-episode]', {hasText: 'was Plug worn'}).waitFor();
+  for (const width of [1400, 390]) {
+    await page.setViewportSize({width, height: 800});
+    await page.locator('tr[data-episode]').getByText('label: was Plug worn')
+        .waitFor();
+  }
   await close(page);
 });
 
@@ -373,8 +395,9 @@ test('a tile says since when and how strong, and cuts no id to sameness',
     async () => {
       const long = 'PLANT-NORTH-UNIT-0042-LINE-7-';
       monitor.reset([tile(`${long}LIC-101A`, 'ISOLATED', ['f19'],
-          {since_ms: kNowMs - 60000, strength: 0.52, spark: [0, 0.9, 1]}),
-      tile(`${long}FIC-101A`, 'NORMAL', [], {spark: [0, 0.1, 0]})]);
+          {since_ms: kNowMs - 60000, strength: 0.52, spark: [0, 0.9, 1, 1]}),
+      // A healthy valve has single points that deviate: no line for them.
+      tile(`${long}FIC-101A`, 'NORMAL', [], {spark: [0, 0.9, 0, 0.4, 0]})]);
       const page = await openShared(browser, address, '#/');
       const first = page.locator('.tile', {hasText: `${long}LIC`});
       await first.waitFor();
@@ -389,6 +412,63 @@ test('a tile says since when and how strong, and cuts no id to sameness',
       assert.equal(await first.locator('.tile-id').getAttribute('title'),
           `${long}LIC-101A`);
       assert.equal(await page.locator('.spark:not([hidden])').count(), 1);
+      await close(page);
+    });
+
+test('what looks the same is named where there is room, and covers nothing',
+    async () => {
+      const row = alarm('0000000000000001', kLongId, 'f19',
+          {certainty: 'one of', look_alikes: ['f6'], factor: 0.9});
+      monitor.reset([tile(kLongId, 'ISOLATED', ['f19'],
+          {...row, since_ms: kNowMs - 3 * kDayMs, strength: -0.7}),
+      tile('V', 'NOT_JUDGED', [], {active: true, fault: 'f19', strength: 0.5,
+        certainty: 'likely', unconfirmed_ms: kNowMs - 3 * kDayMs})], [row]);
+      for (const width of [1400, 390]) {
+        const page = await openShared(browser, address, '#/',
+            {viewport: {width, height: 800}});
+        for (const density of ['comfortable', 'compact']) {
+          await page.getByLabel('Size of the tiles').selectOption(density);
+          const first = page.locator('.tile', {hasText: 'LIC-2107A'});
+          await first.waitFor();
+          const covered = await first.evaluate((node) => {
+            const [tail, word] = ['.tile-id > :last-child', '.tile-certainty']
+                .map((part) => node.querySelector(part).getBoundingClientRect());
+            return tail.right > (word.left || innerWidth) ||
+              tail.right > node.getBoundingClientRect().right;
+          });
+          assert.equal(covered, false, `${width} ${density}`);
+        }
+        await page.getByLabel('Size of the tiles').selectOption('comfortable');
+        const said = await page.locator('.tile').allInnerTexts();
+        assert.match(said[0], /one of 2\nFlow transmitter wrong or Plug worn\n/);
+        assert.match(said[0], /strong, since \d{4}-\d\d-\d\d/);
+        assert.match(said[1], /strong, not confirmed since \d{4}-\d\d-\d\d/);
+        await page.goto(`${address}/#/alarms`);
+        await page.locator('td.fault a', {hasText: 'or Plug worn'}).waitFor();
+        await page.getByText('one of 2', {exact: true}).waitFor();
+        await close(page);
+      }
+    });
+
+test('a monitor that is degraded says so on any screen', async () => {
+  monitor.reset();
+  monitor.answers.status.health = 'DEGRADED';
+  for (const width of [1400, 390]) {
+    const page = await openShared(browser, address, '#/',
+        {viewport: {width, height: 800}});
+    await page.getByText('Monitor degraded').waitFor();
+    await close(page);
+  }
+});
+
+test('a plant without valves and a list without alarms say what comes',
+    async () => {
+      monitor.reset();
+      const page = await openShared(browser, address, '#/');
+      await page.getByText('appears with its first sample').waitFor();
+      await page.goto(`${address}/#/alarms`);
+      await page.getByText('No alarm is open').waitFor();
+      assert.equal(await page.locator('thead').isVisible(), false);
       await close(page);
     });
 
@@ -451,6 +531,21 @@ test('an alarm stays one while its valve is not judged', async () => {
   await page.locator('.state-line')
       .getByText('Flow transmitter wrong (f19): not judged now').waitFor();
   await page.locator('.checks', {hasText: 'Compare it.'}).waitFor();
+  assert.equal(await page.locator('.state-line .sign text').textContent(),
+      '2');
+  await close(page);
+});
+
+test('an alarm whose data ended stays, and can be shelved', async () => {
+  const ended = {state: 'CLOSED', unconfirmed_ms: kNowMs};
+  monitor.reset([], [alarm('0000000000000001', 'V', 'f19', ended),
+    alarm('0000000000000002', 'W', 'f19', {...ended, isa: 'RTN_UNACK',
+      unconfirmed_ms: null})]);
+  Object.assign(monitor.answers.status, {write: true, user: 'anna'});
+  const page = await openShared(browser, address, '#/alarms');
+  await page.locator('tr.group-UNACK', {hasText: 'not confirmed since'})
+      .getByRole('button', {name: 'Shelve V'}).waitFor();
+  assert.equal(await page.getByRole('button', {name: 'Shelve W'}).count(), 0);
   await close(page);
 });
 
@@ -512,7 +607,6 @@ test('a narrow screen keeps what to check', async () => {
   await close(page);
 });
 
-const kLongId = 'PLANT-HALL-NORTH-LIC-2107A';
 const kReport = {
   made_utc: '2026-11-25T12:00:00Z', since_utc: '2026-11-18T12:00:00Z',
   coverage: {loops: 3, named_faults: 1, audit: 1, nothing: 1}, others: [],

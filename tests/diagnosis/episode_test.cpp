@@ -51,6 +51,22 @@ class EpisodeTest : public ::testing::Test {
     return last;
   }
 
+  // Samples of which normal operation has the factor `normal`.
+  std::optional<Transition> Found(FaultSet floor, double normal, int samples) {
+    std::optional<Transition> last;
+    for (int i = 0; i < samples; ++i) {
+      Findings findings = Next();
+      findings.floor = floor;
+      verdict_.normal_factor = normal;
+      verdict_.fault_factors.fill(0.0);
+      episode_->Step(PlantSample(k_), *bank_, findings, verdict_);
+      if (verdict_.transition_count > 0) {
+        last = verdict_.Transitions().back();
+      }
+    }
+    return last;
+  }
+
   std::shared_ptr<const ObserverPlan> plan_;
   std::optional<ObserverBank> bank_;
   std::optional<Episode> episode_;
@@ -102,6 +118,35 @@ TEST_F(EpisodeTest, ANameThatIsGivenUpSaysWhy) {
   EXPECT_EQ(given_up->faults, 0U);
   EXPECT_EQ(given_up->unknown, Unknown::kTooEarly);
   EXPECT_EQ(verdict_.unknown, Unknown::kTooEarly);
+}
+
+// What the floor found is the name of what goes on, not of what came before it.
+TEST_F(EpisodeTest, AFindingThatIsOverIsNotTheNameOfWhatGoesOn) {
+  ModelSet models = LinearPlant();
+  models.floor.emplace();
+  AddFindings(models);
+  Use(models);
+  const FaultSet first = FindingsOf(models) & ~(FindingsOf(models) - 1);
+  const FaultSet second = first << 1;
+  const int last = models.decision.isolation_samples * 3 / 2;
+  Found(first | second, 0.0, 40);
+  ASSERT_EQ(verdict_.isolated, first | second);
+  EXPECT_FALSE(Found(second, 0.0, last - 1));
+  const auto dropped = Found(second, 0.0, 1);
+  ASSERT_TRUE(dropped);
+  EXPECT_EQ(dropped->kind, TransitionKind::kReisolated);
+  EXPECT_EQ(dropped->faults, second);
+  // A valve that looks healthy by now keeps the name of what it had.
+  EXPECT_FALSE(Found(0, 1.0, 2 * last));
+  EXPECT_EQ(verdict_.isolated, second);
+  // What comes and goes is not over.
+  for (int i = 0; i < 4; ++i) {
+    EXPECT_FALSE(Found(0, 0.0, last - 1));
+    EXPECT_FALSE(Found(second, 0.0, 1));
+  }
+  EXPECT_TRUE(Found(0, 0.0, last));
+  EXPECT_EQ(verdict_.state, State::kDetected);
+  EXPECT_EQ(verdict_.isolated, 0U);
 }
 
 // The floor opens the episode, and the valve is not judged any more before the

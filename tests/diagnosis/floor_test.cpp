@@ -310,6 +310,28 @@ TEST(FloorTest, HoldsInAutoOnlyAndNeverWithoutLimits) {
   }
 }
 
+// Onboarded without P1 and P2, the gain is that of F; with the readings of a
+// valve that has them, the opening would seem to pass thirty times as much.
+TEST(FloorTest, SignalsThatTheSetWasNotTrainedWithDoNotCount) {
+  for (const bool trained : {false, true}) {
+    ModelSet models = FlooredPlant();
+    models.floor->flow_gain = 100.0;
+    models.floor->dp_level = 1.0;
+    models.floor->flow_high = 200.0;
+    if (trained) {
+      models.validity.dp = {800.0, 1000.0};
+    }
+    ValveEngine engine(std::make_shared<const ModelSet>(models));
+    for (std::uint64_t k = 0; k < 100; ++k) {
+      Sample sample = tests::PlantSample(k);
+      sample.Set(Signal::kP1, 3500.0);
+      sample.Set(Signal::kP2, 2600.0);
+      engine.Step(sample);
+    }
+    EXPECT_EQ(engine.episode_open(), trained);
+  }
+}
+
 TEST(FloorTest, WhatIsUncertainIsNotTested) {
   const auto found = [](SignalQuality quality) {
     return FirstFindings([=](int) {

@@ -465,6 +465,29 @@ TEST(CsvTest, TagsOfALongTableAreResampledAndWhatIsFilledIsMarked) {
   }
 }
 
+// Pieces of an export meet in rows that are there twice; the tags of one
+// instant are not such rows.
+TEST(CsvTest, RepeatsOfALongTableAreThoseOfATag) {
+  CsvOptions options;
+  options.map.long_table = LongTable{};
+  options.map.time_column = "time";
+  options.map.zone = "UTC";
+  options.map.columns = {{"OP", Signal::kCv}, {"ZT", Signal::kX}};
+  options.skip_repeats = true;
+
+  const CsvTable table = ReadCsv(
+      "time,tag,value\n"
+      "2026-01-05 10:00:00,OP,40\n2026-01-05 10:00:00,ZT,41\n"
+      "2026-01-05 10:00:01,OP,42\n2026-01-05 10:00:01,ZT,43\n"
+      "2026-01-05 10:00:01,OP,42\n2026-01-05 10:00:01,ZT,43\n",
+      options);
+
+  ASSERT_EQ(table.runs.size(), 1U);
+  ASSERT_EQ(table.runs[0].samples.size(), 2U);
+  EXPECT_EQ(table.runs[0].samples[1].sample[Signal::kCv], 42.0);
+  EXPECT_EQ(table.runs[0].samples[1].sample[Signal::kX], 43.0);
+}
+
 TEST(CsvTest, FilesThatCannotBeReadAreNamedWithTheReason) {
   const storage::TemporaryDirectory directory;
   const auto message = [](const std::filesystem::path& path) {

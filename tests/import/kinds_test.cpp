@@ -416,6 +416,54 @@ std::vector<Kind> Kinds() {
                 "," + Fixed(kValve.f[k]);
        }),
        Range(20, 31)},
+      {"settings that look like rows in front of the names",
+       "Channels\t3\t\t\nSamples\t120\t120\t120\n"
+       "Y_Unit_Label\t%\t%\tt/h\nX_Dimension\tTime\tTime\tTime\n"
+       "X0\t0.0\t0.0\t0.0\n***End_of_Header***\t\t\t\t\n"
+       "Time\tFV17 Output\tFV17 Position\tFT17 Flow\tComment\n" +
+           Rows([](std::size_t k) {
+             return Iso(k) + "\t" + Fixed(kValve.cv[k]) + "\t" +
+                    Fixed(kValve.x[k]) + "\t" + Fixed(kValve.f[k]);
+           })},
+      {"a title and the header on each page",
+       [&] {
+         std::string text;
+         for (std::size_t k = 0; k < kRows; ++k) {
+           text += k % 50 == 0 ? "\nTrend of unit 3,,,page " +
+                                     std::to_string(k / 50 + 1) + "\ntime," +
+                                     names + "\n"
+                               : "";
+           text += Iso(k) + "," + Plain(k) + "\n";
+         }
+         return text;
+       }()},
+      {"a clock with its zone, apart from the date",
+       "Date,Clock," + names + "\n" + Rows([](std::size_t k) {
+         return Clock("%Y-%m-%d,%H:%M:%SZ,", k) + Plain(k);
+       })},
+      {"weekdays, a unit behind a slash",
+       "Zeit;Y/%;X/%;q/(t/h)\n" + Rows([](std::size_t k) {
+         return "Di., " + Clock("%d.%m.%Y %H:%M:%S;", k) +
+                Fixed(kValve.cv[k], 4) + ";" + Fixed(kValve.x[k], 4) + ";" +
+                Fixed(kValve.f[k], 4);
+       })},
+      {"currents in the cells",
+       "Date,Clock,AO1 FV17,AI1 FV17,AI2 flow\n" + Rows([](std::size_t k) {
+         return Clock("%Y-%m-%d,%H:%M:%S,", k) +
+                Fixed(4.0 + 0.16 * kValve.cv[k], 4) + " mA," +
+                Fixed(4.0 + 0.16 * kValve.x[k], 4) + " mA," +
+                Fixed(kValve.f[k]) + " t/h";
+       })},
+      {"qualities of OPC HDA, with the kind of the reading",
+       "ItemID\tTimestamp\tQuality\tValue\n" +
+           Tall(
+               [](std::size_t k, const std::string& tag, double value) {
+                 const bool bad = tag == "17ZT.PV" && k >= 50 && k < 60;
+                 return tag + "\t" + Iso(k) +
+                        (bad ? "\t524288\t" : "\t262336\t") + Fixed(value, 4);
+               },
+               true),
+       Range(50, 59)},
       {"a leap second",
        [&] {
          // date -d 2016-12-31T23:59:00Z +%s
@@ -542,6 +590,133 @@ TEST(KindsTest, AmbiguousDecimalsAndDatesAreMarkedAsChoices) {
   given.decimal = '.';
   given.date_order = DateOrder::kMonthFirst;
   EXPECT_TRUE(Sniff(points, "plant.csv", given).choices.empty());
+}
+
+// In quotes between commas, as European spreadsheets save them.
+TEST(KindsTest, QuotedDecimalCommasAreAChoice) {
+  const std::string text = "Time,FC1.OP,ZT1.PV,FT1\n" + Rows([](std::size_t k) {
+                             return Iso(k) + ",\"" +
+                                    Comma(10.0 + kValve.cv[k]) + "\",\"" +
+                                    Comma(10.0 + kValve.x[k]) + "\",\"" +
+                                    Comma(1.0 + kValve.f[k]) + '"';
+                           });
+  EXPECT_THROW(ReadCsv(text, {.map = Utc()}), DataError);
+  const Sniffed found = Sniff(text, "plant.csv", Utc());
+  EXPECT_EQ(found.map.decimal, ',');
+  EXPECT_THAT(found.choices, Contains(HasSubstr("decimal: ")));
+  const CsvTable table = ReadCsv(text, {.map = MapOf(text, Utc())});
+  EXPECT_NEAR(table.runs.at(0).samples[5].sample[Signal::kCv],
+              90.0 - kValve.cv[5], 1e-3);
+}
+
+TEST(KindsTest, AColumnNamedUtcNeedsNoZone) {
+  const auto zone = [](const std::string& name, const ColumnMap& given) {
+    return Sniff(Wide(name + ",FC1.OP,ZT1.PV,FT1",
+                      [](std::size_t k) {
+                        return Clock("%Y-%m-%d %H:%M:%S", k);
+                      }),
+                 "plant.csv", given)
+        .map.zone;
+  };
+  EXPECT_EQ(zone("Time (UTC)", {}), "UTC");
+  EXPECT_EQ(zone("timestamp_utc", {}), "UTC");
+  EXPECT_EQ(zone("Time", {}), "");
+  ColumnMap given;
+  given.zone = "Europe/Warsaw";
+  EXPECT_EQ(zone("UTC Time", given), "Europe/Warsaw");
+}
+
+// Of a day that nothing in the file says: --start does.
+TEST(KindsTest, TimesWithoutADateCountFromTheStart) {
+  // "23:59:07" of "23:mm:ss", minutes and seconds.
+  const auto part = [](std::string form, std::size_t minute,
+                       std::size_t second) {
+    form.replace(form.find("mm"), 2, std::to_string(100 + minute).substr(1));
+    return form.replace(form.find("ss"), 2,
+                        std::to_string(100 + second).substr(1));
+  };
+  struct Case {
+    const char* first;
+    std::function<std::string(std::size_t)> time;
+    double begin_s;
+  };
+  const std::vector<Case> cases = {
+      // Over midnight, and in two rounds of an hour.
+      {"23:59:00",
+       [&](std::size_t k) {
+         return part(k < 60 ? "23:mm:ss" : "00:mm:ss", k < 60 ? 59 : 0, k % 60);
+       },
+       86340.0},
+      {"11:59:00 PM",
+       [&](std::size_t k) {
+         return part(k < 60 ? "11:mm:ss PM" : "12:mm:ss AM", k < 60 ? 59 : 0,
+                     k % 60);
+       },
+       86340.0},
+      {"59:00.0",
+       [&](std::size_t k) {
+         return part("mm:ss.0", (59 + k / 60) % 60, k % 60);
+       },
+       3540.0},
+      {"25:00:00",
+       [&](std::size_t k) { return part("25:mm:ss", k / 60, k % 60); },
+       90000.0},
+      {"0 days 00:00:00",
+       [&](std::size_t k) { return part("0 days 00:mm:ss", k / 60, k % 60); },
+       0.0},
+      {"0 sec", [](std::size_t k) { return std::to_string(k) + " sec"; }, 0.0}};
+  for (const Case& c : cases) {
+    SCOPED_TRACE(c.first);
+    ASSERT_EQ(c.time(0), c.first);
+    const std::string text = Wide("Time,17FC.OP,17ZT.PV,17FT.PV", c.time);
+    const ColumnMap map = MapOf(text, Utc());
+    EXPECT_EQ(map.time_form, TimeForm::kClock);
+    CsvTable table;
+    ASSERT_NO_THROW(table =
+                        ReadCsv(text, {.map = map, .start_ns = 7'000'000'000}));
+    ASSERT_EQ(table.runs.size(), 1U);
+    EXPECT_FALSE(table.dated);
+    const auto& samples = table.runs[0].samples;
+    ASSERT_EQ(samples.size(), kRows);
+    EXPECT_EQ(table.runs[0].period_s, 1.0);
+    EXPECT_EQ(samples[0].sample.stamp_ns,
+              7'000'000'000 + std::llround(c.begin_s * 1e9));
+    EXPECT_THAT(Findings(text), HasSubstr("times without a date"));
+  }
+  EXPECT_THROW(ReadCsv(Wide("Time,17FC.OP,17ZT.PV,17FT.PV",
+                            [&](std::size_t k) {
+                              return part("09:mm:ss", k / 60,
+                                          k == 7 ? 99 : k % 60);
+                            }),
+                       {.map = Utc()}),
+               DataError);
+}
+
+// The smallest usual range that command and position fit; whole numbers of a
+// flow beside percentages are none.
+TEST(KindsTest, CountsAreOfTheSmallestUsualRange) {
+  for (const double full : {1000.0, 4095.0, 10000.0, 27648.0}) {
+    const std::string text =
+        "time,LV1_CMD,LV1_FBK,FT1\n" + Rows([&](std::size_t k) {
+          return Iso(k) + "," + Fixed(full / 100.0 * kValve.cv[k], 0) + "," +
+                 Fixed(full / 100.0 * kValve.x[k], 0) + "," +
+                 Fixed(kValve.f[k]);
+        });
+    const CsvTable table = ReadCsv(text, {.map = MapOf(text, Utc())});
+    const Sample& sample = table.runs.at(0).samples.at(9).sample;
+    EXPECT_NEAR(sample[Signal::kCv], 100.0 - kValve.cv[9], 0.06) << full;
+    EXPECT_NEAR(sample[Signal::kX], 100.0 - kValve.x[9], 0.06) << full;
+    EXPECT_NEAR(sample[Signal::kF], kValve.f[9], 1e-3) << full;
+  }
+  const Sniffed mass =
+      Sniff("time,LV1_CMD,LV1_FBK,FT1\n" + Rows([&](std::size_t k) {
+              return Iso(k) + "," + Fixed(kValve.cv[k]) + "," +
+                     Fixed(kValve.x[k]) + "," + Fixed(1000.0 * kValve.f[k], 0);
+            }),
+            "plant.csv", Utc());
+  EXPECT_EQ(mass.columns.at(2).signal, Signal::kF);
+  EXPECT_EQ(mass.columns.at(2).unit, "kg/h");
+  EXPECT_TRUE(mass.columns.at(2).raw.empty());
 }
 
 TEST(KindsTest, FlaggedReadingsAreUncertain) {
@@ -814,6 +989,30 @@ TEST(KindsTest, TagsOfAPlantAreToldApartTogether) {
             {"FIC17.PIDA.SP", ""}},
            {{"FY101", "cv"}, {"FZT101", "x"}, {"FT101", "f"}},
            {{"LMN", "cv"}, {"LMNR_IN", "x"}, {"PV_IN", ""}},
+           {{"10LAB30AA101.YQ01", "cv"},
+            {"10LAB30AA101.XQ01", "x"},
+            {"10LAB30CF001.XQ01", "f"},
+            {"10LAB30AP001.XQ01", ""}},
+           {{"10 LAB30 AA101 YQ01", "cv"},
+            {"10 LAB30 AA101 XQ01", "x"},
+            {"10 LAB30 CF001 XQ50", "f"},
+            {"10 LAB30 CP001 XQ50", "p1"},
+            {"10 LAB40 CP001 XQ50", "p2"}},
+           {{"RL30S101 Y", "cv"}, {"RL30S101 X", "x"}, {"RL30F001", "f"}},
+           {{"LC-7 Y", "cv"}, {"LV-7 GT", "x"}, {"F-7", "f"}},
+           {{"u", "cv"}, {"x", "x"}, {"q", "f"}},
+           {{"W.YSOLL", "cv"}, {"W.YIST", "x"}, {"W.QIST", "f"}},
+           {{"11FC051.MV", "cv"},
+            {"11FC051.PV", "f"},
+            {"11FC051.SV", ""},
+            {"11FC051.VP", "x"}},
+           {{"FC7", "cv"}, {"GI7", "x"}, {"FI7", "f"}},
+           {{"FEED WTR CTL VLV DMD", "cv"},
+            {"FEED WTR CTL VLV POSN", "x"},
+            {"FEED WTR FLOW", "f"}},
+           {{"TagA", ""}, {"TagB", ""}, {"TagC", ""}},
+           {{"U2_LV7_OUT", "cv"}, {"U2_LV7_POS", "x"}, {"U2_FT7", "f"}},
+           {{"OUT%", "cv"}, {"POS%", "x"}, {"flow_tph", "f"}},
            {{"OP", "cv"}, {"PV", ""}, {"SV", "sp"}, {"FB", "x"}},
            {{"Flow Valve Cmd", "cv"},
             {"Flow Valve Pos", "x"},
@@ -913,8 +1112,10 @@ TEST(KindsTest, WhatValveAndRecordTheModelsAreNotForIsSaid) {
                                      Fixed(kValve.f[k]);
                             })),
               HasSubstr("no position (X)"));
-  EXPECT_THAT(Findings(wide("FV3.OP,FV3.ZT,FT3 [Nm3/h]", Plain)),
-              HasSubstr("a flow of gas"));
+  const std::string gas = wide("FV3.OP,FV3.ZT,FT3 [Nm3/h]", Plain);
+  EXPECT_THAT(Findings(gas), HasSubstr("a flow of gas"));
+  EXPECT_THAT(MapText(Sniff(gas, "gas.csv", {}), "gas.csv"),
+              HasSubstr("# [signal.F]\n# column = \"FT3 [Nm3/h]\""));
   EXPECT_THAT(
       Findings("time,FC1.OP,ZT1.PV,FT1 [t/h]\n" + Rows([](std::size_t k) {
                  return Clock("%Y-%m-%dT%H:%M:%SZ,", 60 * k) + Plain(k);

@@ -38,6 +38,10 @@ std::shared_ptr<const ModelSet> Models() {
   ModelSet models = LinearModels();
   models.faults = {1, 7, 13, 19};
   models.physics = simulator::ToValues(simulator::Physics());
+  // Trained with P1, P2, T1 and F.
+  models.validity.dp = {-1e6, 1e6};
+  models.validity.t1 = {-1e6, 1e6};
+  models.floor.emplace().flow_gain = 1.0;
   return std::make_shared<const ModelSet>(std::move(models));
 }
 

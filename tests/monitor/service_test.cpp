@@ -106,6 +106,18 @@ TEST_F(ServiceTest, AnErrorInTheOptionsLeavesNoTraceInTheHistory) {
   EXPECT_TRUE(history.Sessions().empty());
 }
 
+// The folder may be one that was not meant.
+TEST_F(ServiceTest, AFolderThatHadToBeMadeIsSaidOnce) {
+  global_.data_dir = directory_.path() / "mistyped";
+  ServiceOptions options;
+  options.valves = std::string(300, 'V');
+
+  EXPECT_THROW(Service(options, Context()), ConfigError);
+  EXPECT_EQ(Count("data_folder_made path=" + global_.data_dir.string()), 1U);
+  EXPECT_THROW(Service(options, Context()), ConfigError);
+  EXPECT_EQ(Count("data_folder_made"), 1U);
+}
+
 // Twice, as the first participant may leave threads of the library behind.
 TEST_F(ServiceTest, AnErrorAtTheStartLeavesNoThreadOfTheConsole) {
   const std::filesystem::path page = directory_.path() / "page";

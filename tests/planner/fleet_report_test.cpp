@@ -157,7 +157,9 @@ TEST_F(FleetReportTest, WhatIsNotJudgedIsListedWithItsReason) {
   EXPECT_EQ(unjudged[0]["valve_id"], "B");
   EXPECT_EQ(unjudged[0]["reason"], "its loop was not in automatic");
   EXPECT_NEAR(unjudged[0]["judged_share"].get<double>(), 2.0 / 22.0, 1e-5);
-  EXPECT_EQ(unjudged[1]["reason"], "it has no model set; audit: too short");
+  EXPECT_EQ(unjudged[1]["reason"],
+            "it has no model set, and no window of its loop was judged; "
+            "audit: too short");
   EXPECT_EQ(unjudged[2]["reason"], "no data came");
   EXPECT_EQ(unjudged[3]["reason"], "PV is constant");
 }

@@ -100,8 +100,8 @@ TEST(WorkListTest, WhySaysItInTheWordsOfTheCatalogue) {
   reason.episodes = 3;
   const std::string why = ReasonText(Valve("V1", {reason}), Options());
   EXPECT_EQ(why,
-            "Flow transmitter wrong: stands for 100 days, severity high at "
-            "strength -0.50, 3 episodes");
+            "Flow transmitter wrong: stands for 100 days, severity high, "
+            "strength -50 %, 3 episodes");
 }
 
 // Three valves with an episode each, as the history keeps them.
@@ -186,6 +186,21 @@ TEST_F(ReadWorkTest, WhereOnlyTheDataEndedTheFaultStands) {
       HasSubstr("stands for 1 min, not confirmed for less than a minute"));
 }
 
+// What is only detected is not "unlike any known fault", nor of strength 0.
+TEST_F(ReadWorkTest, WhatHasNoNameYetIsSaidSo) {
+  writer_.Record(
+      Event(TransitionKind::kDetected, 0, 0, 0.3, EndReason::kNone, "V4"),
+      kDetected);
+  query_.valve_glob = "V4";
+
+  const auto rows = Read();
+  ASSERT_EQ(rows.size(), 1u);
+  EXPECT_THAT(rows[0].why, testing::StartsWith("Fault without a name yet: "));
+  const report::Json row = WorkListReport(rows).document["rows"][0];
+  EXPECT_TRUE(row["fault"].is_null());
+  EXPECT_TRUE(row["strength"].is_null());
+}
+
 TEST_F(ReadWorkTest, ALabelSaysWhatItReallyWas) {
   Label("V1", "f13");
   for (const WorkRow& row : Read()) {
@@ -205,6 +220,36 @@ TEST_F(ReadWorkTest, ATrendIsAReasonOfItsOwn) {
   EXPECT_THAT(rows[0].why, HasSubstr("limit F=-10%: limit in 4"));
   EXPECT_NEAR(rows[0].work.travel_strokes, 60 * 24 * 10.0, 1e-6);
   EXPECT_NEAR(rows[0].work.service_hours, 60 * 24.0, 1e-6);
+}
+
+TEST_F(ReadWorkTest, AFigureBeyondItsLimitIsAReason) {
+  HealthHour hour;
+  hour.valve_id = "V9";
+  hour.hour = kDetected / (kDay / 24);
+  hour.seen_ms = 3'600'000;
+  hour.counts.turns = 10;
+  hour.counts.dead_band = 14'000;  // 1.4 % each.
+  hour.counts.slips = 1;           // No more than chance.
+  hour.counts.slip_size = 5'000;
+  Checkpoint checkpoint;
+  checkpoint.health = {hour};
+  writer_.CommitCheckpoint(checkpoint);
+  query_.valve_glob = "V9";
+
+  const auto rows = Read();
+
+  ASSERT_EQ(rows.size(), 1u);
+  EXPECT_EQ(rows[0].why,
+            "Dead band of the valve: 1.40 over the last day, accepted up to "
+            "1.00");
+  const auto json = WorkListReport(rows).document["rows"][0];
+  EXPECT_EQ(json["namur"], "maintenance required");
+  EXPECT_EQ(json["discipline"], "mechanical");
+  EXPECT_TRUE(json["fault"].is_null());
+  query_.discipline = "mechanical";
+  EXPECT_EQ(Read().size(), 1u);
+  query_.discipline = "air";
+  EXPECT_TRUE(Read().empty());
 }
 
 TEST_F(ReadWorkTest, WhatIsShelvedIsLeftOutUntilTheShelfEnds) {

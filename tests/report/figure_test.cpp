@@ -14,6 +14,7 @@
 #include "report/plot/episode_page.h"
 #include "report/plot/gnuplot.h"
 #include "report/plot/run_figure.h"
+#include "report/shared_files.h"
 #include "tests/storage/history_fixture.h"
 #include "tests/storage/message_of.h"
 
@@ -31,6 +32,17 @@ using testing::HasSubstr;
 using testing::Not;
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+
+TEST(EventSentenceTest, ANameThatIsTakenBackIsToldSo) {
+  const report::FaultTexts texts(report::SharedFile("faults.toml"));
+  storage::HistoryEntry event;
+  event.kind = "REISOLATED";
+  EXPECT_EQ(EventSentence(event, texts),
+            "The name was taken back: no known fault explains the readings.");
+  event.faults = "f7";
+  event.strength = 0.5;
+  EXPECT_THAT(EventSentence(event, texts), HasSubstr(" (f7), strength 0.50."));
+}
 
 TEST(IntervalTextTest, AWidthThatCannotBeSeenIsLeftOut) {
   EXPECT_EQ(IntervalText(0.42, 0.38, 0.46, 2), "0.42 (0.38 to 0.46)");
@@ -182,6 +194,22 @@ TEST(FigureScriptTest, TheLastPanelMayHaveAnAxisOfItsOwn) {
   EXPECT_THAT(svg, HasSubstr("5020"));  // Not in the unit of the time.
 }
 
+TEST(FigureScriptTest, TheAxisShowsTheClockOverMidnight) {
+  Figure figure{"V1"};
+  figure.is_time = true;
+  figure.clock_s = 23 * 3600.0 + 40 * 60.0;
+  figure.x = {-1800, 0, 1800};
+  figure.panels = {{"F", {{.title = "F", .y = {1, 2, 3}}}}};
+  if (!HaveGnuplot()) {
+    GTEST_SKIP() << "gnuplot is not installed";
+  }
+
+  const std::string svg = DrawFigure(figure, Format::kSvg);
+
+  EXPECT_THAT(svg, HasSubstr("23:30"));
+  EXPECT_THAT(svg, HasSubstr("00:00"));
+}
+
 TEST(FigureScriptTest, OnlyPngAndSvgInAFolderThatIsThere) {
   EXPECT_THAT(MessageOf<ConfigError>([] { DrawFigure({}, "x.bmp"); }),
               HasSubstr("accepted endings are .png and .svg"));
@@ -235,6 +263,8 @@ TEST_F(EpisodeFigureTest, HasTheMarksOfTheEpisodeAndTheGapsOfTheValve) {
       TextsOf(figure.marks),
       ElementsAre("start", "detected", "isolated f7", "cleared", "closed"));
   EXPECT_NEAR(figure.marks[2].x, 20.0, 1e-9);
+  EXPECT_EQ(figure.x_label, "UTC of 2026-11-20");
+  EXPECT_EQ(figure.clock_s, 14 * 3600 + 56 * 60 + 11);
   ASSERT_EQ(figure.bands.size(), 1U);
   EXPECT_EQ(figure.bands[0].text, "monitor_down");
   EXPECT_NEAR(figure.bands[0].to, 45.0, 1e-9);

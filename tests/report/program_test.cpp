@@ -1,5 +1,6 @@
 #include "report/program.h"
 
+#include <csignal>
 #include <cstdlib>
 #include <fstream>
 #include <stdexcept>
@@ -9,9 +10,11 @@
 #include <CLI/CLI.hpp>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include "base/error.h"
 #include "base/time_text.h"
+#include "report/stop_signals.h"
 #include "tests/storage/temporary_directory.h"
 
 namespace fdi::report {
@@ -101,6 +104,32 @@ Outcome RunProgram(std::vector<const char*> arguments,
   outcome.out = testing::internal::GetCapturedStdout();
   outcome.err = testing::internal::GetCapturedStderr();
   return outcome;
+}
+
+// Prints a result into a pipe that is full, after a SIGTERM.
+[[noreturn]] void PrintUnread() {
+  int pipe_ends[2];
+  if (pipe(pipe_ends) != 0) {
+    _exit(8);
+  }
+  dup2(pipe_ends[1], STDOUT_FILENO);
+  Program program("prog", "A program");
+  program.AddVerb("list", "Lists", [](const Context&) {
+    {
+      const StopSignals signals;
+      std::raise(SIGTERM);
+    }
+    Report report;
+    report.document = {{"text", std::string(1 << 20, 'x')}};
+    return report;
+  });
+  const char* const arguments[] = {"prog", "list", "--json"};
+  program.Run(3, arguments);
+  _exit(7);
+}
+
+TEST(ProgramDeathTest, AResultThatNobodyReadsIsGivenUpAfterAStop) {
+  EXPECT_EXIT(PrintUnread(), testing::ExitedWithCode(kExitFailure), "");
 }
 
 TEST(ProgramTest, GlobalOptionsAreAcceptedBeforeAndAfterTheVerb) {
@@ -340,6 +369,21 @@ TEST_F(ProgramConfigTest, SyntaxErrorNamesFileAndLine) {
 
   EXPECT_EQ(outcome.code, kExitUsage);
   EXPECT_THAT(outcome.err, AllOf(HasSubstr(path_), HasSubstr("line 3")));
+}
+
+// The parser recurses: without a bound such a file ends the process.
+TEST_F(ProgramConfigTest, KeysThatAreTooDeepAreAUsageError) {
+  std::string key = "domain = 3\na";
+  for (int i = 0; i < 1'000'000; ++i) {
+    key += ".a";
+  }
+  const Outcome outcome =
+      RunProgram({"greet", "--config", Write(key + " = 1\n")});
+
+  EXPECT_EQ(outcome.code, kExitUsage);
+  EXPECT_THAT(outcome.err,
+              AllOf(HasSubstr(path_),
+                    HasSubstr("line 2: a key has more than 16 parts")));
 }
 
 TEST_F(ProgramConfigTest, MissingFileIsAUsageError) {

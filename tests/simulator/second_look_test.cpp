@@ -52,6 +52,16 @@ TEST(SecondLookTest, FindsAGrowingFault) {
   EXPECT_NEAR(look.ranked.front().strength, 0.4, 0.05);
 }
 
+// The range of a valve in another size than its type is a guess.
+TEST(SecondLookTest, FindsWhereTheFlowTransmitterEnds) {
+  ValvePhysics physics = Physics();
+  physics.parameters.instruments.flow.high = 43.0;
+  const SecondLook look = RunSecondLook(physics, Window({Abrupt(1, 0.7)}));
+  EXPECT_EQ(look.ranked.front().fault, 1);
+  EXPECT_NEAR(look.ranked.front().strength, 0.7, 0.05);
+  EXPECT_LT(look.misfit, 1.5);
+}
+
 TEST(SecondLookTest, FindsNothingInAHealthyWindow) {
   EXPECT_EQ(AnswerOf(RunSecondLook(Physics(), Window({}))).outcome,
             LookOutcome::kNothing);
@@ -514,6 +524,81 @@ TEST(LookAnswerTest, IsAShortlistBeyondFourFaults) {
       LookOutcome::kUnclear);
 }
 
+// Where the force on the rod or what drives the flow is not measured, what the
+// set does not tell apart binds the look: 5 of 900 are within its errors.
+TEST(LookAnswerTest, GroupsBindALookThatLacksASignal) {
+  const auto named = [](bool complete, const FaultGroups& groups) {
+    SecondLook look =
+        Looked({{12, 0.0}, {4, 45.0}, {3, 50.0}, {19, 60.0}, {0, 900.0}});
+    look.complete = complete;
+    LookAnswer answer = AnswerOf(look);
+    BindGroups(groups, answer);
+    return NamesOf(answer, true);
+  };
+  EXPECT_EQ(named(false, {}), std::vector{12});
+  EXPECT_EQ(named(false, {{4, 12}, {3, 6}}), (std::vector{4, 12}));
+  EXPECT_EQ(named(false, {{3, 6}}), std::vector{12});
+  EXPECT_EQ(named(false, {{12, 19}}), std::vector{12});
+  EXPECT_EQ(named(true, {{4, 12}}), std::vector{12});
+}
+
+TEST(LookAnswerTest, OfWhatChangedUnreadAMeterOrTheLineIsTheName) {
+  const auto named = [](std::vector<std::pair<int, double>> distances) {
+    distances.emplace_back(0, 900.0);
+    const SecondLook look = Looked(std::move(distances));
+    LookAnswer answer = AnswerOf(look);
+    KeepMeterAndLine(look, answer);
+    return NamesOf(answer, true);
+  };
+  EXPECT_EQ(named({{3, 0}, {6, 1}, {13, 1}, {17, 2}, {18, 2}, {19, 3}}),
+            (std::vector{17, 19}));
+  EXPECT_EQ(named({{3, 0}, {13, 1}, {19, 3}}), (std::vector{3, 13, 19}));
+  EXPECT_EQ(named({{1, 0}, {3, 1}, {10, 1}, {13, 2}, {16, 2}}),
+            std::vector<int>());
+  // Slow data have few readings that count.
+  EXPECT_EQ(named({{3, 0}, {17, 1}, {19, 1}, {0, 8}, {12, 9}, {7, 9}}),
+            (std::vector{17, 19}));
+}
+
+// The flow of a valve without X is `share` of the usual from `from` on; rows
+// `gap` to `from` are not read.
+std::optional<LookTask> LookAfter(int gap, int from, double share) {
+  EpisodeLooks looks(Physics());
+  for (int k = 0; k < from + 200; ++k) {
+    if (k >= gap && k < from) {
+      continue;
+    }
+    Sample sample;
+    sample.stamp_ns = k * kSecond;
+    SetReadings({{60.0, 3555.0, 2615.0, 100.7}, 60.0, 17.0}, sample);
+    sample.Set(Signal::kF, k < from ? 17.0 : 17.0 * share);
+    sample.present =
+        static_cast<SignalMask>(MaskOf(Signal::kCv) | MaskOf(Signal::kF));
+    Verdict verdict;
+    if (k == from + 2) {
+      verdict.transitions[0] = {TransitionKind::kDetected, sample.stamp_ns,
+                                sample.stamp_ns};
+      verdict.transition_count = 1;
+    }
+    if (auto task = looks.Step(sample, verdict)) {
+      return task;
+    }
+  }
+  return std::nullopt;
+}
+
+TEST(EpisodeLooksTest, SeesThatTheFlowChangedWhileNothingWasRead) {
+  const auto changed = [](int gap, int from, double share) {
+    const auto task = LookAfter(gap, from, share);
+    return task && task->changed_unread;
+  };
+  EXPECT_TRUE(changed(200, 600, 1.25));
+  EXPECT_TRUE(changed(200, 600, 0.75));
+  EXPECT_FALSE(changed(200, 600, 1.0));
+  EXPECT_FALSE(changed(500, 600, 1.25));
+  EXPECT_FALSE(changed(600, 600, 1.25));
+}
+
 // An episode of the engine, abnormal from `first` on.
 std::vector<LookTask> Follow(int samples, int first,
                              SignalQuality quality = SignalQuality::kGood) {
@@ -664,6 +749,31 @@ TEST(EpisodeLooksTest, SlowDataAreLookedAtLaterAndNotMoreOften) {
   }
   EXPECT_EQ(due, (std::vector<std::pair<int, bool>>{
                      {220, true}, {240, false}, {350, false}, {500, false}}));
+}
+
+// Of an episode that goes on behind a gap, the valve is looked at again as soon
+// as after a detection: it may be another one.
+TEST(EpisodeLooksTest, BehindAGapALookDoesNotWait) {
+  EpisodeLooks looks(Physics());
+  std::vector<int> due;
+  for (int k = 0; k < 1500; ++k) {
+    Sample sample;
+    sample.stamp_ns = (k < 900 ? k : k + 60) * kSecond;
+    for (const Signal signal : {Signal::kCv, Signal::kX, Signal::kF}) {
+      sample.Set(signal, 50.0 + k % 3);
+    }
+    Verdict verdict;
+    if (k == 201) {
+      verdict.transitions[0] = {TransitionKind::kDetected, 200 * kSecond,
+                                200 * kSecond};
+      verdict.transition_count = 1;
+    }
+    if (const auto task = looks.Step(sample, verdict)) {
+      due.push_back(k);
+      EXPECT_TRUE(k < 900 || task->window.detection == 0U);
+    }
+  }
+  EXPECT_EQ(due, (std::vector<int>{220, 240, 350, 500, 800, 940}));
 }
 
 // The simulation takes no such inputs and would throw.

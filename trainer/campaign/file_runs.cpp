@@ -97,7 +97,7 @@ std::vector<path> MatchingFiles(const std::string& pattern,
   return files;
 }
 
-storage::StoredRun RunOf(const importer::CsvTable& table,
+storage::StoredRun RunOf(importer::CsvTable table,
                          storage::RunSelector selector) {
   storage::StoredRun run;
   run.selector = std::move(selector);
@@ -109,8 +109,10 @@ storage::StoredRun RunOf(const importer::CsvTable& table,
   run.info.run.flow_unit = content.flow_unit;
   run.info.signals = content.signals;
   run.info.has_truth = content.has_truth;
-  for (const SampleSeries& part : table.runs) {
-    for (const LabelledSample& labelled : part.samples) {
+  for (SampleSeries& part : table.runs) {
+    // Freed as soon as it is copied.
+    const std::vector<LabelledSample> samples = std::move(part.samples);
+    for (const LabelledSample& labelled : samples) {
       const double t_s =
           static_cast<double>(labelled.sample.stamp_ns - table.start_ns) * 1e-9;
       if (t_s >= run.selector.from_s && t_s < run.selector.to_s) {
@@ -128,14 +130,13 @@ storage::StoredRun ReadRunFile(const std::string& text,
                                importer::CsvOptions csv) {
   storage::RunSelector selector = SplitStretch(text);
   csv.split_gaps = true;
-  const importer::CsvTable table =
-      importer::ReadCsvFile(selector.id, std::move(csv));
-  storage::StoredRun run = RunOf(table, std::move(selector));
+  importer::CsvTable table = importer::ReadCsvFile(selector.id, std::move(csv));
+  std::size_t count = 0;
+  for (const SampleSeries& part : table.runs) {
+    count += part.samples.size();
+  }
+  storage::StoredRun run = RunOf(std::move(table), std::move(selector));
   if (run.samples.empty()) {
-    std::size_t count = 0;
-    for (const SampleSeries& part : table.runs) {
-      count += part.samples.size();
-    }
     throw NotFoundError("file " + text + " holds no sample (of " +
                         std::to_string(count) + ")");
   }

@@ -23,7 +23,7 @@ std::vector<std::filesystem::path> MatchingFiles(
 
 /// The run of a table, gaps left in it, or the stretch that `selector` names by
 /// seconds from its start; its id is that of the selector.
-storage::StoredRun RunOf(const importer::CsvTable& table,
+storage::StoredRun RunOf(importer::CsvTable table,
                          storage::RunSelector selector);
 
 /// Reads a table as a run, as `fdi-store runs import` does, without storing it;

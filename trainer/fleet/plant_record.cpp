@@ -101,8 +101,9 @@ std::vector<storage::StoredRun> ReadRuns(const PlantJob& job,
     } catch (const DataError& error) {
       throw DataError(WithHint(job, source, error.what()));
     }
-    storage::StoredRun run = RunOf(table, WindowOf(job, source, table, utc));
     seen += (seen.empty() ? "" : ", ") + PeriodOf(table, utc);
+    storage::RunSelector window = WindowOf(job, source, table, utc);
+    storage::StoredRun run = RunOf(std::move(table), std::move(window));
     if (!run.samples.empty()) {
       runs.push_back(std::move(run));
     }

@@ -455,11 +455,8 @@ simulator::ValveFit FitType(const std::vector<TrainingRun>& runs,
                              options.type.parameters, fit);
 }
 
-// Lowest and highest reading but for one in a thousand, which may be broken; 0
-// and 0 without any.
-std::pair<double, double> RangeOf(const std::vector<TrainingRun>& runs,
-                                  Signal signal) {
-  constexpr double kBroken = 1e-3;
+std::vector<double> SortedReadings(const std::vector<TrainingRun>& runs,
+                                   Signal signal) {
   std::vector<double> readings;
   for (const TrainingRun& run : runs) {
     for (const LabelledSample& labelled : run.samples) {
@@ -468,18 +465,28 @@ std::pair<double, double> RangeOf(const std::vector<TrainingRun>& runs,
       }
     }
   }
+  std::ranges::sort(readings);
+  return readings;
+}
+
+// Lowest and highest reading but for one in a thousand, which may be broken; 0
+// and 0 without any.
+std::pair<double, double> RangeOf(const std::vector<TrainingRun>& runs,
+                                  Signal signal) {
+  constexpr double kBroken = 1e-3;
+  const std::vector<double> readings = SortedReadings(runs, signal);
   if (readings.empty()) {
     return {0.0, 0.0};
   }
-  std::ranges::sort(readings);
   return {SortedQuantile(readings, kBroken),
           SortedQuantile(readings, 1.0 - kBroken)};
 }
 
+constexpr double kUse = 0.8;  // Of the range of a transmitter.
+
 // Readings beyond the range of the type's transmitter would be held to it.
 void WidenRanges(const std::vector<TrainingRun>& runs,
                  simulator::Instrumentation& instruments) {
-  constexpr double kUse = 0.8;
   const auto widen = [&](Signal signal, simulator::Transmitter& transmitter) {
     const auto [lowest, highest] = RangeOf(runs, signal);
     if (highest > transmitter.high) {
@@ -492,6 +499,43 @@ void WidenRanges(const std::vector<TrainingRun>& runs,
   widen(Signal::kP1, instruments.pressure);
   widen(Signal::kP2, instruments.pressure);
   widen(Signal::kT1, instruments.temperature);
+}
+
+// Where the type does not state the pressures of this valve: a transmitter for
+// ten times its pressure would take a change of a tenth of it for nothing.
+void NarrowPressures(const std::vector<TrainingRun>& runs,
+                     simulator::Instrumentation& instruments) {
+  constexpr double kLeastUse = 0.2;
+  simulator::Transmitter& pressure = instruments.pressure;
+  const double highest = std::max(RangeOf(runs, Signal::kP1).second,
+                                  RangeOf(runs, Signal::kP2).second);
+  if (highest > 0.0 && highest < kLeastUse * pressure.high) {
+    pressure.noise_sd *= highest / kUse / pressure.high;
+    pressure.high = highest / kUse;
+  }
+}
+
+// What stands for P1, P2 and T1 where they are not measured, beside those that
+// are: one pressure has the ratio of the type to the other, and a liquid does
+// not boil at it.
+simulator::InputRow LevelsOf(const std::vector<TrainingRun>& runs,
+                             const ValveType& type) {
+  constexpr double kColdC = 43.0;
+  simulator::InputRow levels = type.levels;
+  const std::vector<double> p1 = SortedReadings(runs, Signal::kP1);
+  const std::vector<double> p2 = SortedReadings(runs, Signal::kP2);
+  const double ratio = levels.p2_kpa / levels.p1_kpa;
+  if (p2.empty() && !p1.empty()) {
+    levels.p2_kpa = ratio * SortedQuantile(p1, 0.5);
+  } else if (p1.empty() && !p2.empty() && SortedQuantile(p2, 0.5) > 0.0) {
+    levels.p1_kpa = SortedQuantile(p2, 0.5) / ratio;
+  }
+  const double inlet_kpa = p1.empty() ? levels.p1_kpa : SortedQuantile(p1, 0.5);
+  if (1e-3 * simulator::VapourPressure(type.parameters.medium, levels.t1_degc) >
+      inlet_kpa) {
+    levels.t1_degc = std::min(levels.t1_degc, kColdC);
+  }
+  return levels;
 }
 
 // The type in the size of the valve. Where the flow is that of the type within
@@ -712,7 +756,7 @@ void RequireOfType(const std::vector<TrainingRun>& runs,
 //                    which may have cut its longest stretch short
 //   RequireAlike     runs that differ in period, flow unit or signals
 //   CheckRecords     units and sense, before anything is fitted to them
-//   InUnit, WidenRanges, Resize
+//   InUnit, LevelsOf, WidenRanges, NarrowPressures, Resize
 //                    the ranges of the type in the unit and of the size of the
 //                    record, before simulated and measured readings are
 //                    compared
@@ -735,7 +779,11 @@ Onboarding Onboard(const std::vector<TrainingRun>& all,
                     ? InUnit(options.type, runs.front().flow_unit)
                     : options.type;
   result.signals = signals;
+  result.type.levels = LevelsOf(runs, result.type);
   WidenRanges(runs, result.type.parameters.instruments);
+  if (result.type.of_any_size) {
+    NarrowPressures(runs, result.type.parameters.instruments);
+  }
   if (options.fit && result.type.of_any_size &&
       (signals & MaskOf(Signal::kF)) != 0) {
     Resize(runs, result);

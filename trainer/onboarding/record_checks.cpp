@@ -6,6 +6,7 @@
 #include <string>
 
 #include "base/error.h"
+#include "base/local_sense.h"
 #include "simulator/valve_equations.h"
 #include "trainer/statistics.h"
 
@@ -72,12 +73,23 @@ void CheckShare(const Readings& r) {
   }
 }
 
-// What a pressure of so little is likeliest in.
-std::string UnitOfPressure(double middle) {
-  return middle <= 0.0  ? "P1 is a gauge pressure and not absolute: "
-         : middle < 3.0 ? "P1 is likely in MPa (or in bar), not in kPa: "
-         : middle < kMinPressure
-             ? "P1 is likely in bar (or in MPa), not in kPa: "
+// What explains a P1 that is so low, or so low for T1, likeliest.
+std::string WhyLow(double p1_kpa, double t1_degc,
+                   const simulator::Medium& medium) {
+  constexpr double kKelvin = 273.15;
+  constexpr double kHotC = 110.0;  // Few liquids, most steam.
+  if (p1_kpa < kMinPressure) {
+    return p1_kpa <= 0.0  ? "P1 is a gauge pressure and not absolute: "
+           : p1_kpa < 3.0 ? "P1 is likely in MPa (or in bar), not in kPa: "
+                          : "P1 is likely in bar (or in MPa), not in kPa: ";
+  }
+  if (t1_degc > kKelvin &&
+      1e-3 * simulator::VapourPressure(medium, t1_degc - kKelvin) < p1_kpa) {
+    return "T1 is likely in K, not in degC, or the medium is steam or a gas: ";
+  }
+  return t1_degc > kHotC
+             ? "the medium is likely steam or a gas, which its type does not "
+               "say; else P1 or T1 is in another unit: "
              : "P1 or T1 is in another unit, or P1 a gauge pressure: ";
 }
 
@@ -88,7 +100,7 @@ void CheckPressures(const Readings& p1, const Readings& p2, const Readings& t1,
   if (p1.measured() &&
       p1.middle < std::max(kMinPressure, kBoilingShare * vapour)) {
     throw DataError(
-        UnitOfPressure(p1.middle) + p1.Seen() +
+        WhyLow(p1.middle, t1.measured() ? t1.middle : 0.0, medium) + p1.Seen() +
         (vapour > 0.0 ? ", and " + t1.Seen() +
                             ": the liquid boils there below " + Text(vapour) +
                             " kPa (for a gas or steam, give a --type of that "
@@ -139,8 +151,9 @@ void CheckFlowFollows(const Readings& cv, const Readings& f) {
   const double rises = LaggedCorrelation(cv, f);
   if (rises > kAgainst) {
     throw DataError("F rises while CV closes (correlation " + Text(rises) +
-                    "): CV must count in % of closing; if it counts opening, "
-                    "map it with sense = \"opening\"");
+                    "): CV counts in the other sense than is stated. If it "
+                    "counts opening, map it with sense = \"opening\"; if it is "
+                    "mapped so, it counts closing");
   }
   if (rises > -kAgainst) {
     throw DataError(
@@ -163,20 +176,34 @@ void CheckSense(const Readings& cv, const Readings& x, const Readings& f) {
   const double follows = Correlation(cv, x);
   if (follows < -kAgainst) {
     throw DataError("X moves against CV (correlation " + Text(follows) +
-                    "): both must count in % of closing; map the one that "
-                    "counts opening with sense = \"opening\"");
+                    "): one of them counts in the other sense than is stated. "
+                    "Map with sense = \"opening\" what counts opening, and "
+                    "nothing else");
   }
   if (f.values.size() != x.values.size() ||
       f.deviation < 0.01 * kMinVariation * std::abs(f.high)) {
     return;
   }
   const double rises = Correlation(x, f);
+  LocalSense minutes;
+  for (std::size_t k = 0; k < x.values.size(); ++k) {
+    minutes.Add(x.values[k], f.values[k]);
+  }
+  if (rises > kAgainst && minutes.Value() < 0.0) {
+    throw DataError(
+        "F ends while X is open, although most minutes show that it falls "
+        "when X closes (correlation of all " +
+        Text(rises) +
+        "): likeliest a line that was shut, or a supply that was lost, and no "
+        "healthy record. Leave that time out with @from:to");
+  }
   if (rises > kAgainst) {
     throw DataError("F rises while X closes (correlation " + Text(rises) +
-                    "): CV and X must count in % of closing; if they count "
-                    "opening, map both with sense = \"opening\". If they are "
-                    "mapped so, the record is not of a healthy valve: the line "
-                    "was shut, or the supply lost");
+                    "): CV and X count in the other sense than is stated. If "
+                    "they count opening, map both with sense = \"opening\"; if "
+                    "they are mapped so, they count closing. Else the record "
+                    "is not of a healthy valve: the line was shut, or the "
+                    "supply lost");
   }
 }
 

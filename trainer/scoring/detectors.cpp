@@ -4,8 +4,8 @@
 
 #include "diagnosis/fault_catalogue.h"
 #include "diagnosis/quality_count.h"
+#include "monitor/names/episode_names.h"
 #include "simulator/second_look/episode_looks.h"
-#include "simulator/second_look/taught_names.h"
 #include "simulator/second_look/valve_physics.h"
 #include "trainer/campaign/run_input.h"
 #include "trainer/parallel_for.h"
@@ -14,97 +14,70 @@
 namespace fdi::trainer {
 namespace {
 
-// What the second look makes of the indications: while an episode has an answer
-// of the physics, that is the set.
-class SecondLooks {
+// What the monitor calls the episodes of one run: the observers and, with
+// physics, looks that are taken at once.
+class RunNames {
  public:
-  explicit SecondLooks(const ModelSet& models)
-      : models_(models),
-        physics_(simulator::PhysicsFrom(models.physics)),
-        looks_(std::in_place, physics_) {}
-
-  bool suspects() const { return looks_->suspects(); }
-  void BeginAnew() { looks_.emplace(physics_); }
-
-  void Watch(const Sample& sample, const Verdict& verdict) {
-    if (const auto task = looks_->Step(sample, verdict)) {
-      if (auto answer = simulator::TakeLook(physics_, *task)) {
-        looks_->Enter(*task, std::move(*answer));
-      }
+  explicit RunNames(const std::shared_ptr<const ModelSet>& models)
+      : models_(models) {
+    if (!models->physics.empty()) {
+      physics_ = simulator::PhysicsFrom(models->physics);
     }
-    if (OutOfOrder(verdict.intake)) {
-      return;
-    }
-    Name name{NamesAt(verdict), {}};
-    if (name.faults) {
-      const bool stays = !names_.empty() && name.faults == names_.back().faults;
-      const bool by_look = looks_->Answer() != nullptr;
-      name.wording =
-          stays ? names_.back().wording
-                : WordingOf(models_, verdict, *name.faults,
-                            by_look ? Layer::kPhysics : Layer::kObservers);
-    }
-    names_.push_back(std::move(name));
+    BeginAnew();
   }
 
-  void Apply(std::vector<Indication>& indications) const {
-    for (std::size_t k = 0; k < indications.size(); ++k) {
-      if (names_[k].faults) {
-        indications[k].isolated = *names_[k].faults;
-        indications[k].withdrawn = names_[k].faults->empty();
-        indications[k].wording = names_[k].wording;
+  void BeginAnew() {
+    if (physics_) {
+      looks_.emplace(*physics_, models_.get());
+    }
+    name_.emplace(models_, std::make_shared<const SeverityCatalogue>());
+  }
+
+  bool suspects() const { return looks_ && looks_->suspects(); }
+
+  NamedVerdict Step(const Sample& sample, const Verdict& engine) {
+    monitor::EpisodeName::Inputs inputs{
+        engine, engine.isolated, {}, looks_.has_value()};
+    if (looks_) {
+      TakeLook(sample, engine);
+      if (engine.detected && !OutOfOrder(engine.intake)) {
+        inputs.look =
+            monitor::LookThatCounts(engine, *models_, looks_->Answer());
+        inputs.remembered = looks_->Observed(*models_, engine.isolated);
       }
     }
+    const Verdict& named = name_->Step(inputs);
+    const bool taken_back = inputs.look || inputs.remembered != engine.isolated;
+    return {&named, name_->now().layer, taken_back && named.isolated == 0};
   }
 
  private:
-  // Instead of what the engine says, which stands where there are no faults.
-  struct Name {
-    std::optional<std::vector<int>> faults;
-    Wording wording;
-  };
-
-  // Nothing if what the engine says stands.
-  std::optional<std::vector<int>> NamesAt(const Verdict& verdict) const {
-    const FaultSet isolated = verdict.isolated;
-    if (const simulator::LookAnswer* answer = looks_->Answer()) {
-      if (auto names = simulator::NamesBeside(verdict, models_, *answer)) {
-        // A finding that the set does not have, no name can hold.
-        std::erase_if(*names, [this](int fault) {
-          return IsFinding(fault) && FaultIndex(models_, fault) < 0;
-        });
-        return names;
+  void TakeLook(const Sample& sample, const Verdict& engine) {
+    if (const auto task = looks_->Step(sample, engine)) {
+      if (auto answer = simulator::TakeLook(*physics_, *task)) {
+        looks_->Enter(*task, std::move(*answer));
       }
     }
-    const FaultSet observed = looks_->Observed(models_, isolated);
-    return observed == isolated ? std::nullopt
-                                : std::optional(FaultsIn(models_, observed));
   }
 
-  const ModelSet& models_;
-  simulator::ValvePhysics physics_;
+  std::shared_ptr<const ModelSet> models_;
+  std::optional<simulator::ValvePhysics> physics_;
   std::optional<simulator::ValveLooks> looks_;
-  std::vector<Name> names_;
+  std::optional<monitor::EpisodeName> name_;
 };
 
 Answer FollowEngine(const std::shared_ptr<const ModelSet>& models,
                     const ScoredRun& scored, const VerdictSink& sink) {
   QualityCount samples;
-  std::optional<SecondLooks> looks;
-  if (!models->physics.empty()) {
-    looks.emplace(*models);
-  }
-  OutsideKnowledge outside;
-  if (looks) {
-    outside = {[&looks] { return looks->suspects(); },
-               [&looks] { looks->BeginAnew(); }};
-  }
+  RunNames names(models);
+  const OutsideKnowledge outside{
+      [&names](const Sample& sample, const Verdict& verdict) {
+        return names.Step(sample, verdict);
+      },
+      [&names] { return names.suspects(); }, [&names] { names.BeginAnew(); }};
   const auto watch = [&](const Sample& sample, const Verdict& verdict) {
     if (CountsAsTime(verdict)) {
       samples.Add(verdict.quality);
-    }
-    if (looks) {
-      looks->Watch(sample, verdict);
     }
     if (sink) {
       sink(sample, verdict);
@@ -112,9 +85,6 @@ Answer FollowEngine(const std::shared_ptr<const ModelSet>& models,
   };
   Answer answer;
   answer.indications = Rescore(models, scored.run, watch, outside);
-  if (looks) {
-    looks->Apply(answer.indications);
-  }
   answer.seconds.emplace();
   for (std::size_t q = 0; q < kQualityCount; ++q) {
     (*answer.seconds)[q] =

@@ -121,6 +121,9 @@ std::vector<Indication> Rescore(const std::shared_ptr<const ModelSet>& models,
     if (sink) {
       sink(stored.sample, verdict);
     }
+    const NamedVerdict named = outside.name
+                                   ? outside.name(stored.sample, verdict)
+                                   : NamedVerdict{&verdict};
     if (outside.suspects) {
       engine.Suspect(outside.suspects());
     }
@@ -129,7 +132,9 @@ std::vector<Indication> Rescore(const std::shared_ptr<const ModelSet>& models,
     }
     start_ns = all.empty() ? stored.sample.stamp_ns : start_ns;
     Indication indication =
-        IndicationOf(*models, verdict, all.empty() ? nullptr : &all.back());
+        IndicationOf(*models, *named.verdict,
+                     all.empty() ? nullptr : &all.back(), named.layer);
+    indication.withdrawn |= named.withdrawn;
     indication.time_s =
         static_cast<double>(stored.sample.stamp_ns - start_ns) * kSecondsPerNs;
     indication.truth = TruthOf(stored);

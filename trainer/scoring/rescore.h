@@ -9,8 +9,17 @@
 
 namespace fdi::trainer {
 
+/// What an episode is called on one sample.
+struct NamedVerdict {
+  const Verdict* verdict;  ///< Never null; as long as the engine's.
+  Layer layer{Layer::kObservers};
+  bool withdrawn{false};  ///< A name that was given before counts no more.
+};
+
 /// What is known of a valve outside of its engine (ValveEngine::Suspect).
 struct OutsideKnowledge {
+  /// Given each verdict of the engine after the sink.
+  std::function<NamedVerdict(const Sample&, const Verdict&)> name{};
   std::function<bool()> suspects{};     ///< Asked behind each sample.
   std::function<void()> begins_anew{};  ///< The monitor forgot what it knew.
 };

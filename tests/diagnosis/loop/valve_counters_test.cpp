@@ -55,6 +55,21 @@ TEST_F(ValveCountersTest, APlayHasItsWidthAsDeadBandAndAsErrorBand) {
   EXPECT_EQ(counts_.steps, 0);
 }
 
+// The noise of CV chose the samples in which it seemed to rise, of which X - CV
+// is low because X does not follow noise: 3 to 7 % of error band in every loop.
+TEST_F(ValveCountersTest, ANoisyCommandIsNoRamp) {
+  std::mt19937 random(1);
+  std::normal_distribution<double> noise(0.0, 3.0);
+  double x = 50.0;
+  Run(
+      4000,
+      [&](int k) { return 50.0 + 10.0 * std::sin(0.005 * k) + noise(random); },
+      [&](double cv) { return x += 0.3 * (cv - x); });
+
+  EXPECT_EQ(counts_.opening + counts_.closing, 0);
+  EXPECT_TRUE(std::isnan(Of(Figure::kErrorBand)));
+}
+
 TEST_F(ValveCountersTest, AValveThatFollowsHasNeither) {
   std::mt19937 random(1);
   std::normal_distribution<double> noise(0.0, 0.05);
@@ -76,6 +91,15 @@ TEST_F(ValveCountersTest, ARodThatSticksAndLetsGoJumps) {
 
   EXPECT_NEAR(static_cast<double>(counts_.slips), 400.0 / 1.2, 25.0);
   EXPECT_NEAR(Of(Figure::kSlipJump), 1.2, 1e-3);
+}
+
+// Of many samples some stand by chance, and the next one is elsewhere.
+TEST_F(ValveCountersTest, NoiseOfXIsNoSlip) {
+  std::mt19937 random(1);
+  std::normal_distribution<double> noise(0.0, 0.7);
+  Run(4000, CommandOfTriangle, [&](double cv) { return cv + noise(random); });
+
+  EXPECT_EQ(counts_.slips, 0);
 }
 
 TEST_F(ValveCountersTest, TravelWithoutADeadBandCountsAllThatXMoves) {

@@ -2,6 +2,8 @@
 #include <chrono>
 #include <csignal>
 #include <cstdint>
+#include <cstdlib>
+#include <fstream>
 #include <set>
 #include <string>
 #include <vector>
@@ -11,6 +13,8 @@
 #include <nlohmann/json.hpp>
 
 #include "import/csv.h"
+#include "import/sniff.h"
+#include "import/tag_map.h"
 #include "tests/programs/simulator/publish_fixture.h"
 
 namespace fdi::simulator {
@@ -161,6 +165,41 @@ TEST_F(AppPublishTest, GapsOfAFileAreKept) {
   ASSERT_EQ(got.size(), 5U);
   EXPECT_EQ(got[3].stamp_ns - got[2].stamp_ns, 58'000'000'000);
   EXPECT_EQ(got[4].seq, 4U);
+}
+
+// Exports, with the map that sniff writes: what the reader makes of them is on
+// the bus.
+TEST_F(AppPublishTest, ReferenceFilesAreReplayedAsTheyAreRead) {
+  const char* folder = std::getenv("FDI_REFERENCE_DATA");
+  if (folder == nullptr) {
+    GTEST_SKIP() << "FDI_REFERENCE_DATA is not set";
+  }
+  const std::string tags = (folder_.path() / "tags.toml").string();
+  for (const std::string name :
+       {"a01_wincc_archive", "a05_grafana_units", "a11_s7_counts"}) {
+    SCOPED_TRACE(name);
+    const std::string file = std::string(folder) + "/cases/" + name + ".csv";
+    importer::ColumnMap map;
+    map.zone = "Europe/Berlin";
+    std::ofstream(tags) << importer::MapText(
+        importer::Sniff(ReadTextFile(file), file, map), file);
+    const importer::CsvTable table =
+        importer::ReadCsvFile(file, {.map = importer::ReadTagMap(tags)});
+    Reader reader(domain_);
+
+    Process process(With({"replay", "--csv", file, "--map", tags, "--valve",
+                          name, "--speed", "max"}));
+    ASSERT_TRUE(reader.TakeUntilEnded());
+
+    EXPECT_EQ(process.Wait().code, 0);
+    const auto& got = reader.Samples(name);
+    const auto& sent = table.runs.at(0).samples;
+    ASSERT_EQ(got.size(), sent.size());
+    for (std::size_t k = 0; k < sent.size(); ++k) {
+      ASSERT_EQ(got[k].present, sent[k].sample.present) << k;
+      ASSERT_EQ(got[k].values, sent[k].sample.values) << k;
+    }
+  }
 }
 
 TEST_F(AppPublishTest, SigtermEndsALiveRunAndItsStream) {

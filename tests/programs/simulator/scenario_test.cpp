@@ -192,6 +192,30 @@ TEST(ScenarioTomlTest, ASettingKeepsWhatItDoesNotName) {
   EXPECT_THROW(ApplySetting("noise=maybe", scenario), ConfigError);
 }
 
+// Its default pressure is 1000 kPa, at which water boils at 180 degC.
+TEST(ScenarioTomlTest, AnInventoryLoopHasATemperatureOfItsMedium) {
+  const auto t1_degc = [](const char* type) {
+    const Scenario scenario = Read("parameters = '" + std::string(type) +
+                                   "'\nexcitation = 'inventory-loop'");
+    return std::get<InventoryLoopExcitation>(scenario.config.excitation)
+        .t1_degc;
+  };
+  EXPECT_LT(t1_degc("liquid-globe"), 100.0);
+  EXPECT_GT(t1_degc("steam-globe"), 180.0);
+}
+
+TEST(ScenarioTomlTest, ABypassHasTheSizeOfItsValve) {
+  const storage::TemporaryDirectory folder;
+  const auto bypass = [&](const char* trim) {
+    std::ofstream(folder.path() / "type.toml") << "base = 'gas-globe'\n[trim]\n"
+                                               << trim;
+    return FindParameters("type.toml", folder.path()).trim.bypass_kv_m3_h;
+  };
+  EXPECT_EQ(bypass("characteristic = 'linear'"), 7.0);
+  EXPECT_DOUBLE_EQ(bypass("kv_m3_h = 400.0"), 70.0);
+  EXPECT_EQ(bypass("kv_m3_h = 400.0\nbypass_kv_m3_h = 9.0"), 9.0);
+}
+
 TEST(ScenarioTomlTest, ACsvExcitationKeepsTheModes) {
   const storage::TemporaryDirectory folder;
   std::ofstream(folder.path() / "in.csv")

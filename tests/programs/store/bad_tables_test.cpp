@@ -1,6 +1,7 @@
 // Forty files broken in forty ways: what is said, the exit code, nothing
 // stored.
 #include <gmock/gmock.h>
+#include <sys/resource.h>
 #include <zlib.h>
 
 #include "tests/programs/store/store_program_fixture.h"
@@ -181,6 +182,68 @@ TEST_F(FdiStoreTest, BrokenTablesAreRefusedInOneLineAndNothingIsStored) {
     EXPECT_EQ(std::ranges::count(outcome.err, '\n'), 1) << outcome.err;
     EXPECT_FALSE(RunsAreStored());
   }
+}
+
+// The largest memory that a program of this test had.
+double MegabytesOfPrograms() {
+  rusage usage{};
+  getrusage(RUSAGE_CHILDREN, &usage);
+  return static_cast<double>(usage.ru_maxrss) / 1024.0;
+}
+
+// Packed to less than a hundredth, so that nothing but its form is wrong.
+TEST_F(FdiStoreTest, AGzipTakesLittleMemoryWhateverItUnpacksTo) {
+  std::string part;
+  for (std::uint32_t i = 0; part.size() < 1U << 20U; i = i * 1664525U + 99U) {
+    part += std::to_string(i) + std::string(300, '7') + ',';
+  }
+  std::string line;
+  for (int i = 0; i < 150; ++i) {
+    line += part;
+  }
+  Write("line.csv", Gzip(line));
+  std::string rows = "t_s,CV_pct,P1_kPa,P2_kPa,T1_degC,X_pct,F_t_h\n";
+  for (int t = 0; t < 1'000'001; ++t) {
+    rows += std::to_string(t) + ",1,3,2,1,1,2\n";
+  }
+  Write("rows.csv", Gzip(rows));
+
+  for (const char* verb : {"runs sniff line.csv", "audit line.csv",
+                           "runs import line.csv --valve V"}) {
+    const Outcome outcome = Store(verb);
+    EXPECT_EQ(outcome.code, 3);
+    EXPECT_THAT(outcome.out + outcome.err,
+                HasSubstr("line.csv:1: the line is longer than 2 MiB"));
+  }
+  const Outcome many = Store("runs import rows.csv --valve V");
+  EXPECT_EQ(many.code, 3);
+  EXPECT_THAT(many.err, HasSubstr("rows.csv: has more than 1000000 rows, which "
+                                  "a gzip may not have; try to unpack it"));
+  EXPECT_FALSE(RunsAreStored());
+  EXPECT_LT(MegabytesOfPrograms(), 300.0);
+}
+
+TEST_F(FdiStoreTest, TablesWithoutEndAreRefused) {
+  std::string wide = "t_s";
+  for (int i = 0; i < 20'001; ++i) {
+    wide += ",a" + std::to_string(i);
+  }
+  Write("wide.csv", wide + '\n' + wide + '\n');
+  EXPECT_THAT(Store("runs sniff wide.csv").err,
+              HasSubstr("wide.csv:1: 20002 columns; expected at most 20000"));
+
+  std::string quote = "t_s,CV_pct,X_pct\n0,1,2\n1,1,2\n2,\"1,2\n";
+  for (int t = 3; t < 300'000; ++t) {
+    quote += std::to_string(t) + ",1,2\n";
+  }
+  Write("quote.csv", quote);
+  const Outcome open = Store("runs import quote.csv --valve V --signals CV,X");
+  EXPECT_EQ(open.code, 3);
+  EXPECT_THAT(open.err, HasSubstr("a quote in it is not closed"));
+
+  Write("twice.csv", Gzip(Gzip(Plant("2026-01-05 10:00:02;41,5;34,1;22,05"))));
+  EXPECT_THAT(Store("runs sniff twice.csv").err,
+              HasSubstr("twice.csv: is a gzip within a gzip"));
 }
 
 // The rows that the table above breaks are read as they are.

@@ -64,9 +64,22 @@ TEST_F(FdiStoreHistoryTest, TheListFitsAHundredColumns) {
           << line;
     }
   }
-  for (const char* shown : {"UNIT-300/AREA-2/FV-10123A", "f1|f7|f19", "UNACK",
+  for (const char* shown : {"UNIT-300/AREA-2/FV-10123A", "UNACK", "severity",
                             "2026-11-20 ", "Flashing"}) {
     EXPECT_THAT(all, HasSubstr(shown));
+  }
+}
+
+// How bad it is now, and what it is, before what only experts read.
+TEST_F(FdiStoreHistoryTest, AHundredColumnsSayHowBadItIsInPlainWords) {
+  const std::string list = Store("history list").out;
+  const std::string left_out =
+      list.substr(std::min(list.find("(too narrow"), list.size()));
+
+  EXPECT_THAT(list, HasSubstr("Flashing or cr"));
+  EXPECT_THAT(list, testing::ContainsRegex("[0-9] %"));
+  for (const char* kept : {"severity", "now", "meaning"}) {
+    EXPECT_THAT(left_out, testing::Not(HasSubstr(kept)));
   }
 }
 
@@ -209,6 +222,19 @@ TEST_F(FdiStoreHistoryTest, AWindowIsPlannedBeforeAnyMonitorHasRun) {
   EXPECT_EQ(StoreJson("history unshelve --valve FV-9")["shelf"].size(), 1U);
   EXPECT_THAT(Store("--utc history shelve FV-9 --from 2026-01-01").err,
               HasSubstr("planned from a time after now"));
+}
+
+// Work that is planned before the first run.
+TEST_F(FdiStoreHistoryTest, AShelfNeedsNoFolderYet) {
+  const std::string out = (directory_.path() / "shelf").string();
+  const auto run = [&](const std::string& verb) {
+    const std::string command = "\"" FDI_STORE_PROGRAM "\" --data " + out +
+                                "-data/new " + verb + " >" + out + " 2>&1";
+    return std::system(command.c_str());
+  };
+  EXPECT_EQ(run("history shelve FV-9 --for 2h"), 0);
+  EXPECT_EQ(run("history shelf"), 0);
+  EXPECT_THAT(Slurp(out), HasSubstr("FV-9"));
 }
 
 TEST_F(FdiStoreHistoryTest, AShelvedAlarmSaysSoUntilItIsTakenOff) {

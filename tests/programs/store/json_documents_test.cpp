@@ -319,7 +319,17 @@ TEST_F(JsonDocumentsTest, ProgramsAndPageHaveTheSameKeys) {
     }
     Write(loop, text);
   }
-  Printed(page, "audit", "a.csv FIC1.csv FIC2.csv");
+  // A stroke test whose actuator pressure is measured, twice.
+  std::string strokes = "t_s,CV_pct,X_pct,Ps_kPa\n";
+  double x = 0.0;
+  for (int k = 0; k < 240; ++k) {
+    const double cv = k / 60 % 2 == 0 ? 0.0 : 100.0;
+    x += 0.25 * (cv - x);
+    strokes += std::to_string(k) + ',' + std::to_string(cv) + ',' +
+               std::to_string(x) + ',' + std::to_string(x + 0.1 * cv) + '\n';
+  }
+  Write("FV1.csv", strokes + "240,0,0,0\n");
+  Printed(page, "audit", "a.csv FIC1.csv FIC2.csv FV1.csv");
   Printed(page, "runs label", id + "@0:1 f7");
   Printed(page, "runs list");
   Printed(page, "runs show", id);

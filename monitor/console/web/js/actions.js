@@ -3,7 +3,7 @@
 
 import {path, post} from './api.js';
 import {button, field, h, replace, select, showDialog} from './dom.js';
-import {faultTitle, members} from './faults.js';
+import {faultOfRow, faultTitle, members} from './faults.js';
 import {fromInput} from './format.js';
 import {store} from './store.js';
 
@@ -48,7 +48,8 @@ function ask({title, subject, fields, verb, commentNeeded, send}) {
 
 function describe(rows) {
   return rows.length === 1 ?
-    `${rows[0].valve}: ${faultTitle(rows[0].fault)}` : `${rows.length} alarms`;
+    `${rows[0].valve}: ${faultTitle(faultOfRow(rows[0]))}` :
+    `${rows.length} alarms`;
 }
 
 export function acknowledge(rows) {
@@ -102,11 +103,10 @@ export function label(row) {
   if (!canLabel()) return false;
   const own = members(row.fault);
   const choice = select([
-    ['true', own.length > 0 ? `True: it was ${faultTitle(row.fault)}` :
-      'True: there was a fault'],
-    ['false', 'False alarm'],
+    ['true', own.length > 0 ? 'As the alarm says' : 'A fault of some kind'],
+    ['false', 'Nothing: a false alarm'],
     ...[...store.faults.values()].filter((fault) => fault.label)
-        .map(({fault}) => [fault, `It was ${faultTitle(fault)}`]),
+        .map(({fault}) => [fault, faultTitle(fault)]),
   ], row.label ?? 'true');
   return ask({
     title: 'Label', verb: 'Label', subject: describe([row]),
@@ -127,7 +127,8 @@ export function actionButtons(row, done) {
   return [
     open ? acting('Acknowledge', acknowledge, [row]) : null,
     row.shelved ? acting('Unshelve', unshelve, row) :
-      row.state !== 'CLOSED' ? acting('Shelve', shelve, row) : null,
+      row.isa === 'RTN_UNACK' || row.isa === 'NORMAL' ? null :
+        acting('Shelve', shelve, row),
     canLabel() ? acting('Label', label, row) : null,
   ];
 }

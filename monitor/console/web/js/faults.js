@@ -20,6 +20,10 @@ export function faultName(fault) {
   return members(fault).map(nameOf).join(' or ');
 }
 
+/** Of an alarm; nothing for one that ended before it had a name. */
+export const faultOfRow = ({fault, certainty}) =>
+  fault === 'unknown' && certainty === 'not yet' ? null : fault;
+
 /** "flow sensor (f19)" */
 export function faultTitle(fault) {
   const name = faultName(fault);
@@ -27,16 +31,15 @@ export function faultTitle(fault) {
     `${name} (${fault})` : name;
 }
 
-/**
- * "likely", "one of 3", "one of 2, or bypass valve open"; empty for what needs
- * no word.
- */
+/** "likely", "one of 3"; empty for what needs no word. */
 export function certaintyText({certainty, faults, fault, look_alikes}) {
-  if (certainty !== 'one of') return certainty ?? '';
-  const others = look_alikes ?? [];
-  const count = members(faults?.join('|') || fault).length + others.length;
-  return [`one of ${count}`, ...others.map((f) => `or ${nameOf(f)}`)].join(', ');
+  return certainty !== 'one of' ? certainty ?? '' : `one of ${
+    members(faults?.join('|') || fault).length + (look_alikes ?? []).length}`;
 }
+
+/** " or Bypass open (f18)": what looks the same to a model set; or empty. */
+export const alikeText = ({look_alikes: others}, title = faultTitle) =>
+  (others ?? []).map((fault) => ` or ${title(fault)}`).join('');
 
 /** The same as an element that tells experts the number behind it. */
 export function certaintyNode(row, name = 'tag') {
@@ -158,7 +161,8 @@ export function qualityText(tile) {
   const why = quality === 'BAD_INPUT' ? lackText(tile) : (reasons ?? '')
       .split('|').map((r) => kReasonWords[r] ?? r).join(', ');
   return (kQualityWords[quality] ?? plain(quality)) +
-      (quality === 'STALE' && stamp ? ` since ${timeText(stamp)}` : '') +
+      (stamp && quality === 'STALE' ? ` since ${timeText(stamp)}` :
+        stamp && quality === 'ENDED' ? ` at ${timeText(stamp)}` : '') +
       (why ? `: ${why}` : '');
 }
 

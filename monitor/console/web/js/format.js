@@ -40,6 +40,10 @@ export function timeText(ms) {
     clockText(ms) : `${dateText(ms)} ${clockText(ms)}`;
 }
 
+/** Where there is room for one of both: the time of today, or the date. */
+export const shortTimeText = (ms) =>
+  dateText(ms) === dateText(Date.now()) ? clockText(ms) : dateText(ms);
+
 /** "42 s", "3 min 05 s", "2 h 10 min", "3 d 4 h" */
 export function durationText(ms) {
   if (ms === null || ms === undefined) return '–';
@@ -77,7 +81,8 @@ export function factorText(value) {
 }
 
 /** "12 %", and "0 %": the end of an interval. */
-export const wholePercent = (v) => `${Math.round(100 * v)} %`;
+export const wholePercent = (v) => `${Math.round(100 * v)} %`
+    .replace('-', '−');
 
 /** "12 %" of what the model set was trained to; a dash where it is none. */
 export function percentText(value) {
@@ -88,9 +93,9 @@ export function percentText(value) {
 /** How strong a fault is, in words; empty where it is none. */
 export function strengthText(value) {
   if (percentText(value) === '–') return '';
-  const size = Math.abs(value);
-  return size < 0.2 ? 'slight' : size < 0.5 ? 'moderate' :
-    size < 0.8 ? 'strong' : 'severe';
+  const percent = Math.round(100 * Math.abs(value));
+  return percent < 20 ? 'slight' : percent < 50 ? 'moderate' :
+    percent < 80 ? 'strong' : 'severe';
 }
 
 /** "12 % (10 % to 14 %)"; an interval without width is not known. */

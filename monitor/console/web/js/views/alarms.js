@@ -15,7 +15,7 @@ import {oncePerFrame, View} from './view.js';
 const kColumns = [
   columns.priority, columns.detected, columns.valve, faultAndCheck,
   columns.group, columns.lasted, columns.certainty, columns.strength,
-  columns.label, columns.discipline, columns.namur,
+  columns.discipline, columns.namur,
 ];
 
 function causeLine({group, opened_ms: since, members}) {
@@ -38,6 +38,8 @@ class Alarms extends View {
   #causes = h('div', {role: 'status'});
   #shownCauses = '[]';  // What is made anew is read out anew.
   #nothing = h('p', {class: 'nothing', hidden: true});
+  #table = dataTable('Alarms, worst first', kColumns, [],
+      {layout: 'cards', head: this.#head, body: this.#body});
   #bulk = button('', () => this.#acknowledgeSelected(),
       {class: 'primary', hidden: true});
   #readOnly = h('p', {class: 'note', hidden: true});
@@ -48,8 +50,7 @@ class Alarms extends View {
     this.element = h('section', {class: 'live'},
         h('div', {class: 'controls'}, h('h1', {}, 'Alarms'), this.#makeChips(),
             this.#bulk), this.#readOnly, this.#causes, this.#nothing,
-        dataTable('Alarms, worst first', kColumns, [],
-            {layout: 'cards', head: this.#head, body: this.#body}));
+        this.#table);
     // A flood of alarms costs one table a frame.
     const showSoon = oncePerFrame(this, () => this.#show());
     this.on(store, 'alarms', showSoon);
@@ -144,6 +145,7 @@ class Alarms extends View {
       chip.setAttribute('aria-pressed', String(this.#group === key));
     }
     this.#nothing.hidden = rows.length > 0;
+    this.#table.hidden = rows.length === 0;
     setText(this.#nothing, all.length === 0 ?
       'No alarm is open or waits for somebody.' : 'No alarm in this group.');
     this.#bulk.hidden = this.#selected.size === 0;

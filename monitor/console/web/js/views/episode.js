@@ -7,11 +7,11 @@ import {exportPng} from '../charts/export.js';
 import {Timeline} from '../charts/timeline.js';
 import {TrendData} from '../charts/trend_data.js';
 import {button, errorNote, factList, h, replace, setText} from '../dom.js';
-import {certaintyNode, faultTitle, groupName, layerText, markWord, members, namurText,
-  priorityNames, priorityOf, prioritySign, stateWord, unconfirmedText}
-  from '../faults.js';
-import {durationText, intervalText, percentText, rangeText, wholePercent,
-  zoneName}
+import {alikeText, certaintyNode, faultOfRow, faultTitle, groupName,
+  layerText, markWord, members, namurText, priorityNames, priorityOf, prioritySign, stateWord,
+  unconfirmedText} from '../faults.js';
+import {durationText, intervalText, percentText, rangeText,
+  strengthText, wholePercent, zoneName}
   from '../format.js';
 import {link} from '../route.js';
 import {store} from '../store.js';
@@ -25,12 +25,16 @@ const kEndWords = {
   superseded: 'another episode took over', unknown: 'the monitor was down meanwhile',
 };
 
+// "strong, 52 % (50 % to 54 %)"
+const inWords = (strength, percent) =>
+  [strengthText(strength), percent].filter(Boolean).join(', ');
+
 function facts({episode: row, model_hash: hash}) {
   return [
     ['Valve', valveLink(row.valve)],
     ['Fault', h('span', {class: 'with-sign'},
         prioritySign(priorityOf(row), members(row.fault).length > 0),
-        [faultTitle(row.fault), layerText(row.layer)]
+        [faultTitle(faultOfRow(row)) + alikeText(row), layerText(row.layer)]
             .filter(Boolean).join(', '))],
     ['Priority', priorityNames[priorityOf(row)]],
     ['State', [`${stateWord(row.state)}; ${groupName(row).toLowerCase()}`,
@@ -44,9 +48,10 @@ function facts({episode: row, model_hash: hash}) {
     ['End', row.end_reason ? kEndWords[row.end_reason] ?? row.end_reason :
       'still open'],
     ['How sure', certaintyNode(row, '')],
-    ['Strength', intervalText({...row, value: row.strength}, percentText, '',
-        wholePercent)],
-    ['At its worst', percentText(row.worst_strength)],
+    ['Strength', inWords(row.strength, intervalText(
+        {...row, value: row.strength}, percentText, '', wholePercent))],
+    ['At its worst', inWords(row.worst_strength,
+        percentText(row.worst_strength))],
     ['For', forText(row.discipline)],
     ['NE 107', namurText(row.namur)],
     ['Label', labelText(row.label)],
@@ -171,7 +176,7 @@ class EpisodePage extends View {
 
   #show(found) {
     this.#row = found.episode;
-    this.title = `${this.#row.valve}: ${faultTitle(this.#row.fault)}`;
+    this.title = `${this.#row.valve}: ${faultTitle(faultOfRow(this.#row))}`;
     this.#showActions();
     const checks = members(this.#row.fault)
         .map((fault) => store.faults.get(fault)).filter((f) => f?.check);

@@ -19,7 +19,7 @@ function panelsOf(health) {
       color: '--s5', dash: [6, 3]}],
   }));
   return [...residuals, {
-    key: 'd0', title: 'Factor d of normal, mean of the day', height: 90,
+    key: 'd0', title: 'How well normal explains the data, mean of the day', height: 90,
     points: true, range: [-0.03, 1.05],
     lines: [{column: 'd0', label: 'normal', unit: '', color: '--s1'}],
   }, {

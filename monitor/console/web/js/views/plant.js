@@ -223,7 +223,8 @@ class Plant extends View {
     this.#showGroups(tiles);
     this.#nothing.hidden = this.#shown.length > 0;
     setText(this.#nothing, tiles.length === 0 ?
-      'No valve has been heard of yet.' : 'No valve fits the search.');
+      'No valve has been heard of yet. Each appears with ' +
+        'its first sample on the bus.' : 'No valve fits the search.');
   }
 
   // "FV (12, 2 in alarm)"; without a choice of several, nothing.

@@ -1,8 +1,9 @@
 // Tables by declaration of their columns: {text, cell(row), class, header}.
 
 import {h} from '../dom.js';
-import {certaintyNode, faultName, faultTitle, groupName, members, namurText, priorityOf,
-  priorityNames, prioritySign, qualityText, unconfirmedText} from '../faults.js';
+import {alikeText, certaintyNode, faultName, faultOfRow, faultTitle,
+  groupName, members, namurText, priorityNames, priorityOf, prioritySign,
+  qualityText, unconfirmedText} from '../faults.js';
 import {durationText, percentText, strengthText, timeText} from '../format.js';
 import {link} from '../route.js';
 import {store} from '../store.js';
@@ -50,16 +51,20 @@ function priorityCell(row) {
 }
 
 function faultCell(row) {
-  const name = faultName(row.fault);
+  const fault = faultOfRow(row);
+  const name = faultName(fault);
   const numbers = members(row.fault).join(', ');
-  return h('a', {href: link('episode', row.episode), title: faultTitle(
-      row.fault)}, name, numbers && numbers !== name ?
-    h('span', {class: 'number'}, ` ${numbers}`) : null);
+  return h('a', {href: link('episode', row.episode), title:
+    faultTitle(fault) + alikeText(row)}, name, numbers && numbers !== name ?
+    h('span', {class: 'number'}, ` ${numbers}`) : null,
+  alikeText(row, faultName));
 }
 
-/** A fault and what to check. */
+/** A fault, what somebody found it to be, and what to check. */
 export const faultAndCheck = {text: 'Fault', class: 'fault', cell: (row) => [
-  faultCell(row), row.check ? h('div', {class: 'to-check', title: row.check},
+  faultCell(row),
+  row.label && h('div', {}, `label: ${labelText(row.label)}`),
+  row.check ? h('div', {class: 'to-check', title: row.check},
       row.check) : null]};
 
 /** "mechanical or instrument" */
@@ -75,7 +80,7 @@ export function lastedText(row) {
 
 export function labelText(label) {
   if (!label) return '–';
-  if (label === 'true') return 'true';
+  if (label === 'true') return 'right';
   return label === 'false' ? 'false alarm' : `was ${faultTitle(label)}`;
 }
 

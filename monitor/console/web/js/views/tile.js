@@ -2,20 +2,24 @@
 
 import {drawSparkline} from '../charts/sparkline.js';
 import {h, replace, setText} from '../dom.js';
-import {certaintyText, factorTitle, faultName, faultOfTile, faultTitle,
-  inAlarm, isAlarm, members, priorityNames, priorityOf, prioritySign, qualityText,
-  stateWord, unconfirmedText} from '../faults.js';
-import {clockText, percentText, strengthText, timeText} from '../format.js';
+import {alikeText, certaintyText, factorTitle, faultName, faultOfTile,
+  faultTitle, inAlarm, isAlarm, members, priorityNames, priorityOf,
+  prioritySign, qualityText, stateWord, unconfirmedText} from '../faults.js';
+import {percentText, shortTimeText, strengthText, timeText} from '../format.js';
 import {link} from '../route.js';
 import {store} from '../store.js';
 import {labelText} from './table.js';
 
 const kIdTail = [6, 12];
+const kTag = /[a-z]*[-_. ]?\d+[a-z]*$/i;  // "LIC-101A" at the end of an id.
 const kDeviation = 0.3;  // Of 1 - d_0.
+const kLasting = 3;  // Points beyond it in a row; healthy valves have single ones.
 
-/** How many letters at the ends of `ids` tell them apart, within limits. */
+/** Letters at the ends of `ids` with the tag, that tell them apart, to a limit. */
 export function tailLength(ids) {
-  let [length] = kIdTail;
+  const tags = ids.map((id) => kTag.exec(id)?.[0].length ?? 0)
+      .filter((length) => length <= kIdTail[1]);
+  let length = Math.max(kIdTail[0], ...tags);
   while (length < kIdTail[1] &&
       new Set(ids.map((id) => id.slice(-length))).size < ids.length) ++length;
   return length;
@@ -32,20 +36,25 @@ export function rankOf(tile) {
 
 function whatText(tile) {
   if (isAlarm(tile)) {
-    const name = faultName(faultOfTile(tile));
-    return [name[0].toUpperCase() + name.slice(1), unconfirmedText(tile)]
-        .filter(Boolean).join(', ');
+    const name = faultName(faultOfTile(tile)) + alikeText(tile, faultName);
+    return name[0].toUpperCase() + name.slice(1);
   }
   if (tile.unacked) return 'Returned, unacknowledged';
   return {NOT_JUDGED: 'Not judged', PARTLY_JUDGED: 'Partly judged'}[
       tile.state] ?? '';
 }
 
+function deviates(spark) {
+  let row = 0;
+  return spark.some((v) => (row = v > kDeviation ? row + 1 : 0) >= kLasting);
+}
+
 // "strong, since 12:03"
 function howText(tile) {
   const {strength, since_ms: since, unconfirmed_ms: unconfirmed} = tile;
-  return [strengthText(strength), !inAlarm(tile) && !unconfirmed ?
-    'not judged now' : since && `since ${timeText(since)}`]
+  return [strengthText(strength), unconfirmed ?
+    `not confirmed since ${shortTimeText(unconfirmed)}` : !inAlarm(tile) ?
+    'not judged now' : since && `since ${shortTimeText(since)}`]
       .filter(Boolean).join(', ');
 }
 
@@ -91,7 +100,7 @@ export class Tile {
     const what = whatText(tile);
     const label = store.alarms.get(tile.episode)?.label;
     const said = tile.shelved_until_ms !== null ?
-      `shelved until ${clockText(tile.shelved_until_ms)}` :
+      `shelved until ${timeText(tile.shelved_until_ms)}` :
       [qualityText(tile), label && `label: ${labelText(label)}`]
           .filter(Boolean).join('; ');
     const quality = said ||
@@ -104,8 +113,10 @@ export class Tile {
     setText(this.#what, what);
     setText(this.#certainty, alarm ? certaintyText(tile) : '');
     setText(this.#how, alarm ? howText(tile) : '');
-    this.#how.title = alarm && strengthText(tile.strength) ?
-      `strength ${percentText(tile.strength)}` : '';
+    this.#how.title = !alarm ? '' : [
+      strengthText(tile.strength) && `strength ${percentText(tile.strength)}`,
+      tile.since_ms && `since ${timeText(tile.since_ms)}`,
+      unconfirmedText(tile)].filter(Boolean).join(', ');
     this.#certainty.title = alarm && tile.factor !== null ?
       factorTitle(tile.factor) : '';
     setText(this.#quality, quality);
@@ -113,11 +124,12 @@ export class Tile {
     setText(this.#spoken, alarm ? `, ${priorityNames[priority]}, ` +
       stateWord(tile.state) + (tile.unacked ? ', unacknowledged' : '') :
       what ? '' : ', normal');
-    this.#what.title = alarm ? faultTitle(faultOfTile(tile)) : '';
+    this.#what.title = alarm ?
+      faultTitle(faultOfTile(tile)) + alikeText(tile) : '';
     // A calm valve draws no line: a line is a deviation, and says so. Words need
     // its room.
     const spark = tile.spark ?? [];
-    this.#canvas.hidden = said !== '' || !spark.some((v) => v > kDeviation);
+    this.#canvas.hidden = said !== '' || !deviates(spark);
     if (!this.#canvas.hidden) drawSparkline(this.#canvas, spark, this.color);
   }
 

@@ -4,9 +4,9 @@ import {getOptional, path} from '../api.js';
 import {Timeline} from '../charts/timeline.js';
 import {TrendData} from '../charts/trend_data.js';
 import {button, h, replace, setText} from '../dom.js';
-import {certaintyNode, factorTitle, faultName, faultOfTile, faultTitle, inAlarm,
-  members, openText, priorityNames, priorityOf, prioritySign, qualityText,
-  stateWord} from '../faults.js';
+import {alikeText, certaintyNode, factorTitle, faultName, faultOfTile,
+  faultTitle, inAlarm, isAlarm, members, openText, priorityNames, priorityOf,
+  prioritySign, qualityText, stateWord} from '../faults.js';
 import {durationText, numberText, percentText, strengthText,
   timeText, unitText} from '../format.js';
 import {link} from '../route.js';
@@ -29,17 +29,16 @@ function stateLine(tile) {
     tile.shelf_planned_ms && h('span', {class: 'tag'},
         `shelf planned from ${timeText(tile.shelf_planned_ms)}`),
     tile.monitor && h('span', {class: 'tag'}, `monitor ${tile.monitor}`)];
-  if (!inAlarm(tile)) {
-    return [h('span', {class: 'tag'}, stateWord(tile.state)), quality,
-      tile.active ? h('a', {href: link('episode', tile.episode)},
-          openText(tile)) : null];
+  if (!isAlarm(tile)) {
+    return [h('span', {class: 'tag'}, stateWord(tile.state)), quality];
   }
   const priority = priorityOf(tile);
   const label = store.alarms.get(tile.episode)?.label;
   return [
     h('span', {class: 'tag strong'},
-        prioritySign(priority, tile.state === 'ISOLATED'),
-        `${stateWord(tile.state)}: ${faultTitle(faultOfTile(tile))}`),
+        prioritySign(priority, members(faultOfTile(tile)).length > 0),
+        inAlarm(tile) ? `${stateWord(tile.state)}: ` +
+            faultTitle(faultOfTile(tile)) + alikeText(tile) : openText(tile)),
     certaintyNode(tile),
     h('span', {class: 'tag'}, priorityNames[priority]),
     percentText(tile.strength) === '–' ? null :
@@ -103,9 +102,10 @@ function scopeText({model_set: set, missing}, about) {
  * What explains the data, in words: [{name, fits, d, strong}]. While it is
  * normal, no fault is listed: those that change nothing then explain it, too.
  */
-function explanations({faults, T}, state, d0, d) {
+function explanations({faults, T}, state, d0, d, partly) {
   const normal = {name: 'normal', d: d0, fits: state === 'NOT_JUDGED' ?
-    'not judged' : d0 >= T || state === 'NORMAL' ? 'yes' : 'no'};
+    'not judged' : d0 < T && state !== 'NORMAL' ? 'no' :
+    partly ? 'yes, as far as judged' : 'yes'};
   const ranked = faults.map((fault, f) => ({name: faultTitle(fault), d: d[f]}))
       .filter((row) => row.d >= T / 2).sort((a, b) => b.d - a.d);
   if (state === 'NOT_JUDGED') return [normal];
@@ -118,7 +118,7 @@ function explanations({faults, T}, state, d0, d) {
 }
 
 /** Residuals against their thresholds, and what explains them. */
-function nowTables(data) {
+function nowTables(data, partly) {
   const {channels, faults, windows} = data.meta;
   const last = (name) => data.columns[name].at(-1);
   // Behind a channel its windows that are beyond their limits: they raise the
@@ -136,7 +136,7 @@ function nowTables(data) {
     dataTable('What explains the data now', kFitColumns,
         explanations(data.meta, last('state') === 'NORMAL' &&
             last('quality') !== 'LIVE' ? 'NOT_JUDGED' : last('state'), last('d0'),
-            faults.map((_, f) => last(`d${f + 1}`))),
+            faults.map((_, f) => last(`d${f + 1}`)), partly),
         {attributesOf: ({strong, quiet}) =>
           ({class: strong ? 'out' : quiet ? 'quiet' : ''})}),
   ];
@@ -316,8 +316,10 @@ class ValvePage extends View {
   }
 
   #showNow() {
-    setText(this.#words, this.#data.words);
-    if (this.#data.size > 0) replace(this.#now, nowTables(this.#data));
+    const partly = store.tiles.get(this.id)?.state === 'PARTLY_JUDGED';
+    setText(this.#words, this.#data.words +
+      (partly && this.#data.words ? ', as far as it is judged' : ''));
+    if (this.#data.size > 0) replace(this.#now, nowTables(this.#data, partly));
   }
 
   #showState() {

@@ -13,9 +13,11 @@ const kColumns = [
   {text: 'Valve', header: true, cell: (row) =>
     valveCell(row.valve_id, row)},
   {text: 'Why', class: 'remark', cell: (row) => row.why},
-  {text: 'Probable fault', cell: (row) => !row.fault ? row.name ?? '–' :
-    row.episode_id ? h('a', {href: link('episode', row.episode_id)},
-        faultTitle(row.fault)) : faultTitle(row.fault)},
+  {text: 'Probable fault', cell: (row) => {
+    const name = row.fault ? faultTitle(row.fault) : row.name ?? '–';
+    return row.episode_id ?
+      h('a', {href: link('episode', row.episode_id)}, name) : name;
+  }},
   {text: 'For', cell: (row) => forText(row.discipline)},
   {text: 'What to check', class: 'remark check', cell: (row) =>
     row.check ?? '–'},

@@ -5,7 +5,7 @@
 
 #include "base/correlation.h"
 
-namespace fdi::importer {
+namespace fdi {
 
 /// Whether one signal rises or falls with another: the sign that most stretches
 /// of 60 pairs have. A fault that lasts, such as a shut line, says nothing
@@ -42,4 +42,4 @@ class LocalSense {
   std::size_t falling_{0};
 };
 
-}  // namespace fdi::importer
+}  // namespace fdi

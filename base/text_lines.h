@@ -1,0 +1,55 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdio>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+
+namespace fdi {
+
+/// The lines of a text, read in passes. Of a file, at most 16 MiB are kept in
+/// memory: a longer one is read again in each pass, from a temporary file
+/// without a name if it has to be unpacked or converted to UTF-8. So a gzip of
+/// a few megabytes does not take the memory of the text that it unpacks to.
+class TextLines {
+ public:
+  /// Gets a line, without its break, and its number from 1; @returns whether to
+  /// go on. The line is valid during the call.
+  using Take = std::function<bool(std::string_view, std::size_t)>;
+
+  /// @param text has to outlive this.
+  explicit TextLines(std::string_view text, std::string source = "input");
+  /// Lines of a file, or of stdin for `-`, as ReadTextFile() reads it.
+  /// @throws as ReadTextFile(), or if the temporary file cannot be written.
+  static TextLines OfFile(const std::filesystem::path& path);
+
+  /// @throws DataError if a line is longer than 2 MiB.
+  void ForEach(const Take& take, std::size_t first = 1) const;
+  /// From the last line to `last`.
+  void ForEachBackwards(const Take& take, std::size_t last = 1) const;
+
+  /// Whether the file was a gzip.
+  bool packed() const { return packed_; }
+  /// Of the text.
+  std::size_t bytes() const { return end_ - begin_; }
+
+ private:
+  TextLines() = default;
+  std::string_view Block(std::size_t begin, std::size_t end,
+                         std::string& buffer) const;
+  void CheckLength(std::size_t length, std::size_t number) const;
+
+  std::string source_;
+  std::shared_ptr<const std::string> own_;
+  std::string_view text_;  // Unless it is in file_.
+  std::shared_ptr<std::FILE> file_;
+  std::size_t begin_{0};  // Behind a byte order mark.
+  std::size_t end_{0};
+  std::size_t count_{0};
+  bool packed_{false};
+};
+
+}  // namespace fdi
