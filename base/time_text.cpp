@@ -609,7 +609,7 @@ std::optional<std::int64_t> LocalClock::Utc(const CivilTime& time,
     // change their offsets at full or half hours, so those of half an hour are
     // kept.
     if (std::time_t half = shown / kHalfHour; half != known_) {
-      FindOffsets(time.fields);
+      FindOffsets(fields);  // Of 23:59:60 those of the next day.
       known_ = half;
     }
     offsets = offsets_s_;

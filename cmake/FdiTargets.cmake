@@ -152,12 +152,13 @@ function(fdi_test_precompiled_headers)
     <gmock/gmock.h>)
 endfunction()
 
-# fdi_test(name [NUMERICAL] [THREADS] [ALONE] LABEL unit|system [TIMEOUT 120]
+# fdi_test(name [NUMERICAL] [THREADS] [ALONE] [WHOLE] LABEL unit|system [TIMEOUT 120]
 #          SOURCES a_test.cpp ... LIBRARIES lib ...)
 # NUMERICAL: fully optimised, under sanitizers, too. THREADS: also run under the
 # thread sanitizer (preset tsan). ALONE: not beside other tests, for it measures delays.
+# WHOLE: one test of ctest, for the cases share what is slow to make.
 function(fdi_test name)
-  cmake_parse_arguments(ARG "NUMERICAL;THREADS;ALONE" "LABEL;TIMEOUT" "SOURCES;LIBRARIES" ${ARGN})
+  cmake_parse_arguments(ARG "NUMERICAL;THREADS;ALONE;WHOLE" "LABEL;TIMEOUT" "SOURCES;LIBRARIES" ${ARGN})
   add_executable(${name} ${ARG_SOURCES})
   target_link_libraries(${name} PRIVATE ${ARG_LIBRARIES} GTest::gtest
                         GTest::gmock GTest::gtest_main)
@@ -183,7 +184,12 @@ function(fdi_test name)
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 120)
   endif()
-  gtest_discover_tests(${name} DISCOVERY_TIMEOUT 60
-                       PROPERTIES LABELS ${ARG_LABEL} TIMEOUT ${ARG_TIMEOUT}
-                                  RUN_SERIAL ${ARG_ALONE})
+  set(properties LABELS ${ARG_LABEL} TIMEOUT ${ARG_TIMEOUT}
+                 RUN_SERIAL ${ARG_ALONE})
+  if(ARG_WHOLE)
+    add_test(NAME ${name} COMMAND ${name})
+    set_tests_properties(${name} PROPERTIES ${properties})
+  else()
+    gtest_discover_tests(${name} DISCOVERY_TIMEOUT 60 PROPERTIES ${properties})
+  endif()
 endfunction()

@@ -28,7 +28,7 @@ constexpr double kOtherInterval = 0.2;  // Of the interval: it is another one.
 double ReadingOf(const Sample& sample, Signal signal) {
   const bool good = sample.Has(signal) &&
                     sample.quality[Index(signal)] != SignalQuality::kBad &&
-                    PlausibleRange(signal).Contains(sample[signal]);
+                    IsPlausible(sample, signal);
   return good ? sample[signal] : kNone;
 }
 
@@ -96,8 +96,11 @@ int FindingOf(loop::Verdict verdict) {
 }
 
 LoopWatch::LoopWatch(std::size_t phase,
-                     std::shared_ptr<const SeverityCatalogue> severities)
-    : phase_(phase), severities_(std::move(severities)) {
+                     std::shared_ptr<const SeverityCatalogue> severities,
+                     bool pv_integrates)
+    : phase_(phase),
+      pv_integrates_(pv_integrates),
+      severities_(std::move(severities)) {
   verdict_.quality = Quality::kUnassigned;
   verdict_.residuals.fill(kNone);
 }
@@ -150,7 +153,8 @@ bool LoopWatch::AddPoint(const Sample& sample, double period_s) {
   const double f = ReadingOf(sample, Signal::kF);
   const double x = ReadingOf(sample, Signal::kX);
   const bool whole =
-      std::isfinite(cv) && (std::isfinite(f) || std::isfinite(x));
+      std::isfinite(cv) && (std::isfinite(f) || std::isfinite(x) ||
+                            std::isfinite(ReadingOf(sample, Signal::kPv)));
   if (sample.mode != ValveMode::kAuto || !whole) {
     Restart();
     return whole;
@@ -182,19 +186,32 @@ bool LoopWatch::AddPoint(const Sample& sample, double period_s) {
   const Point point{
       static_cast<std::uint32_t>(std::llround(at_s * kMsPerSecond)),
       static_cast<float>(cv), static_cast<float>(f), static_cast<float>(x)};
+  const std::size_t row = added_ % kPoints;
   if (ring_.size() < kPoints) {
     ring_.push_back(point);
   } else {
-    ring_[added_ % kPoints] = point;
+    ring_[row] = point;
   }
+  AddControl(sample, row);
   ++added_;
   at_point_ = true;
   due_ = due_ || (ring_.size() == kPoints && (added_ + phase_) % kHop == 0);
   return true;
 }
 
+// Loops without PV, which most are, have no memory for it.
+void LoopWatch::AddControl(const Sample& sample, std::size_t row) {
+  const double pv = ReadingOf(sample, Signal::kPv);
+  if (control_.empty() && std::isnan(pv)) {
+    return;
+  }
+  control_.resize(ring_.size(), {kNone, kNone});
+  control_[row] = {pv, std::isnan(pv) ? kNone : ReadingOf(sample, Signal::kSp)};
+}
+
 void LoopWatch::Restart() {
   ring_.clear();
+  control_.clear();
   added_ = 0;
   due_ = false;
   taken_ = false;
@@ -211,30 +228,55 @@ std::optional<loop::Window> LoopWatch::TakeWindow() {
   taken_ns_ = verdict_.stamp_ns;
   loop::Window window;
   window.period_s = interval_s_;
-  // CV is % of closing, so that F falls with it; F over CV is no integral.
-  window.gain_sign = -1;
-  window.integrating = false;
   for (std::size_t k = 0; k < kPoints; ++k) {
     const Point& point = ring_[(added_ + k) % kPoints];
     window.op.push_back(double{point.cv});
     window.pv.push_back(double{point.f});
     window.x.push_back(double{point.x});
   }
+  SetControlled(window);
+  if (window.pv.empty()) {  // Now F, now X.
+    taken_ = false;
+    return std::nullopt;
+  }
+  return window;
+}
+
+// Decides between PV, F (which is in window.pv) and X, of which what is not
+// there throughout does not count.
+void LoopWatch::SetControlled(loop::Window& window) const {
   const auto has_gap = [](const std::vector<double>& values) {
     return std::ranges::any_of(values, [](double v) { return std::isnan(v); });
   };
   if (has_gap(window.x)) {
     window.x.clear();
   }
+  std::vector<double> pv;
+  for (std::size_t k = 0; k < control_.size(); ++k) {
+    const Control& control = control_[(added_ + k) % kPoints];
+    pv.push_back(control.pv);
+    window.sp.push_back(control.sp);
+  }
+  if (!pv.empty() && !has_gap(pv)) {
+    // Its sense and whether it is an integral are read off the record.
+    window.pv = std::move(pv);
+    window.gain_sign = 0;
+    if (pv_integrates_) {
+      window.integrating = true;
+    }
+    if (has_gap(window.sp)) {
+      window.sp.clear();
+    }
+    return;
+  }
+  window.sp.clear();
+  // CV is % of closing, so that F falls with it; F over CV is no integral.
+  window.gain_sign = -1;
+  window.integrating = false;
   if (has_gap(window.pv)) {
     window.pv = window.x;
     window.gain_sign = 1;
   }
-  if (window.pv.empty()) {  // Now F, now X.
-    taken_ = false;
-    return std::nullopt;
-  }
-  return window;
 }
 
 void LoopWatch::Enter(std::optional<loop::Audit> audit) {
@@ -362,9 +404,13 @@ std::optional<Transition> LoopWatch::End(EndReason reason) {
 }
 
 Sample LoopWatch::Reduced(Sample sample) {
+  const unsigned control =
+      sample.Has(Signal::kPv)
+          ? unsigned{MaskOf(Signal::kPv)} | MaskOf(Signal::kSp)
+          : 0U;
   sample.present = static_cast<SignalMask>(
-      sample.present &
-      (MaskOf(Signal::kCv) | MaskOf(Signal::kF) | MaskOf(Signal::kX)));
+      sample.present & (MaskOf(Signal::kCv) | MaskOf(Signal::kF) |
+                        MaskOf(Signal::kX) | control));
   return sample;
 }
 
@@ -384,6 +430,11 @@ std::vector<Sample> LoopWatch::Points() const {
     sample.values[Index(Signal::kCv)] = double{point.cv};
     sample.values[Index(Signal::kF)] = double{point.f};
     sample.values[Index(Signal::kX)] = double{point.x};
+    if (!control_.empty()) {
+      const Control& control = control_[(added_ - n + k) % kPoints];
+      sample.values[Index(Signal::kPv)] = control.pv;
+      sample.values[Index(Signal::kSp)] = control.sp;
+    }
   }
   return points;
 }

@@ -33,8 +33,10 @@ int FindingOf(loop::Verdict verdict);
 ///
 /// - A point each 10 s, or each sample if these are slower; 720 points are a
 ///   window, two hours or more. It begins anew at a change of mode, source or
-///   epoch, at a gap of three intervals, and where CV, or both F and X, are
+///   epoch, at a gap of three intervals, and where CV, or PV, F and X, are
 ///   missing.
+/// - The controlled variable is PV with SP, else F, else X. A PV that follows
+///   the integral of CV is a level, and never called sticky.
 /// - A full window is audited each 120 points. Which of them is `phase`, so
 /// that
 ///   the loops of a plant take turns.
@@ -52,8 +54,10 @@ class LoopWatch {
   static constexpr double kInterval_s = 10.0;
 
   /// @param phase in 0..kHop-1
+  /// @param pv_integrates PV is known to be a level.
   LoopWatch(std::size_t phase,
-            std::shared_ptr<const SeverityCatalogue> severities);
+            std::shared_ptr<const SeverityCatalogue> severities,
+            bool pv_integrates = false);
 
   /// Takes the next sample. @param period_s of the samples.
   const Verdict& Step(const Sample& sample, double period_s);
@@ -79,7 +83,7 @@ class LoopWatch {
   bool found_normal() const { return found_normal_; }
 
   /// The points of the window, as the samples that they were, oldest first; of
-  /// their signals CV, F and X.
+  /// their signals CV, F and X, and PV with SP.
   std::vector<Sample> Points() const;
 
   /// A sample with only these signals.
@@ -91,6 +95,10 @@ class LoopWatch {
     float cv;
     float f;  // NaN: not there; so is X.
     float x;
+  };
+  struct Control {
+    double pv;  // NaN: not there; so is SP.
+    double sp;
   };
   struct Found {
     int finding{0};
@@ -107,6 +115,8 @@ class LoopWatch {
   bool IsInOrder(const Sample& sample);
   bool AddPoint(const Sample& sample, double period_s);
   void Restart();
+  void AddControl(const Sample& sample, std::size_t row);
+  void SetControlled(loop::Window& window) const;
   void Count(const loop::Audit& audit);
   void Tell();
   void Forget();
@@ -115,6 +125,7 @@ class LoopWatch {
   Severity SeverityOf(const Found& found) const;
 
   std::size_t phase_;
+  bool pv_integrates_;
   std::shared_ptr<const SeverityCatalogue> severities_;
   std::shared_ptr<const ModelSet> models_;
   Verdict verdict_;
@@ -124,6 +135,7 @@ class LoopWatch {
   std::int64_t first_ns_{0};
   std::size_t added_{0};  // Points of this window's loop, also those gone.
   std::vector<Point> ring_;
+  std::vector<Control> control_;  // Row by row as ring_; empty: there is no PV.
   bool due_{false};
   bool taken_{false};
   std::int64_t taken_ns_{0};

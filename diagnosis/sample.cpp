@@ -24,6 +24,7 @@ constexpr std::array<SignalFacts, kSignalCount> kFacts{{
     {"CVI", "-", {-2.0, 2.0}},
     {"Ps", "kPa", {-100.0, 2000.0}},
     {"Pz", "kPa", {-100.0, 2000.0}},
+    {"PV", "", {-1e12, 1e12}},
 }};
 
 constexpr std::array<std::string_view, 5> kModeNames = {
@@ -50,6 +51,11 @@ std::optional<Signal> ParseSignal(std::string_view name) {
 
 SignalRange PlausibleRange(Signal signal) {
   return kFacts[Index(signal)].range;
+}
+
+bool IsPlausible(const Sample& sample, Signal signal) {
+  const bool as_pv = signal == Signal::kSp && sample.Has(Signal::kPv);
+  return PlausibleRange(as_pv ? Signal::kPv : signal).Contains(sample[signal]);
 }
 
 std::string_view ValveModeName(ValveMode mode) {

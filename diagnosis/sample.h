@@ -18,12 +18,16 @@ enum class Signal : std::uint8_t {
   kT1,   ///< Temperature before the valve [°C].
   kX,    ///< Rod position [%].
   kF,    ///< Flow [m³/h or t/h, see FlowUnit].
-  kSp,   ///< Set point of the loop [%].
+  kSp,   ///< Set point of the loop [%; with kPv in the unit of that].
   kCvi,  ///< Positioner output [-1, 1].
   kPs,   ///< Actuator chamber pressure [kPa].
   kPz,   ///< Supply pressure [kPa].
+  kPv,   ///< Controlled variable of the loop, if it is no flow [its own unit].
 };
-inline constexpr std::size_t kSignalCount = 10;
+inline constexpr std::size_t kSignalCount = 11;
+/// The first ones, all but kPv: those of version 1 on the wire and in stored
+/// runs, and those that a model set may read.
+inline constexpr std::size_t kModelSignalCount = 10;
 
 constexpr std::size_t Index(Signal signal) {
   return static_cast<std::size_t>(signal);
@@ -51,11 +55,12 @@ struct SignalRange {
 
 /// "CV", "P1", ...
 std::string_view SignalName(Signal signal);
-/// "%", "kPa", "degC"; for kF the unit of the flow, see FlowUnitName().
+/// "%", "kPa", "degC"; empty for kF, see FlowUnitName(), and for kPv.
 std::string_view SignalUnit(Signal signal);
 /// Parses a signal name, ignoring case.
 std::optional<Signal> ParseSignal(std::string_view name);
-/// The physically possible readings of `signal`, for both flow units.
+/// The physically possible readings of `signal`, for both flow units. Of kSp
+/// those in %: see IsPlausible().
 SignalRange PlausibleRange(Signal signal);
 
 enum class SignalQuality : std::uint8_t { kGood, kUncertain, kBad };
@@ -100,6 +105,9 @@ struct Sample {
   /// quality UNCERTAIN.
   SignalMask uncertain() const {
     SignalMask mask = 0;
+    if (quality == decltype(quality){}) {
+      return mask;  // All are good, as nearly always.
+    }
     for (std::size_t i = 0; i < kSignalCount; ++i) {
       if (quality[i] == SignalQuality::kUncertain) {
         mask = static_cast<SignalMask>(mask | MaskOf(static_cast<Signal>(i)));
@@ -112,6 +120,10 @@ struct Sample {
     present = static_cast<SignalMask>(present | MaskOf(signal));
   }
 };
+
+/// Whether the reading of `signal`, which is present, is physically possible:
+/// in PlausibleRange(), or, of an SP beside a PV, in that of the PV.
+bool IsPlausible(const Sample& sample, Signal signal);
 
 /// The truth of a simulated or labelled sample; never seen by an engine.
 struct FaultTruth {

@@ -109,7 +109,7 @@ void ValidateRegressors(const TsModel& model, const Checker& checker) {
   for (std::size_t j = 0; j < n; ++j) {
     const Checker at = checker.At("regressor " + std::to_string(j + 1));
     const Regressor& regressor = model.regressors[j];
-    at.Check(Index(regressor.signal) < kSignalCount,
+    at.Check(Index(regressor.signal) < kModelSignalCount,
              "signal number " + std::to_string(Index(regressor.signal)) +
                  " is unknown");
     at.Check(regressor.lag >= 0 && regressor.lag <= kMaxLag,
@@ -260,7 +260,7 @@ SignalMask RequiredSignals(const TsModel& model) {
 
 void Validate(const TsModel& model, const char* where) {
   const Checker checker{where};
-  checker.Check(Index(model.output) < kSignalCount,
+  checker.Check(Index(model.output) < kModelSignalCount,
                 "output signal number " + std::to_string(Index(model.output)) +
                     " is unknown");
   ValidateRegressors(model, checker);

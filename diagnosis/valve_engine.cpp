@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <limits>
 
@@ -56,11 +57,10 @@ Intake CheckValues(const ModelSet& models, SignalMask required,
       sample.flow_unit != models.flow_unit) {
     return Intake::kUnit;
   }
-  for (std::size_t i = 0; i < kSignalCount; ++i) {
+  const SignalMask read = required & sample.present;
+  for (unsigned left = read; left != 0; left &= left - 1) {
+    const auto i = static_cast<std::size_t>(std::countr_zero(left));
     const auto signal = static_cast<Signal>(i);
-    if ((required & MaskOf(signal)) == 0 || !sample.Has(signal)) {
-      continue;
-    }
     if (sample.quality[i] == SignalQuality::kBad) {
       return Intake::kBadQuality;
     }
@@ -68,7 +68,7 @@ Intake CheckValues(const ModelSet& models, SignalMask required,
     if (!std::isfinite(sample.values[i])) {
       return Intake::kNotFinite;
     }
-    if (!PlausibleRange(signal).Contains(sample.values[i])) {
+    if (!IsPlausible(sample, signal)) {
       return Intake::kRange;
     }
     if (!episode_open &&

@@ -11,7 +11,7 @@
 #include "base/printable.h"
 #include "diagnosis/fault_catalogue.h"
 
-// Maps records to messages of fdi_v1.idl and back:
+// Maps records to messages of fdi_v1.idl and fdi_v2.idl and back:
 //
 //     KeyFields(transfer, record, wire)   the members that are its key
 //     Fields(transfer, record, wire)      all others
@@ -24,8 +24,9 @@ namespace fdi::idl {
 namespace {
 
 static_assert(kMaxChannels == 16 && kMaxFaults == 64 && kMaxObservers == 128 &&
-                  kSignalCount == 10 && kLastFinding <= 255,
-              "fdi_v1.idl cannot grow");
+                  kModelSignalCount == 10 && kSignalCount == 11 &&
+                  kLastFinding <= 255,
+              "fdi_v1.idl and fdi_v2.idl cannot grow");
 
 // LastOf(enumerator) is the last one of its enumeration. Enumerators have the
 // same order on both sides, which the last ones prove.
@@ -34,7 +35,7 @@ static_assert(kMaxChannels == 16 && kMaxFaults == 64 && kMaxObservers == 128 &&
   constexpr std::int64_t LastOf(decltype(OURS)) {                            \
     return static_cast<std::int64_t>(OURS);                                  \
   }
-FDI_LAST(Signal::kPz, kSignalCount - 1)
+FDI_LAST(Signal::kPz, kModelSignalCount - 1)
 FDI_LAST(SignalQuality::kBad, v1::SignalQuality::SIGNAL_BAD)
 FDI_LAST(ValveMode::kCalibrating, v1::ValveMode::MODE_CALIBRATING)
 FDI_LAST(FlowUnit::kTPerHour, v1::FlowUnit::FLOW_T_PER_H)
@@ -47,6 +48,12 @@ FDI_LAST(EndReason::kUnknown, v1::EndReason::END_UNKNOWN)
 FDI_LAST(Health::kFailing, v1::Health::HEALTH_FAILING)
 FDI_LAST(OperatorActionKind::kShelve, v1::OperatorActionKind::ACTION_SHELVE)
 #undef FDI_LAST
+static_assert(static_cast<unsigned>(SignalQuality::kBad) ==
+                  static_cast<unsigned>(v2::SignalQuality::SIGNAL_BAD) &&
+              static_cast<unsigned>(ValveMode::kCalibrating) ==
+                  static_cast<unsigned>(v2::ValveMode::MODE_CALIBRATING) &&
+              static_cast<unsigned>(FlowUnit::kTPerHour) ==
+                  static_cast<unsigned>(v2::FlowUnit::FLOW_T_PER_H));
 
 template <bool kEncodes>
 class Transfer {
@@ -228,15 +235,22 @@ void KeyFields(auto& t, Message& m, auto& w) {
   }
 }
 
+// A set of the first `count` signals.
 template <typename Mask, typename Wire>
-void SignalsField(auto& t, const char* field, Mask& mask, Wire&& wire) {
-  t.Ranged(field, mask, wire, 0, (1 << kSignalCount) - 1);
+void SignalsField(auto& t, const char* field, Mask& mask, Wire&& wire,
+                  std::size_t count = kModelSignalCount) {
+  t.Ranged(field, mask, wire, 0, (1 << count) - 1);
 }
 
 // The wire object is used for one message after another, and nothing clears it
 // in between: each function has to set every member of its type. Their order is
 // free, because the library serialises them in that of the IDL.
-void Fields(auto& t, Is<ValveSampleMessage> auto& message, auto& w) {
+template <typename Wire>
+void Fields(auto& t, Is<ValveSampleMessage> auto& message, Wire& w) {
+  constexpr bool kHasPv = requires {
+    w.pv();
+  };
+  constexpr std::size_t kSignals = kHasPv ? kSignalCount : kModelSignalCount;
   auto& m = message.sample;
   FDI_FOR_EACH(FDI_FIELD, source_id, seq)
   t.Ranged("stamp_ns", m.stamp_ns, w.stamp_ns(), kMinStampNs, kMaxStampNs);
@@ -253,8 +267,14 @@ void Fields(auto& t, Is<ValveSampleMessage> auto& message, auto& w) {
   t("cvi", value(Signal::kCvi), w.cvi());
   t("ps", value(Signal::kPs), w.ps());
   t("pz", value(Signal::kPz), w.pz());
-  SignalsField(t, "present", m.present, w.present());
-  for (std::size_t i = 0; i < kSignalCount; ++i) {
+  if constexpr (kHasPv) {
+    t("pv", value(Signal::kPv), w.pv());
+  } else if constexpr (!std::is_const_v<std::remove_reference_t<decltype(m)>>) {
+    m.values[Index(Signal::kPv)] = 0.0;
+    m.quality[Index(Signal::kPv)] = SignalQuality::kGood;
+  }
+  SignalsField(t, "present", m.present, w.present(), kSignals);
+  for (std::size_t i = 0; i < kSignals; ++i) {
     t("quality", m.quality[i], w.quality()[i]);
   }
   FDI_FOR_EACH(FDI_FIELD, mode, flow_unit, epoch)
@@ -361,21 +381,21 @@ void Fields(auto& t, Is<OperatorAction> auto& m, auto& w) {
 
 }  // namespace
 
-template <typename Message>
-void Codec<Message>::EncodeKey(const Message& message, Wire& wire) {
+template <typename Message, int kVersion>
+void Codec<Message, kVersion>::EncodeKey(const Message& message, Wire& wire) {
   Transfer<true> transfer;
   KeyFields(transfer, message, wire);
 }
 
-template <typename Message>
-void Codec<Message>::Encode(const Message& message, Wire& wire) {
+template <typename Message, int kVersion>
+void Codec<Message, kVersion>::Encode(const Message& message, Wire& wire) {
   Transfer<true> transfer;
   KeyFields(transfer, message, wire);
   Fields(transfer, message, wire);
 }
 
-template <typename Message>
-bool Codec<Message>::Decode(const Wire& wire, Message& message) {
+template <typename Message, int kVersion>
+bool Codec<Message, kVersion>::Decode(const Wire& wire, Message& message) {
   // Goes on after a field that does not fit: each field is bounded by itself.
   Transfer<false> transfer;
   KeyFields(transfer, message, wire);
@@ -384,6 +404,7 @@ bool Codec<Message>::Decode(const Wire& wire, Message& message) {
 }
 
 template struct Codec<ValveSampleMessage>;
+template struct Codec<ValveSampleMessage, 2>;
 template struct Codec<DecisionMessage>;
 template struct Codec<DecisionBatchMessage>;
 template struct Codec<FaultEvent>;

@@ -13,41 +13,47 @@
 #if FDI_FAST_DDS == 2
 #include "fdi_v1.h"
 #include "fdi_v1PubSubTypes.h"
+#include "fdi_v2.h"
+#include "fdi_v2PubSubTypes.h"
 #else
 #include "fdi_v1.hpp"
 #include "fdi_v1PubSubTypes.hpp"
+#include "fdi_v2.hpp"
+#include "fdi_v2PubSubTypes.hpp"
 #endif
 
 /// Inside idl/ only: converts plain messages to generated types and back.
 namespace fdi::idl {
 
-/// The name of a topic and its types on the wire.
-template <typename Message>
+/// The name of a topic and its types on the wire. All messages have version 1,
+/// samples also 2.
+template <typename Message, int kVersion = 1>
 struct TopicOf;
 
-#define FDI_TOPIC(MESSAGE, NAME)                           \
-  template <>                                              \
-  struct TopicOf<MESSAGE> {                                \
-    using Wire = v1::NAME;                                 \
-    using Type = v1::NAME##PubSubType;                     \
-    static constexpr const char* kTopic = "fdi/v1/" #NAME; \
+#define FDI_TOPIC(MESSAGE, NAME, VERSION)                             \
+  template <>                                                         \
+  struct TopicOf<MESSAGE, VERSION> {                                  \
+    using Wire = v##VERSION::NAME;                                    \
+    using Type = v##VERSION::NAME##PubSubType;                        \
+    static constexpr const char* kTopic = "fdi/v" #VERSION "/" #NAME; \
   };
-FDI_TOPIC(ValveSampleMessage, ValveSample)
-FDI_TOPIC(DecisionMessage, DecisionVector)
-FDI_TOPIC(DecisionBatchMessage, DecisionBatch)
-FDI_TOPIC(FaultEvent, FaultEvent)
-FDI_TOPIC(ModelSetInfoMessage, ModelSetInfo)
-FDI_TOPIC(MonitorStatusMessage, MonitorStatus)
-FDI_TOPIC(PairState, PairState)
-FDI_TOPIC(OperatorAction, OperatorAction)
-FDI_TOPIC(MonitorShare, MonitorShare)
+FDI_TOPIC(ValveSampleMessage, ValveSample, 1)
+FDI_TOPIC(ValveSampleMessage, ValveSample, 2)
+FDI_TOPIC(DecisionMessage, DecisionVector, 1)
+FDI_TOPIC(DecisionBatchMessage, DecisionBatch, 1)
+FDI_TOPIC(FaultEvent, FaultEvent, 1)
+FDI_TOPIC(ModelSetInfoMessage, ModelSetInfo, 1)
+FDI_TOPIC(MonitorStatusMessage, MonitorStatus, 1)
+FDI_TOPIC(PairState, PairState, 1)
+FDI_TOPIC(OperatorAction, OperatorAction, 1)
+FDI_TOPIC(MonitorShare, MonitorShare, 1)
 #undef FDI_TOPIC
 
 /// Converts the messages of one topic; codec.cpp lists the fields once for both
 /// directions.
-template <typename Message>
-struct Codec : TopicOf<Message> {
-  using Wire = typename TopicOf<Message>::Wire;
+template <typename Message, int kVersion = 1>
+struct Codec : TopicOf<Message, kVersion> {
+  using Wire = typename TopicOf<Message, kVersion>::Wire;
 
   /// @throws DataError naming the field that does not fit and what would.
   static void Encode(const Message& message, Wire& wire);

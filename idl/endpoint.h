@@ -49,6 +49,11 @@ struct PublisherStatus {
 /// Writes one topic. Thread safe. Destroying it loses unacknowledged messages:
 /// call WaitForAcknowledged() first.
 ///
+/// Samples go out on two topics: fdi/v1/ValveSample, and, of a valve from its
+/// first PV on, fdi/v2/ValveSample. Where nobody reads version 2, or our key
+/// does not permit it, they go out on version 1 without PV, which is logged
+/// once. Readers count once.
+///
 /// Message is one of the nine of wire.h; no others are instantiated.
 template <typename Message>
 class Publisher {
@@ -61,7 +66,8 @@ class Publisher {
   Publisher& operator=(const Publisher&) = delete;
 
   /// Sends `message`. With kLossless it blocks until there is room, a stop is
-  /// requested or `timeout` has passed; otherwise it does not block.
+  /// requested or `timeout` has passed; otherwise it does not block. The first
+  /// PV of a valve may take a second.
   /// @throws DataError naming the field that is too long or out of range.
   WriteResult Write(
       const Message& message, std::stop_token stop = {},
@@ -118,8 +124,8 @@ struct SubscriberStatus {
   std::uint64_t rejected_samples{0};
   std::uint64_t incompatible{0};  ///< Writers with incompatible QoS.
   std::uint64_t waiting{0};       ///< Messages queued for Take().
-  int matched{0};                 ///< Writers at present.
-  int alive{0};                   ///< Of these, writers that are alive.
+  int matched{0};  ///< Writers at present; of samples, publishers.
+  int alive{0};    ///< Of these, writers that are alive.
 };
 
 /// Where the backlog of Take() is held once 16 MB are queued.
@@ -152,10 +158,10 @@ inline Handlers<DecisionBatchMessage> ForEachVector(
           {}};
 }
 
-/// Reads one topic. Messages of one valve from one writer are delivered in the
-/// order of writing; those of different valves as they arrive, or valve by
-/// valve after a backlog. One thread calls Take(); status() and Interrupt() are
-/// thread safe.
+/// Reads one topic, of samples both versions. Messages of one valve from one
+/// writer are delivered in the order of writing; those of different valves as
+/// they arrive, or valve by valve after a backlog. One thread calls Take();
+/// status() and Interrupt() are thread safe.
 template <typename Message>
 class Subscriber {
  public:

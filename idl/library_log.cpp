@@ -170,4 +170,10 @@ std::uint64_t RefusedPermissions() {
   return registry.refusals;
 }
 
+void CountRefusedPermission() {
+  Registry& registry = GlobalRegistry();
+  const MutexLock lock(registry.mutex);
+  ++registry.refusals;
+}
+
 }  // namespace fdi::idl

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <set>
 #include <sstream>
 #include <utility>
@@ -17,6 +18,7 @@
 #include "base/passing_error.h"
 #include "base/time_units.h"
 #include "idl/interface_watch.h"
+#include "idl/library_log.h"
 #include "idl/participant_impl.h"
 #include "idl/security/keys.h"
 #if FDI_FAST_DDS == 2
@@ -42,6 +44,9 @@ using transport::UDPv6TransportDescriptor;
 // The port of discovery is 7400 + 250 domain [RTPS, 9.6], at most 65 535.
 constexpr int kMaxDomain = 232;
 constexpr int kMaxValvesLimit = 100000;
+// Of a peer that a profile names without a port, so many participants are
+// called: what fits a domain and host. The library's default is 4.
+constexpr std::uint32_t kInitialPeersRange = 120;
 // The kernel's default of some 200 kB is the first queue to overflow, and what
 // it drops has to be retransmitted. Capped by net.core.rmem_max.
 constexpr std::uint32_t kReceiveBufferBytes = 4U << 20U;
@@ -221,9 +226,7 @@ void SetTransports(const DdsOptions& options, dds::DomainParticipantQos& qos) {
     auto udp = std::make_shared<UDPv4TransportDescriptor>();
     udp->receiveBufferSize = kReceiveBufferBytes;
     udp->sendBufferSize = kSendBufferBytes;
-    // Of a peer that a profile names without a port, so many participants are
-    // called: what fits a domain and host. The library's default is 4.
-    udp->maxInitialPeersRange = 120;
+    udp->maxInitialPeersRange = kInitialPeersRange;
     if (options.interfaces != "all") {
       udp->interfaceWhiteList = Addresses(options.interfaces);
     }
@@ -246,6 +249,7 @@ void CheckTransports(const std::shared_ptr<DatagramLog>& log,
     auto udp = std::make_shared<UDPv4TransportDescriptor>();
     udp->sendBufferSize = qos.send_socket_buffer_size;
     udp->receiveBufferSize = qos.listen_socket_buffer_size;
+    udp->maxInitialPeersRange = kInitialPeersRange;
     qos.user_transports.push_back(udp);
     qos.user_transports.push_back(
         std::make_shared<SharedMemTransportDescriptor>());
@@ -257,18 +261,26 @@ void CheckTransports(const std::shared_ptr<DatagramLog>& log,
   }
 }
 
-// Configures the plugins of DDS Security 1.1 with the files of one key.
-void Secure(const std::filesystem::path& folder, const LogSink& log,
-            dds::DomainParticipantQos& qos) {
+// For a file that is missing or wrong, create_participant() returns null and no
+// reason; CheckKey() names both before the library sees the files.
+std::optional<KeyInfo> CheckedKey(const std::filesystem::path& folder,
+                                  const LogSink& log) {
+  if (folder.empty()) {
+    return std::nullopt;
+  }
   const std::int64_t now = NowNs();
-  // For a file that is missing or wrong, create_participant() returns null and
-  // no reason; CheckKey() names both before the library sees the files.
-  const KeyInfo key = CheckKey(folder, now);
+  KeyInfo key = CheckKey(folder, now);
   const std::int64_t days = (key.until_ns - now) / kNsPerDay;
   if (days < kDaysOfWarning && log) {
     log(LogLevel::kWarning, "security_key_expires name=" + key.name +
                                 " days=" + std::to_string(days));
   }
+  return key;
+}
+
+// Configures the plugins of DDS Security 1.1 with the files of one key.
+void Secure(const std::filesystem::path& folder,
+            dds::DomainParticipantQos& qos) {
   const std::string file =
       "file://" + std::filesystem::absolute(folder).string() + "/";
   const std::string auth = "dds.sec.auth.builtin.PKI-DH.";
@@ -291,7 +303,7 @@ void Secure(const std::filesystem::path& folder, const LogSink& log,
 dds::DomainParticipantQos MakeQos(const DdsOptions& options,
                                   const ProfileFile& profiles,
                                   const std::shared_ptr<DatagramLog>& datagrams,
-                                  const LogSink& log, const std::string& name) {
+                                  const std::string& name) {
   dds::DomainParticipantQos qos;
   // The profile is read first, because reading it replaces the whole QoS: what
   // it does not state gets the library's defaults.
@@ -310,7 +322,7 @@ dds::DomainParticipantQos MakeQos(const DdsOptions& options,
   }
   CheckTransports(datagrams, qos.transport());
   if (!options.security.empty()) {
-    Secure(options.security, log, qos);
+    Secure(options.security, qos);
   }
   if (!states("builtin")) {
     auto& discovery = qos.wire_protocol().builtin.discovery_config;
@@ -378,7 +390,8 @@ Participant::Impl::Impl(const DdsOptions& options, LogSink log,
       library_log_(log_),
       datagrams_(std::make_shared<DatagramLog>(log_)),
       profiles_(options.qos_file.empty() ? ProfileFile()
-                                         : ProfileFile(options.qos_file)) {
+                                         : ProfileFile(options.qos_file)),
+      key_(CheckedKey(options.security, log_)) {
   SetUpLibraryOnce();
   if (options_.transport != "shm") {
     interfaces_.emplace(options_.interfaces, log_);
@@ -386,7 +399,7 @@ Participant::Impl::Impl(const DdsOptions& options, LogSink log,
   RequireDescriptors(kDescriptors);
   RequireHeadroom(kThreads, kHeadroomBytes);
   const dds::DomainParticipantQos qos =
-      MakeQos(options_, profiles_, datagrams_, log_, name);
+      MakeQos(options_, profiles_, datagrams_, name);
   // The participant is active at once: its callbacks may come before `handle_`
   // is set and use only members initialised above. It listens to discovery
   // alone; the status of an endpoint goes to the listener of that endpoint.
@@ -451,10 +464,21 @@ void Participant::Impl::ReportIncompatible(const std::string& topic,
                 : " offered_here=" + own_text + " requested_there=" + theirs));
 }
 
+bool Participant::Impl::PermitsPv(const char* topic) {
+  const bool permitted = !key_ || key_->has_pv;
+  if (!permitted && !told_of_key_.exchange(true)) {
+    CountRefusedPermission();
+    Log(LogLevel::kWarning,
+        "security_key_without_pv name=" + key_->name + " topic=" + topic +
+            " effect=\"no PV is sent or read\" try=\"fdi-store keys renew\"");
+  }
+  return permitted;
+}
+
 void Participant::Impl::StorePolicies(const RemoteKey& key, PolicyTexts texts) {
   const MutexLock lock(remotes_mutex_);
   // Ours are few; others may use any number of names, also like ours.
-  if (!key.first.starts_with("fdi/v1/") ||
+  if (!key.first.starts_with("fdi/v") ||
       (remotes_.size() >= kMaxRemembered && !remotes_.contains(key))) {
     return;
   }

@@ -22,6 +22,7 @@
 #include "idl/participant.h"
 #include "idl/profile_file.h"
 #include "idl/qos.h"
+#include "idl/security/keys.h"
 
 /// Inside idl/ only: shared by the endpoints of a participant.
 namespace fdi::idl {
@@ -129,6 +130,17 @@ class Participant::Impl : private dds::DomainParticipantListener {
   void ReportIncompatible(const std::string& topic, bool remote_is_writer,
                           dds::QosPolicyId_t id, const PolicyTexts& ours);
 
+  /// Whether our key permits `topic`, one of version 2. The first time that it
+  /// does not, because it was made before, is logged and counted in
+  /// RefusedPermissions().
+  bool PermitsPv(const char* topic);
+
+  void Log(LogLevel level, const std::string& line) const {
+    if (log_) {
+      log_(level, line);
+    }
+  }
+
   dds::DomainParticipant* operator->() { return handle_; }
   const DdsOptions& options() const { return options_; }
   const ProfileFile& profiles() const { return profiles_; }
@@ -163,6 +175,8 @@ class Participant::Impl : private dds::DomainParticipantListener {
   LibraryLog library_log_;
   std::shared_ptr<DatagramLog> datagrams_;  // Shared with the transports.
   ProfileFile profiles_;
+  std::optional<KeyInfo> key_;  // None: the bus is not secured.
+  std::atomic<bool> told_of_key_{false};
   std::atomic<std::uint64_t> refused_{0};
   Mutex remotes_mutex_;
   std::map<RemoteKey, std::deque<PolicyTexts>> remotes_

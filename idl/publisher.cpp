@@ -2,7 +2,11 @@
 #include <atomic>
 #include <functional>
 #include <map>
+#include <memory>
+#include <string>
 #include <thread>
+#include <unordered_set>
+#include <utility>
 
 #include <fastdds/dds/publisher/DataWriter.hpp>
 #include <fastdds/dds/publisher/DataWriterListener.hpp>
@@ -42,11 +46,14 @@ Duration Until(Clock::time_point deadline) {
 
 }  // namespace
 
-template <typename Message>
-struct Publisher<Message>::Impl : dds::DataWriterListener {
-  using Traits = Codec<Message>;
+namespace {
 
-  Impl(Participant& participant, const PublisherOptions& options)
+// The writer of one topic, see Publisher.
+template <typename Message, int kVersion = 1>
+struct TopicWriter : dds::DataWriterListener {
+  using Traits = Codec<Message, kVersion>;
+
+  TopicWriter(Participant& participant, const PublisherOptions& options)
       : bus(participant.impl()),
         lossless(options.profile == Profile::kLossless),
         valves(options.valves > 0 ? options.valves : bus.options().max_valves),
@@ -76,7 +83,7 @@ struct Publisher<Message>::Impl : dds::DataWriterListener {
                      std::string("create_datawriter of ") + Traits::kTopic);
   }
 
-  ~Impl() override {
+  ~TopicWriter() override {
     writer->set_listener(nullptr);
     // Deleting a writer frees its changes while its heartbeat may still iterate
     // over them, forever if a dead reader has not acknowledged them.
@@ -85,8 +92,85 @@ struct Publisher<Message>::Impl : dds::DataWriterListener {
     publisher->delete_datawriter(writer);
   }
 
-  Impl(const Impl&) = delete;
-  Impl& operator=(const Impl&) = delete;
+  TopicWriter(const TopicWriter&) = delete;
+  TopicWriter& operator=(const TopicWriter&) = delete;
+
+  WriteResult Write(const Message& message, const std::stop_token& stop,
+                    std::chrono::milliseconds timeout) {
+    const MutexLock lock(mutex);
+    MakeRoomFor(message);
+    Traits::Encode(message, wire);
+    const dds::InstanceHandle_t* instance = InstanceOf(message);
+    if (instance == nullptr) {
+      refused.fetch_add(1, std::memory_order_relaxed);
+      return WriteResult::kTooManyValves;
+    }
+    // With a handle: in Fast DDS 2.9 write() without one returns a bool, which
+    // does not tell a full history from an error.
+    const auto send = [&] { return writer->write(&wire, *instance); };
+    if (!Retry(send, "write", stop, DeadlineIn(timeout))) {
+      return WriteResult::kNotSent;
+    }
+    written.fetch_add(1, std::memory_order_relaxed);
+    return WriteResult::kSent;
+  }
+
+  void Dispose(const Message& message) {
+    const MutexLock lock(mutex);
+    const auto found = instances.find(KeyOf(message));
+    if (found == instances.end()) {
+      return;
+    }
+    Traits::EncodeKey(message, wire);
+    const auto send = [&] {
+      return writer->dispose(&wire, found->second.handle);
+    };
+    if (!Retry(send, "dispose", {}, Clock::now() + kDisposeTimeout)) {
+      throw TransportError("dispose: the readers are behind",
+                           NumberOf(return_code::RETCODE_TIMEOUT));
+    }
+  }
+
+  void Unregister(const Message& message) {
+    const MutexLock lock(mutex);
+    UnregisterLocked(message);
+  }
+
+  // The number of the last message of this instance; 0: none.
+  std::uint64_t LastWriteOf(const Message& message) {
+    const MutexLock lock(mutex);
+    const auto found = instances.find(KeyOf(message));
+    return found == instances.end() ? 0 : found->second.last_write;
+  }
+
+  // That of the last message of all.
+  std::uint64_t last_write() {
+    const MutexLock lock(mutex);
+    return writes;
+  }
+
+  bool WaitForReaders(int count, std::chrono::milliseconds timeout) const {
+    return matched.WaitFor(count, timeout);
+  }
+
+  bool WaitForAcknowledged(std::chrono::milliseconds timeout) {
+    return writer->wait_for_acknowledgments(Until(DeadlineIn(timeout))) ==
+           return_code::RETCODE_OK;
+  }
+
+  PublisherStatus status() const {
+    constexpr auto kOrder = std::memory_order_relaxed;
+    return {written.load(kOrder), retries.load(kOrder), refused.load(kOrder),
+            incompatible.load(kOrder), readers()};
+  }
+  int readers() const { return matched.count(); }
+  int total_readers() const { return total_matched.load(); }
+
+  void ClearHistory() {
+    const MutexLock lock(mutex);
+    std::size_t removed = 0;
+    writer->clear_history(&removed);
+  }
 
   // The instance of `message`, which is already encoded in `wire`; nullptr
   // beyond the limit.
@@ -115,11 +199,11 @@ struct Publisher<Message>::Impl : dds::DataWriterListener {
         instances, {}, [](const auto& each) { return each.second.last_write; });
     Message ended;
     KeyOf(ended) = oldest->first;
-    Unregister(ended);
+    UnregisterLocked(ended);
   }
 
   // The library frees the place once all readers have acknowledged the end.
-  void Unregister(const Message& ended) REQUIRES(mutex) {
+  void UnregisterLocked(const Message& ended) REQUIRES(mutex) {
     const auto found = instances.find(KeyOf(ended));
     if (found == instances.end()) {
       return;
@@ -197,6 +281,179 @@ struct Publisher<Message>::Impl : dds::DataWriterListener {
   typename Traits::Wire wire GUARDED_BY(mutex);
 };
 
+// Samples, on both versions of their topic.
+//
+// A valve stays on version 1 until its first sample with a PV, and on version 2
+// from then on, also with samples that have none: the order of two topics is
+// not kept. Before it changes, what it has on version 1 is acknowledged.
+//
+// Where version 2 has no reader and version 1 has, which is a monitor of an
+// earlier version or one whose key is too old, samples go to that one without
+// PV. Likewise where our own key does not permit version 2.
+class SampleWriter {
+ public:
+  SampleWriter(Participant& participant, const PublisherOptions& options)
+      : bus_(participant.impl()),
+        first_(participant, options),
+        second_(bus_.PermitsPv(Second::Traits::kTopic)
+                    ? std::make_unique<Second>(participant, options)
+                    : nullptr) {}
+
+  WriteResult Write(const ValveSampleMessage& message,
+                    const std::stop_token& stop,
+                    std::chrono::milliseconds timeout) {
+    switch (VersionFor(message)) {
+      case Version::kFirst:
+        return first_.Write(message, stop, timeout);
+      case Version::kSecond:
+        return second_->Write(message, stop, timeout);
+      case Version::kFirstWithoutPv:
+        break;
+    }
+    ValveSampleMessage plain = message;
+    Sample& sample = plain.sample;
+    sample.present = static_cast<SignalMask>(
+        sample.present & ~(MaskOf(Signal::kPv) | MaskOf(Signal::kSp)));
+    sample.quality[Index(Signal::kPv)] = SignalQuality::kGood;
+    return first_.Write(plain, stop, timeout);
+  }
+
+  // A reader hears of the end from the writer that it heard of last.
+  void Dispose(const ValveSampleMessage& message) {
+    ForEach([&](auto& writer) { writer.Dispose(message); });
+  }
+  void Unregister(const ValveSampleMessage& message) {
+    ForEach([&](auto& writer) { writer.Unregister(message); });
+    const MutexLock lock(mutex_);
+    changed_.erase(message.valve_id);
+  }
+
+  // A reader of samples has both versions, and is found on both within
+  // milliseconds: Write() waits for that.
+  bool WaitForReaders(int count, std::chrono::milliseconds timeout) const {
+    const Clock::time_point deadline = DeadlineIn(timeout);
+    constexpr milliseconds kLook{20};
+    while (readers() < count) {
+      if (Clock::now() >= deadline) {
+        return false;
+      }
+      first_.WaitForReaders(count, std::min(kLook, LeftUntil(deadline)));
+    }
+    return true;
+  }
+
+  bool WaitForAcknowledged(std::chrono::milliseconds timeout) {
+    const Clock::time_point deadline = DeadlineIn(timeout);
+    return first_.WaitForAcknowledged(timeout) &&
+           (second_ == nullptr ||
+            second_->WaitForAcknowledged(LeftUntil(deadline)));
+  }
+
+  PublisherStatus status() const {
+    PublisherStatus status = first_.status();
+    if (second_) {
+      const PublisherStatus more = second_->status();
+      status.written += more.written;
+      status.retries += more.retries;
+      status.refused += more.refused;
+      status.incompatible = std::max(status.incompatible, more.incompatible);
+    }
+    status.matched = readers();
+    return status;
+  }
+  int readers() const {
+    return std::max(first_.readers(), second_ ? second_->readers() : 0);
+  }
+  int total_readers() const {
+    return std::max(first_.total_readers(),
+                    second_ ? second_->total_readers() : 0);
+  }
+
+  void ClearHistory() {
+    ForEach([](auto& writer) { writer.ClearHistory(); });
+  }
+
+ private:
+  using milliseconds = std::chrono::milliseconds;
+  using Second = TopicWriter<ValveSampleMessage, 2>;
+  enum class Version { kFirst, kSecond, kFirstWithoutPv };
+  // For the discovery of readers of version 2, and for acknowledgements.
+  static constexpr milliseconds kLongestChange{1000};
+
+  static milliseconds LeftUntil(Clock::time_point deadline) {
+    return std::chrono::duration_cast<milliseconds>(
+        std::max(deadline - Clock::now(), Clock::duration::zero()));
+  }
+
+  void ForEach(const auto& call) {
+    if (second_) {
+      call(*second_);
+    }
+    call(first_);
+  }
+
+  Version VersionFor(const ValveSampleMessage& message) {
+    const bool has_pv = message.sample.Has(Signal::kPv);
+    const MutexLock lock(mutex_);
+    if (!has_pv && (changed_.empty() || !changed_.contains(message.valve_id))) {
+      return Version::kFirst;
+    }
+    if (second_ == nullptr) {
+      return Version::kFirstWithoutPv;
+    }
+    AwaitSameReaders();
+    if (second_->readers() == 0 && first_.readers() > 0) {
+      if (!std::exchange(told_, true)) {
+        bus_.Log(LogLevel::kWarning,
+                 std::string("pv_unread topic=") + Second::Traits::kTopic +
+                     " effect=\"samples go out without PV\"");
+      }
+      return has_pv ? Version::kFirstWithoutPv : Version::kFirst;
+    }
+    if (changed_.insert(message.valve_id).second &&
+        first_.LastWriteOf(message) > acknowledged_) {
+      const std::uint64_t written = first_.last_write();
+      first_.WaitForAcknowledged(kLongestChange);
+      acknowledged_ = written;
+    }
+    return Version::kSecond;
+  }
+
+  // A reader that is new on version 1 is found on version 2 in a moment.
+  void AwaitSameReaders() REQUIRES(mutex_) {
+    const int found = first_.total_readers();
+    if (second_->readers() < first_.readers() &&
+        std::exchange(awaited_, found) != found) {
+      second_->WaitForReaders(first_.readers(), kLongestChange);
+    }
+  }
+
+  Participant::Impl& bus_;
+  TopicWriter<ValveSampleMessage> first_;
+  std::unique_ptr<Second> second_;  // Null: not permitted.
+  Mutex mutex_;
+  std::unordered_set<std::string> changed_ GUARDED_BY(mutex_);  // To version 2.
+  std::uint64_t acknowledged_ GUARDED_BY(mutex_){0};            // Of first_.
+  int awaited_ GUARDED_BY(mutex_){0};  // Readers of first_.
+  bool told_ GUARDED_BY(mutex_){false};
+};
+
+template <typename Message>
+struct WriterOf {
+  using Type = TopicWriter<Message>;
+};
+template <>
+struct WriterOf<ValveSampleMessage> {
+  using Type = SampleWriter;
+};
+
+}  // namespace
+
+template <typename Message>
+struct Publisher<Message>::Impl : WriterOf<Message>::Type {
+  using WriterOf<Message>::Type::Type;
+};
+
 template <typename Message>
 Publisher<Message>::Publisher(Participant& participant,
                               const PublisherOptions& options)
@@ -209,85 +466,49 @@ template <typename Message>
 WriteResult Publisher<Message>::Write(const Message& message,
                                       std::stop_token stop,
                                       std::chrono::milliseconds timeout) {
-  Impl& impl = *impl_;
-  const MutexLock lock(impl.mutex);
-  impl.MakeRoomFor(message);
-  Impl::Traits::Encode(message, impl.wire);
-  const dds::InstanceHandle_t* instance = impl.InstanceOf(message);
-  if (instance == nullptr) {
-    impl.refused.fetch_add(1, std::memory_order_relaxed);
-    return WriteResult::kTooManyValves;
-  }
-  // With a handle: in Fast DDS 2.9 write() without one returns a bool, which
-  // does not tell a full history from an error.
-  const auto send = [&] { return impl.writer->write(&impl.wire, *instance); };
-  if (!impl.Retry(send, "write", stop, DeadlineIn(timeout))) {
-    return WriteResult::kNotSent;
-  }
-  impl.written.fetch_add(1, std::memory_order_relaxed);
-  return WriteResult::kSent;
+  return impl_->Write(message, stop, timeout);
 }
 
 template <typename Message>
 void Publisher<Message>::Dispose(const Message& message) {
-  Impl& impl = *impl_;
-  const MutexLock lock(impl.mutex);
-  const auto found = impl.instances.find(KeyOf(message));
-  if (found == impl.instances.end()) {
-    return;
-  }
-  Impl::Traits::EncodeKey(message, impl.wire);
-  const auto send = [&] {
-    return impl.writer->dispose(&impl.wire, found->second.handle);
-  };
-  if (!impl.Retry(send, "dispose", {}, Clock::now() + kDisposeTimeout)) {
-    throw TransportError("dispose: the readers are behind",
-                         NumberOf(return_code::RETCODE_TIMEOUT));
-  }
+  impl_->Dispose(message);
 }
 
 template <typename Message>
 void Publisher<Message>::Unregister(const Message& message) {
-  const MutexLock lock(impl_->mutex);
   impl_->Unregister(message);
 }
 
 template <typename Message>
 bool Publisher<Message>::WaitForReaders(
     int count, std::chrono::milliseconds timeout) const {
-  return impl_->matched.WaitFor(count, timeout);
+  return impl_->WaitForReaders(count, timeout);
 }
 
 template <typename Message>
 bool Publisher<Message>::WaitForAcknowledged(
     std::chrono::milliseconds timeout) {
-  return impl_->writer->wait_for_acknowledgments(Until(DeadlineIn(timeout))) ==
-         return_code::RETCODE_OK;
+  return impl_->WaitForAcknowledged(timeout);
 }
 
 template <typename Message>
 PublisherStatus Publisher<Message>::status() const {
-  constexpr auto kOrder = std::memory_order_relaxed;
-  return {impl_->written.load(kOrder), impl_->retries.load(kOrder),
-          impl_->refused.load(kOrder), impl_->incompatible.load(kOrder),
-          matched()};
+  return impl_->status();
 }
 
 template <typename Message>
 int Publisher<Message>::matched() const {
-  return impl_->matched.count();
+  return impl_->readers();
 }
 
 template <typename Message>
 int Publisher<Message>::total_matched() const {
-  return impl_->total_matched.load();
+  return impl_->total_readers();
 }
 
 template <typename Message>
 void Publisher<Message>::ClearHistory() {
-  const MutexLock lock(impl_->mutex);
-  std::size_t removed = 0;
-  impl_->writer->clear_history(&removed);
+  impl_->ClearHistory();
 }
 
 template class Publisher<ValveSampleMessage>;

@@ -3,8 +3,12 @@
 #include <chrono>
 #include <cstring>
 #include <functional>
+#include <memory>
 #include <set>
+#include <string>
+#include <type_traits>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include <fastdds/dds/subscriber/DataReader.hpp>
@@ -60,68 +64,57 @@ std::uint64_t HashOf(const dds::InstanceHandle_t& writer, std::size_t bytes) {
 
 }  // namespace
 
+namespace {
+
 template <typename Message>
-struct Subscriber<Message>::Impl : dds::DataReaderListener {
-  using Traits = Codec<Message>;
-  using Type = CheckedType<typename Traits::Type>;
+struct Item {
+  Message message;
+  Reception reception;
+  bool ended{false};
+};
 
-  struct Item {
-    Message message;
-    Reception reception;
-    bool ended{false};
-  };
+// The part of a reader that moves messages from the library to the queue of its
+// Subscriber.
+template <typename Message>
+class Source {
+ public:
+  enum class Taken { kNothing, kMessage, kUndecodable };
 
-  Impl(Participant& participant, Profile profile, Overflow overflow,
-       const std::vector<std::string>& partitions)
-      : bus(participant.impl()),
-        holds_receipt(overflow == Overflow::kOnTheWay),
-        max_keys(4 * static_cast<std::size_t>(bus.options().max_valves) +
-                 1024) {
-    dds::Topic* topic =
-        bus.TopicOf(Traits::kTopic, dds::TypeSupport(new Type()));
-    // Another endpoint may have made the topic, and registered its own type,
-    // first. The registered one is that which counts refusals.
-    type = bus->find_type(topic->get_type_name());
-    const EndpointQos ours = QosFor<Message>(profile, bus.options().max_valves);
-    // Enabled only after `reader` is set, because callbacks use it.
-    dds::SubscriberQos subscriber_qos;
-    subscriber_qos.entity_factory().autoenable_created_entities = false;
-    for (const std::string& partition : partitions) {
-      subscriber_qos.partition().push_back(partition.c_str());
+  Source(dds::DataReader& reader, std::size_t max_keys)
+      : reader_(reader), max_keys_(max_keys) {}
+  virtual ~Source() = default;
+  Source(const Source&) = delete;
+  Source& operator=(const Source&) = delete;
+
+  // The next message that the library has.
+  Taken Take(Item<Message>& item) {
+    dds::SampleInfo info;
+    if (TakeWire(info) != return_code::RETCODE_OK) {
+      return Taken::kNothing;
     }
-    subscriber = {
-        NotNull(bus->create_subscriber(subscriber_qos), "create_subscriber"),
-        [this](dds::Subscriber* handle) { bus->delete_subscriber(handle); }};
-    const dds::DataReaderQos qos = bus.profiles().Override(
-        ours.name + "_reader", ours.reader, *subscriber);
-    policies = Describe(qos);
-    has_lease = qos.liveliness().lease_duration != kForever;
-    reader = NotNull(subscriber->create_datareader(topic, qos, this, Mask()),
-                     std::string("create_datareader of ") + Traits::kTopic);
-    Check(reader->enable(), "enable a reader");
-  }
-
-  ~Impl() override {
-    // Closing comes first: the receiving thread may be waiting for room, with
-    // the library's locks held that deleting the reader needs.
-    queue.Close();
-    reader->set_listener(nullptr);
-    if (!holds_receipt) {  // Otherwise nothing was rejected.
-      LetWritersFinish();
+    item.reception = {info.source_timestamp.to_ns(),
+                      info.reception_timestamp.to_ns(),
+                      HashOf(info.publication_handle, 16),
+                      HashOf(info.publication_handle, 12)};
+    item.ended = !info.valid_data;
+    // Counted before it is decoded: what cannot be decoded was not lost on the
+    // way.
+    gaps_.Count(item.reception.writer_id,
+                info.sample_identity.sequence_number().to64long(),
+                item.reception.sent_ns);
+    if (item.ended ? !FindKey(info.instance_handle, item.message)
+                   : !Decode(item.message)) {
+      return Taken::kUndecodable;
     }
-    subscriber->delete_datareader(reader);
-  }
-
-  Impl(const Impl&) = delete;
-  Impl& operator=(const Impl&) = delete;
-
-  static dds::StatusMask Mask() {
-    return dds::StatusMask::data_available()
-           << dds::StatusMask::subscription_matched()
-           << dds::StatusMask::requested_incompatible_qos()
-           << dds::StatusMask::sample_lost()
-           << dds::StatusMask::sample_rejected()
-           << dds::StatusMask::liveliness_changed();
+    if (!item.ended && !keys_.contains(info.instance_handle)) {
+      // Once forgotten, the end of an instance that sends no more is
+      // undecodable.
+      if (keys_.size() >= max_keys_) {
+        keys_.clear();  // Bounds the memory if ids keep changing.
+      }
+      keys_.emplace(info.instance_handle, CopyOf(KeyOf(item.message)));
+    }
+    return Taken::kMessage;
   }
 
   // A writer that removes a reader drops what the reader has not acknowledged.
@@ -133,15 +126,265 @@ struct Subscriber<Message>::Impl : dds::DataReaderListener {
   void LetWritersFinish() {
     const Duration two_heartbeats{0, 100'000'000};
     const auto end = std::chrono::steady_clock::now() + kMaxFinalDrain;
-    const MutexLock lock(drain_mutex);
     dds::SampleInfo info;
-    const auto take = [&]() REQUIRES(drain_mutex) {
-      return reader->take_next_sample(&wire, &info) == return_code::RETCODE_OK;
-    };
+    const auto take = [&] { return TakeWire(info) == return_code::RETCODE_OK; };
     bool behind = take();
     while (behind && std::chrono::steady_clock::now() < end) {
-      behind = take() || reader->wait_for_unread_message(two_heartbeats);
+      behind = take() || reader_.wait_for_unread_message(two_heartbeats);
     }
+  }
+
+  std::uint64_t missing() const { return gaps_.missing(); }
+
+ protected:
+  dds::DataReader& reader() { return reader_; }
+
+ private:
+  virtual ReturnCode TakeWire(dds::SampleInfo& info) = 0;
+  virtual bool Decode(Message& message) = 0;
+
+  // Sets the key of the disposed instance. A dispose carries only the instance
+  // handle, an MD5 sum of the key, which `keys_` maps back.
+  bool FindKey(const dds::InstanceHandle_t& handle, Message& message) {
+    const auto found = keys_.find(handle);
+    if (found == keys_.end()) {
+      return false;
+    }
+    KeyOf(message) = found->second;
+    keys_.erase(found);
+    return true;
+  }
+
+  dds::DataReader& reader_;
+  const std::size_t max_keys_;
+  GapCounter gaps_{NowNs()};
+  std::unordered_map<dds::InstanceHandle_t, Key<Message>, HandleHash> keys_;
+};
+
+template <typename Message, int kVersion>
+class SourceOf : public Source<Message> {
+ public:
+  using Source<Message>::Source;
+
+ private:
+  ReturnCode TakeWire(dds::SampleInfo& info) override {
+    return this->reader().take_next_sample(&wire_, &info);
+  }
+  bool Decode(Message& message) override {
+    return Codec<Message, kVersion>::Decode(wire_, message);
+  }
+
+  typename Codec<Message, kVersion>::Wire wire_;
+};
+
+// The reader of one topic, with what the library tells of it: all but its
+// messages.
+class TopicReader : public dds::DataReaderListener {
+ public:
+  // @param type counts the messages that cannot be deserialized.
+  // @param on_data called when messages have arrived, after Enable().
+  TopicReader(Participant::Impl& bus, const char* topic,
+              const dds::TypeSupport& type, const EndpointQos& ours,
+              const std::vector<std::string>& partitions,
+              std::function<void()> on_data)
+      : bus_(bus), topic_(topic), on_data_(std::move(on_data)) {
+    dds::Topic* handle = bus_.TopicOf(topic_, type);
+    // Another endpoint may have made the topic, and registered its own type,
+    // first. The registered one is that which counts refusals.
+    type_ = bus_->find_type(handle->get_type_name());
+    // Enabled only after everything is set, because callbacks use it.
+    dds::SubscriberQos subscriber_qos;
+    subscriber_qos.entity_factory().autoenable_created_entities = false;
+    for (const std::string& partition : partitions) {
+      subscriber_qos.partition().push_back(partition.c_str());
+    }
+    subscriber_ = {
+        NotNull(bus_->create_subscriber(subscriber_qos), "create_subscriber"),
+        [this](dds::Subscriber* each) { bus_->delete_subscriber(each); }};
+    const dds::DataReaderQos qos = bus_.profiles().Override(
+        ours.name + "_reader", ours.reader, *subscriber_);
+    policies_ = Describe(qos);
+    has_lease_ = qos.liveliness().lease_duration != kForever;
+    reader_ = NotNull(subscriber_->create_datareader(handle, qos, this, Mask()),
+                      std::string("create_datareader of ") + topic_);
+  }
+
+  ~TopicReader() override { subscriber_->delete_datareader(reader_); }
+  TopicReader(const TopicReader&) = delete;
+  TopicReader& operator=(const TopicReader&) = delete;
+
+  void Enable() { Check(reader_->enable(), "enable a reader"); }
+  // No callback comes any more.
+  void Silence() { reader_->set_listener(nullptr); }
+
+  dds::DataReader& handle() { return *reader_; }
+  const Matched& matched() const { return matched_; }
+
+  void CountUndecodable() { Add(&SubscriberStatus::undecodable); }
+  void CountLost() { Add(&SubscriberStatus::lost); }
+  void SetMissing(std::uint64_t missing) {
+    const MutexLock lock(mutex_);
+    missing_ = missing;
+  }
+
+  // All but what a Subscriber counts itself.
+  // @param refused_bytes messages that could not be deserialized.
+  SubscriberStatus status(std::uint64_t refused_bytes) const {
+    const MutexLock lock(mutex_);
+    SubscriberStatus status = counted_;
+    status.undecodable += refused_bytes;
+    // Numbers that were never received include the messages that are counted
+    // above as rejected or refused. The larger figure counts: the library
+    // leaves out what a writer overwrote, the numbers what came before the
+    // first one received.
+    const std::uint64_t explained = status.rejected_instances + refused_bytes;
+    status.lost =
+        std::max(missing_ - std::min(missing_, explained), status.lost);
+    status.matched = matched_.count();
+    // With an infinite lease the library reports no liveliness of writers.
+    if (!has_lease_) {
+      status.alive = status.matched;
+    }
+    status.refused_valves = refused_valves_.size();
+    return status;
+  }
+  const dds::TypeSupport& type() const { return type_; }
+
+ private:
+  static dds::StatusMask Mask() {
+    return dds::StatusMask::data_available()
+           << dds::StatusMask::subscription_matched()
+           << dds::StatusMask::requested_incompatible_qos()
+           << dds::StatusMask::sample_lost()
+           << dds::StatusMask::sample_rejected()
+           << dds::StatusMask::liveliness_changed();
+  }
+
+  void Add(std::uint64_t SubscriberStatus::*count, std::uint64_t more = 1) {
+    const MutexLock lock(mutex_);
+    counted_.*count += more;
+  }
+
+  void on_data_available(dds::DataReader* /*reader*/) override { on_data_(); }
+
+  void on_subscription_matched(
+      dds::DataReader* /*reader*/,
+      const dds::SubscriptionMatchedStatus& status) override {
+    matched_.Set(status.current_count);
+  }
+
+  void on_liveliness_changed(
+      dds::DataReader* /*reader*/,
+      const dds::LivelinessChangedStatus& status) override {
+    const MutexLock lock(mutex_);
+    counted_.alive = status.alive_count;
+  }
+
+  void on_requested_incompatible_qos(
+      dds::DataReader* /*reader*/,
+      const dds::RequestedIncompatibleQosStatus& status) override {
+    {
+      const MutexLock lock(mutex_);
+      counted_.incompatible = status.total_count;
+    }
+    bus_.ReportIncompatible(topic_, true, status.last_policy_id, policies_);
+  }
+
+  void on_sample_lost(dds::DataReader* /*reader*/,
+                      const dds::SampleLostStatus& status) override {
+    Add(&SubscriberStatus::lost,
+        static_cast<std::uint64_t>(status.total_count_change));
+  }
+
+  void on_sample_rejected(dds::DataReader* /*reader*/,
+                          const dds::SampleRejectedStatus& status) override {
+    // Thousands a second may come under back-pressure: they are counted, never
+    // logged one by one.
+    if (status.last_reason != dds::REJECTED_BY_INSTANCES_LIMIT) {
+      Add(&SubscriberStatus::rejected_samples, status.total_count_change);
+      return;
+    }
+    Add(&SubscriberStatus::rejected_instances, status.total_count_change);
+    const MutexLock lock(mutex_);
+    if (refused_valves_.size() < kRefusedLimit) {
+      refused_valves_.insert(status.last_instance_handle);
+    }
+  }
+
+  Participant::Impl& bus_;
+  const std::string topic_;
+  const std::function<void()> on_data_;
+  dds::TypeSupport type_;
+  std::unique_ptr<dds::Subscriber, std::function<void(dds::Subscriber*)>>
+      subscriber_;
+  dds::DataReader* reader_{nullptr};
+  PolicyTexts policies_;
+  bool has_lease_{false};
+  Matched matched_;
+
+  mutable Mutex mutex_;
+  // Its `lost` is the library's count, `missing_` that of the numbers.
+  SubscriberStatus counted_ GUARDED_BY(mutex_);
+  std::uint64_t missing_ GUARDED_BY(mutex_){0};
+  std::set<dds::InstanceHandle_t> refused_valves_ GUARDED_BY(mutex_);
+};
+
+}  // namespace
+
+// Samples have a reader of each version of their topic, all others one. The
+// readers share a queue, in which messages are in the order of their arrival.
+template <typename Message>
+struct Subscriber<Message>::Impl {
+  Impl(Participant& participant, Profile profile, Overflow overflow,
+       const std::vector<std::string>& partitions)
+      : bus(participant.impl()),
+        holds_receipt(overflow == Overflow::kOnTheWay) {
+    AddReader<1>(profile, partitions);
+    if constexpr (std::is_same_v<Message, ValveSampleMessage>) {
+      if (bus.PermitsPv(TopicOf<Message, 2>::kTopic)) {
+        AddReader<2>(profile, partitions);
+      }
+    }
+    for (const auto& reader : readers) {
+      reader->Enable();
+    }
+  }
+
+  ~Impl() {
+    // Closing comes first: the receiving thread may be waiting for room, with
+    // the library's locks held that deleting the reader needs.
+    queue.Close();
+    for (const auto& reader : readers) {
+      reader->Silence();
+    }
+    if (!holds_receipt) {  // Otherwise nothing was rejected.
+      const MutexLock lock(drain_mutex);
+      for (const auto& source : sources) {
+        source->LetWritersFinish();
+      }
+    }
+  }
+
+  Impl(const Impl&) = delete;
+  Impl& operator=(const Impl&) = delete;
+
+  template <int kVersion>
+  void AddReader(Profile profile, const std::vector<std::string>& partitions) {
+    using Traits = Codec<Message, kVersion>;
+    using Type = CheckedType<typename Traits::Type>;
+    const int valves = bus.options().max_valves;
+    readers.push_back(std::make_unique<TopicReader>(
+        bus, Traits::kTopic, dds::TypeSupport(new Type()),
+        QosFor<Message>(profile, valves), partitions,
+        [this] { Drain(holds_receipt); }));
+    const dds::TypeSupport& type = readers.back()->type();
+    refused_bytes.push_back([checked = dynamic_cast<const Type*>(type.get())] {
+      return checked == nullptr ? 0 : checked->refused();
+    });
+    const std::size_t max_keys = 4 * static_cast<std::size_t>(valves) + 1024;
+    const MutexLock lock(drain_mutex);
+    sources.push_back(std::make_unique<SourceOf<Message, kVersion>>(
+        readers.back()->handle(), max_keys));
   }
 
   // Called by the taking thread. Waits for the first message only.
@@ -165,7 +408,7 @@ struct Subscriber<Message>::Impl : dds::DataReaderListener {
       }
       // Before the handler runs, because it may throw: the next call goes on
       // behind this message.
-      const Item& item = batch[next++];
+      const Item<Message>& item = batch[next++];
       ++handed;
       (item.ended ? ended : received).fetch_add(1, std::memory_order_relaxed);
       const auto& handler =
@@ -196,148 +439,92 @@ struct Subscriber<Message>::Impl : dds::DataReaderListener {
     }
   }
 
+  // Version 1 first: a publisher goes on with version 2 once it knows that what
+  // it sent on version 1 is in the library.
   void DrainLocked(bool waits) noexcept REQUIRES(drain_mutex) {
-    dds::SampleInfo info;
-    while (waits ? queue.WaitForRoom() : queue.HasRoom()) {
-      if (reader->take_next_sample(&wire, &info) != return_code::RETCODE_OK) {
-        // Only now, because numbers that are still in the library look missing:
-        // after a backlog it returns messages valve by valve, not in the order
-        // of writing.
-        const MutexLock lock(status_mutex);
-        missing = gaps.missing();
-        return;
-      }
-      try {
-        Accept(info);
-      } catch (const std::exception&) {  // Out of memory.
-        Add(&SubscriberStatus::lost);
+    for (std::size_t i = 0; i < sources.size(); ++i) {
+      while (waits ? queue.WaitForRoom() : queue.HasRoom()) {
+        if (!TakeOne(*sources[i], *readers[i])) {
+          // Only now, because numbers that are still in the library look
+          // missing: after a backlog it returns messages valve by valve, not in
+          // the order of writing.
+          readers[i]->SetMissing(sources[i]->missing());
+          break;
+        }
       }
     }
   }
 
-  void Accept(const dds::SampleInfo& info) REQUIRES(drain_mutex) {
-    Item item;
-    item.reception = {info.source_timestamp.to_ns(),
-                      info.reception_timestamp.to_ns(),
-                      HashOf(info.publication_handle, 16),
-                      HashOf(info.publication_handle, 12)};
-    item.ended = !info.valid_data;
-    // Counted before it is decoded: what cannot be decoded was not lost on the
-    // way.
-    gaps.Count(item.reception.writer_id,
-               info.sample_identity.sequence_number().to64long(),
-               item.reception.sent_ns);
-    if (item.ended ? !FindKey(info.instance_handle, item.message)
-                   : !Traits::Decode(wire, item.message)) {
-      Add(&SubscriberStatus::undecodable);
-      return;
-    }
-    if (!item.ended && !keys.contains(info.instance_handle)) {
-      // Once forgotten, the end of an instance that sends no more is
-      // undecodable.
-      if (keys.size() >= max_keys) {
-        keys.clear();  // Bounds the memory if ids keep changing.
+  // @returns false if there is none.
+  bool TakeOne(Source<Message>& source, TopicReader& reader) noexcept {
+    using Taken = typename Source<Message>::Taken;
+    try {
+      Item<Message> item;
+      const Taken taken = source.Take(item);
+      if (taken == Taken::kUndecodable) {
+        reader.CountUndecodable();
+      } else if (taken == Taken::kMessage) {
+        queue.TryPush(std::move(item));  // There is room, or it is closed.
       }
-      keys.emplace(info.instance_handle, CopyOf(KeyOf(item.message)));
+      return taken != Taken::kNothing;
+    } catch (const std::exception&) {  // Out of memory.
+      reader.CountLost();
+      return true;
     }
-    queue.TryPush(std::move(item));  // There is room, or it is closed.
   }
 
-  // Sets the key of the disposed instance. A dispose carries only the instance
-  // handle, an MD5 sum of the key, which `keys` maps back.
-  bool FindKey(const dds::InstanceHandle_t& handle, Message& message)
-      REQUIRES(drain_mutex) {
-    const auto found = keys.find(handle);
-    if (found == keys.end()) {
-      return false;
+  bool WaitForWriters(int count, std::chrono::milliseconds timeout) const {
+    const auto deadline = DeadlineIn(timeout);
+    constexpr std::chrono::milliseconds kLook{20};
+    while (status().matched < count) {
+      const auto now = std::chrono::steady_clock::now();
+      if (now >= deadline) {
+        return false;
+      }
+      const auto left =
+          std::chrono::ceil<std::chrono::milliseconds>(deadline - now);
+      readers.front()->matched().WaitFor(
+          count, readers.size() == 1 ? left : std::min(kLook, left));
     }
-    KeyOf(message) = found->second;
-    keys.erase(found);
     return true;
   }
 
-  void Add(std::uint64_t SubscriberStatus::*count, std::uint64_t more = 1) {
-    const MutexLock lock(status_mutex);
-    counted.*count += more;
-  }
-
-  void on_data_available(dds::DataReader* /*reader*/) override {
-    Drain(holds_receipt);
-  }
-
-  void on_subscription_matched(
-      dds::DataReader* /*reader*/,
-      const dds::SubscriptionMatchedStatus& status) override {
-    matched.Set(status.current_count);
-  }
-
-  void on_liveliness_changed(
-      dds::DataReader* /*reader*/,
-      const dds::LivelinessChangedStatus& status) override {
-    const MutexLock lock(status_mutex);
-    counted.alive = status.alive_count;
-  }
-
-  void on_requested_incompatible_qos(
-      dds::DataReader* /*reader*/,
-      const dds::RequestedIncompatibleQosStatus& status) override {
-    {
-      const MutexLock lock(status_mutex);
-      counted.incompatible = status.total_count;
+  // A publisher has a writer of each version: writers are counted on the
+  // version that has more.
+  SubscriberStatus status() const {
+    SubscriberStatus sum;
+    for (std::size_t i = 0; i < readers.size(); ++i) {
+      const SubscriberStatus one = readers[i]->status(refused_bytes[i]());
+      sum.lost += one.lost;
+      sum.undecodable += one.undecodable;
+      sum.rejected_instances += one.rejected_instances;
+      sum.rejected_samples += one.rejected_samples;
+      sum.refused_valves += one.refused_valves;
+      sum.incompatible = std::max(sum.incompatible, one.incompatible);
+      sum.matched = std::max(sum.matched, one.matched);
+      sum.alive = std::max(sum.alive, one.alive);
     }
-    bus.ReportIncompatible(Traits::kTopic, true, status.last_policy_id,
-                           policies);
-  }
-
-  void on_sample_lost(dds::DataReader* /*reader*/,
-                      const dds::SampleLostStatus& status) override {
-    Add(&SubscriberStatus::lost,
-        static_cast<std::uint64_t>(status.total_count_change));
-  }
-
-  void on_sample_rejected(dds::DataReader* /*reader*/,
-                          const dds::SampleRejectedStatus& status) override {
-    // Thousands a second may come under back-pressure: they are counted, never
-    // logged one by one.
-    if (status.last_reason != dds::REJECTED_BY_INSTANCES_LIMIT) {
-      Add(&SubscriberStatus::rejected_samples, status.total_count_change);
-      return;
-    }
-    Add(&SubscriberStatus::rejected_instances, status.total_count_change);
-    const MutexLock lock(status_mutex);
-    if (refused_valves.size() < kRefusedLimit) {
-      refused_valves.insert(status.last_instance_handle);
-    }
+    sum.received = received.load(std::memory_order_relaxed);
+    sum.ended = ended.load(std::memory_order_relaxed);
+    sum.waiting = queue.size();
+    return sum;
   }
 
   Participant::Impl& bus;
   const bool holds_receipt;
-  const std::size_t max_keys;
-  dds::TypeSupport type;
-  std::unique_ptr<dds::Subscriber, std::function<void(dds::Subscriber*)>>
-      subscriber;
-  dds::DataReader* reader{nullptr};
-  PolicyTexts policies;
-  bool has_lease{false};
-  Matched matched;
-  BoundedQueue<Item> queue{QueueCapacity<Message>()};
-  std::vector<Item> batch;  // Taken from `queue`; handed out up to `next`.
+  BoundedQueue<Item<Message>> queue{QueueCapacity<Message>()};
+  std::vector<Item<Message>> batch;  // From `queue`; handed out up to `next`.
   std::size_t next{0};
   std::atomic<bool> pending{false};
   std::atomic<std::uint64_t> received{0};  // Handed out; likewise `ended`.
   std::atomic<std::uint64_t> ended{0};
 
-  mutable Mutex status_mutex;
-  SubscriberStatus counted
-      GUARDED_BY(status_mutex);  // Its `lost` is the library's count,
-  std::uint64_t missing GUARDED_BY(status_mutex){0};  // this is that of `gaps`.
-  std::set<dds::InstanceHandle_t> refused_valves GUARDED_BY(status_mutex);
-
   Mutex drain_mutex;
-  GapCounter gaps GUARDED_BY(drain_mutex){NowNs()};
-  typename Traits::Wire wire GUARDED_BY(drain_mutex);
-  std::unordered_map<dds::InstanceHandle_t, Key<Message>, HandleHash> keys
-      GUARDED_BY(drain_mutex);
+  std::vector<std::unique_ptr<Source<Message>>> sources
+      GUARDED_BY(drain_mutex);  // By version.
+  // Likewise; last, because their callbacks use what is above.
+  std::vector<std::unique_ptr<TopicReader>> readers;
+  std::vector<std::function<std::uint64_t()>> refused_bytes;
 };
 
 template <typename Message>
@@ -364,34 +551,12 @@ void Subscriber<Message>::Interrupt() {
 template <typename Message>
 bool Subscriber<Message>::WaitForWriters(
     int count, std::chrono::milliseconds timeout) const {
-  return impl_->matched.WaitFor(count, timeout);
+  return impl_->WaitForWriters(count, timeout);
 }
 
 template <typename Message>
 SubscriberStatus Subscriber<Message>::status() const {
-  const Impl& impl = *impl_;
-  const auto* type = dynamic_cast<const typename Impl::Type*>(impl.type.get());
-  const std::uint64_t refused_bytes = type == nullptr ? 0 : type->refused();
-  const MutexLock lock(impl.status_mutex);
-  SubscriberStatus status = impl.counted;
-  status.received = impl.received.load(std::memory_order_relaxed);
-  status.ended = impl.ended.load(std::memory_order_relaxed);
-  status.undecodable += refused_bytes;
-  // Numbers that were never received include the messages that are counted
-  // above as rejected or refused. The larger figure counts: the library leaves
-  // out what a writer overwrote, the numbers what came before the first one
-  // received.
-  const std::uint64_t explained = status.rejected_instances + refused_bytes;
-  status.lost =
-      std::max(impl.missing - std::min(impl.missing, explained), status.lost);
-  status.waiting = impl.queue.size();
-  status.matched = impl.matched.count();
-  // With an infinite lease the library reports no liveliness of writers.
-  if (!impl.has_lease) {
-    status.alive = status.matched;
-  }
-  status.refused_valves = impl.refused_valves.size();
-  return status;
+  return impl_->status();
 }
 
 template class Subscriber<ValveSampleMessage>;

@@ -15,7 +15,7 @@
 #include "diagnosis/sample.h"
 #include "diagnosis/verdict.h"
 
-/// The messages on the wire as plain structs, one per topic `fdi/v1/...`.
+/// The messages on the wire as plain structs, one per topic.
 /// Doubles are transmitted bit for bit, including NaN.
 namespace fdi::idl {
 
@@ -31,7 +31,7 @@ inline constexpr std::size_t kMaxBatch = 128;
 inline constexpr std::int64_t kMinStampNs = -2'208'988'800'000'000'000;
 inline constexpr std::int64_t kMaxStampNs = 4'102'444'800'000'000'000;
 
-/// Topic fdi/v1/ValveSample, key valve_id.
+/// Topics fdi/v1/ValveSample and, with PV, fdi/v2/ValveSample; key valve_id.
 struct ValveSampleMessage {
   std::string valve_id;
   Sample sample;

@@ -57,7 +57,7 @@ double DaysOf1970(TimeForm form) {
 std::string ColumnNames(Signal signal) {
   std::string names;
   for (const SignalColumn& column : kSignalColumns) {
-    if (column.signal == signal) {
+    if (column.signal == signal && !NeedsPv(column)) {
       names += names.empty() ? "" : " or ";
       names += column.name;
     }
@@ -81,8 +81,10 @@ Columns ColumnsOf(std::span<const LabelledSample> samples, FlowUnit flow_unit) {
     columns.mode = columns.mode || labelled.sample.mode != ValveMode::kAuto;
   }
   for (const SignalColumn& column : kSignalColumns) {
+    const bool has_pv = (occurring & MaskOf(Signal::kPv)) != 0;
     const bool wrong_unit =
-        column.signal == Signal::kF && column.flow_unit != flow_unit;
+        (column.signal == Signal::kF && column.flow_unit != flow_unit) ||
+        (column.signal == Signal::kSp && NeedsPv(column) != has_pv);
     if ((occurring & MaskOf(column.signal)) != 0 && !wrong_unit) {
       columns.signals.push_back(column);
     }
@@ -288,6 +290,7 @@ std::optional<CsvRow> CsvReader::TakeLine(std::string_view line,
     for (const Conversion& c : conversions_) {
       Convert(c, sample);
     }
+    DropLoneSetPoint(header_.signals, sample);
   }
   if (mode_column_) {
     sample.mode = Mode();
@@ -725,8 +728,18 @@ bool CsvReader::AddByContract(std::size_t column, std::string_view name) {
     mode_column_ = column;
     return true;
   }
+  // Tables of others have a PV that is a flow, and say so by a map.
+  const bool may_have_pv = options_.map.columns.empty();
+  const bool has_pv =
+      may_have_pv && std::ranges::any_of(names_, [](const std::string& each) {
+        return SameName(each, SignalName(Signal::kPv));
+      });
   for (const SignalColumn& known : kSignalColumns) {
     if (SameName(name, known.name)) {
+      if ((known.signal == Signal::kPv && !may_have_pv) ||
+          (NeedsPv(known) && !has_pv)) {
+        return false;
+      }
       if (known.signal == Signal::kF) {
         header_.flow_unit = known.flow_unit;
       }
@@ -782,8 +795,8 @@ void CsvReader::CheckHeader() const {
       require((header_.signals & MaskOf(signal)) != 0, ColumnNames(signal));
     }
   }
-  if (!map.columns.empty() && missing.empty() &&
-      (header_.signals & (MaskOf(Signal::kX) | MaskOf(Signal::kF))) == 0) {
+  const bool has_answer = (header_.signals & kAnswers) != 0;
+  if (!map.columns.empty() && missing.empty() && !has_answer) {
     Refuse(
         "neither a position (X) nor a flow (F) is mapped: the command alone, "
         "or a level, shows nothing about the valve; expected one of the two; "
@@ -791,9 +804,9 @@ void CsvReader::CheckHeader() const {
         "and [signal.X] or [signal.F] of --map; the header is " +
         Quoted(Listed(names_)));
   }
-  require((header_.signals & (MaskOf(Signal::kX) | MaskOf(Signal::kF))) != 0,
+  require(has_answer,
           "one of X_pct, F_m3_h, F_t_h (position or flow: the command alone, "
-          "or a level, shows nothing about the valve)");
+          "or a level, shows nothing about the valve; a PV, of the loop)");
   require(fault_column_ || !strength_column_, "fault (or fault_no)");
   require(strength_column_ || !fault_column_, kStrengthColumn);
   if (!missing.empty()) {

@@ -23,6 +23,13 @@
 
 namespace fdi::importer {
 
+/// What shows whether a command is followed; a sample needs one of them.
+inline constexpr SignalMask kAnswers =
+    MaskOf(Signal::kX) | MaskOf(Signal::kF) | MaskOf(Signal::kPv);
+
+/// SP beside a PV, in the unit of that.
+inline constexpr std::string_view kSetPointOfPv = "SP";
+
 /// A column of the CSV contract.
 struct SignalColumn {
   std::string_view name;
@@ -30,7 +37,7 @@ struct SignalColumn {
   FlowUnit flow_unit;  ///< Used for kF only.
 };
 
-inline constexpr std::array<SignalColumn, kSignalCount + 1> kSignalColumns{{
+inline constexpr std::array<SignalColumn, kSignalCount + 2> kSignalColumns{{
     {"CV_pct", Signal::kCv, FlowUnit::kM3PerHour},
     {"P1_kPa", Signal::kP1, FlowUnit::kM3PerHour},
     {"P2_kPa", Signal::kP2, FlowUnit::kM3PerHour},
@@ -42,7 +49,15 @@ inline constexpr std::array<SignalColumn, kSignalCount + 1> kSignalColumns{{
     {"CVI", Signal::kCvi, FlowUnit::kM3PerHour},
     {"Ps_kPa", Signal::kPs, FlowUnit::kM3PerHour},
     {"Pz_kPa", Signal::kPz, FlowUnit::kM3PerHour},
+    {"PV", Signal::kPv, FlowUnit::kM3PerHour},
+    {kSetPointOfPv, Signal::kSp, FlowUnit::kM3PerHour},
 }};
+
+/// The columns of a table without PV have a unit, so that other tables with
+/// names such as SP are not taken for it.
+constexpr bool NeedsPv(const SignalColumn& column) {
+  return column.name == kSetPointOfPv;
+}
 
 inline constexpr std::string_view kTimeColumn = "t_s";
 inline constexpr std::string_view kModeColumn = "mode";
@@ -154,7 +169,7 @@ struct ColumnMap {
 /// Settings of the CSV readers.
 struct CsvOptions {
   std::string source{"input"};  ///< File name for error messages.
-  ColumnMap map;
+  ColumnMap map{};
   /// Required columns; with a map, those of the map instead. Time, CV and one
   /// of X, F are always required.
   SignalMask required{kBasicSignals};
@@ -168,7 +183,11 @@ struct CsvOptions {
   /// exports in pieces have where two pieces meet; otherwise an error.
   bool skip_repeats{false};
   std::int64_t start_ns{0};  ///< UTC of t_s = 0, unless times have a date.
-  LogSink log;               ///< Receives CsvTable::notes, each as `csv_note`.
+  LogSink log{};             ///< Receives CsvTable::notes, each as `csv_note`.
+  /// Takes the samples, in their order, in place of CsvTable::runs, which then
+  /// have none: for who would otherwise have them in memory twice.
+  std::function<void(const LabelledSample&)> take{};
+  std::size_t max_packed_rows{kMaxPackedRows};  ///< If it is in a gzip.
 };
 
 /// Information from the header of a table.
@@ -192,6 +211,14 @@ struct CsvTable {
 };
 
 /// A row accepted by CsvReader; in a long table it has one signal.
+/// Without its PV the unit of a set point is not known.
+inline void DropLoneSetPoint(SignalMask signals, Sample& sample) {
+  if ((signals & MaskOf(Signal::kPv)) != 0 && !sample.Has(Signal::kPv)) {
+    sample.present =
+        static_cast<SignalMask>(sample.present & ~MaskOf(Signal::kSp));
+  }
+}
+
 struct CsvRow {
   LabelledSample labelled;  ///< seq counts from 0; source_id 0, epoch 0.
   double t_s{0.0};          ///< Dated: since the first row.
@@ -221,7 +248,8 @@ class StepCheck {
 /// left to the caller.
 ///
 /// Header: t_s,CV_pct,P1_kPa,P2_kPa,T1_degC,X_pct,F_m3_h (or F_t_h), in any
-/// order and case; optional SP_pct,CVI,Ps_kPa,Pz_kPa; optional truth: fault
+/// order and case; optional SP_pct,CVI,Ps_kPa,Pz_kPa; optional PV, and with it
+/// SP, unless a map names the columns; optional truth: fault
 /// (f1..f19, t1, p1, p2, normal) or fault_no (0..22) with fault_strength, where
 /// only a non-zero strength marks a fault; optional mode (kValveModeNames, or
 /// the words of controllers, CAS, MAN, ...; AUTO if the column is missing).
@@ -351,7 +379,7 @@ class CsvReader {
 /// @throws DataError as CsvReader, or naming the line of a step that is not the
 ///   sample period; if there are fewer than two rows and no period is given; if
 ///   the decimal sign is ambiguous; if most values of a mapped signal are
-///   impossible; if a gzip has more than kMaxPackedRows rows.
+///   impossible; if a gzip has more than CsvOptions::max_packed_rows.
 CsvTable ReadCsv(std::string_view text, const CsvOptions& options = {});
 CsvTable ReadCsv(const TextLines& lines, const CsvOptions& options);
 

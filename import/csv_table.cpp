@@ -288,9 +288,9 @@ bool TableReader::Joined(const CsvRow& row) {
 }
 
 void TableReader::CheckCount() const {
-  if (lines_.packed() && rows_.size() >= kMaxPackedRows) {
+  if (lines_.packed() && rows_.size() >= options().max_packed_rows) {
     throw DataError(options().source + ": has more than " +
-                    std::to_string(kMaxPackedRows) +
+                    std::to_string(options().max_packed_rows) +
                     " rows, which a gzip may not have; try to unpack it with "
                     "gunzip first, or to cut it into parts");
   }
@@ -485,9 +485,10 @@ void TableReader::NoteResampling(
 }
 
 void TableReader::CheckResampled(std::size_t samples) const {
-  if (lines_.packed() && samples >= kMaxPackedRows) {
+  if (lines_.packed() && samples >= options().max_packed_rows) {
     throw DataError(options().source + ": --resample " + NumberText(period_s_) +
-                    "s: more than " + std::to_string(kMaxPackedRows) +
+                    "s: more than " +
+                    std::to_string(options().max_packed_rows) +
                     " samples, which a gzip may not have; try a longer "
                     "period, or to unpack it with gunzip first");
   }
@@ -540,8 +541,7 @@ void TableReader::Resample() {
             value->filled ? SignalQuality::kUncertain : SignalQuality::kGood;
       }
     }
-    if (!sample.Has(Signal::kCv) ||
-        (!sample.Has(Signal::kX) && !sample.Has(Signal::kF))) {
+    if (!sample.Has(Signal::kCv) || (sample.present & kAnswers) == 0) {
       // Otherwise a gap of months would be walked through instant by instant.
       if (row + 1 < rows_.size() && rows_[row + 1].t_s > t_s + period_s_) {
         // Continue after the gap.
@@ -574,8 +574,7 @@ void TableReader::DropImpossible(const ColumnMapping& m) {
   std::size_t count = 0;
   for (CsvRow& row : rows_) {
     Sample& sample = row.labelled.sample;
-    if (sample.Has(m.signal) &&
-        !PlausibleRange(m.signal).Contains(sample[m.signal])) {
+    if (sample.Has(m.signal) && !IsPlausible(sample, m.signal)) {
       const double value = sample[m.signal];
       ++cells[((m.sense == Sense::kOpening ? 100.0 - value : value) -
                m.offset) /
@@ -607,10 +606,8 @@ void TableReader::CheckReadings() {
     for (std::size_t i = 0; i < kSignalCount; ++i) {
       readings[i] += sample.Has(static_cast<Signal>(i)) ? 1U : 0U;
     }
-    usable += sample.Has(Signal::kCv) &&
-                      (sample.Has(Signal::kX) || sample.Has(Signal::kF))
-                  ? 1U
-                  : 0U;
+    usable +=
+        sample.Has(Signal::kCv) && (sample.present & kAnswers) != 0 ? 1U : 0U;
   }
   const ColumnMap& map = options().map;
   for (std::size_t i = 0; i < kSignalCount; ++i) {
@@ -658,7 +655,7 @@ void TableReader::CheckValues() {
       ++count;
       low = std::min(low, sample[signal]);
       high = std::max(high, sample[signal]);
-      if (!range.Contains(sample[signal])) {
+      if (!IsPlausible(sample, signal)) {
         first = first == nullptr ? &row : first;
         ++beyond;
       }
@@ -768,13 +765,20 @@ void TableReader::CheckMotion() {
          " of the rows: it was not measured, and no fault shows in it. Map the "
          "position transmitter as [signal.X], or leave [signal.X] out");
   }
-  if ((signals & MaskOf(Signal::kX)) == 0) {
+  const bool of_valve =
+      (signals & (MaskOf(Signal::kX) | MaskOf(Signal::kF))) != 0;
+  if (!of_valve) {
+    note(
+        "no position (X) and no flow (F): PV is the loop's, which is audited, "
+        "and shows no fault of the valve by name");
+  }
+  if (of_valve && (signals & MaskOf(Signal::kX)) == 0) {
     note(
         "no position (X): CV and F show that something is wrong, not whether "
         "it is the rod, the trim or the flow transmitter. Map the position "
         "transmitter as [signal.X] if there is one");
   }
-  if ((signals & MaskOf(Signal::kF)) == 0) {
+  if (of_valve && (signals & MaskOf(Signal::kF)) == 0) {
     note(
         "no flow (F): CV and X show what the rod does, not what the trim does "
         "(blocked, worn, leaking). Map the flow as [signal.F] if there is one");
@@ -849,9 +853,13 @@ void TableReader::Cut() {
   for (const std::size_t length : lengths) {
     SampleSeries& run =
         table_.runs.emplace_back(EmptyRun(table_.header, period_s_));
-    run.samples.reserve(length);
+    run.samples.reserve(options().take ? 0 : length);
     for (std::size_t k = 0; k < length; ++k) {
-      run.samples.push_back(rows_.front().labelled);
+      if (options().take) {
+        options().take(rows_.front().labelled);
+      } else {
+        run.samples.push_back(rows_.front().labelled);
+      }
       rows_.pop_front();
       if (rows_.size() % 65536 == 0) {
         malloc_trim(0);

@@ -875,8 +875,13 @@ void SignalGuess::FindCounts(const std::vector<SniffedColumn*>& numbers,
 
 // A name of the contract, or a column of the caller's map.
 bool SignalGuess::TakeKnown(SniffedColumn& column, const std::string& unit) {
+  // PV and SP are names of the contract in a table that has others of it.
+  const bool is_contract = std::ranges::any_of(
+      found_.columns,
+      [](const SniffedColumn& each) { return SameName(each.name, "CV_pct"); });
   for (const SignalColumn& known : kSignalColumns) {
-    if (SameName(known.name, column.name)) {
+    if (SameName(known.name, column.name) &&
+        (is_contract || (known.signal != Signal::kPv && !NeedsPv(known)))) {
       column.signal = known.signal;
       const bool by_name = !unit.empty() && FindUnit(known.signal, unit);
       column.unit = by_name ? unit
@@ -1101,7 +1106,8 @@ void SignalGuess::NoteMissing() {
         "no command (CV) found: nothing can be judged without it. State its "
         "column under [signal.CV]");
   }
-  if (Of(Signal::kX).empty() && Of(Signal::kF).empty()) {
+  if (Of(Signal::kX).empty() && Of(Signal::kF).empty() &&
+      Of(Signal::kPv).empty()) {
     found_.findings.push_back(
         (level.empty()
              ? std::string()
@@ -1262,8 +1268,8 @@ void ReadColumns(const TextLines& lines, const Layout& layout,
     bool form = SameName(names[c], layout.map.time_column) ||
                 SameName(names[c], kTimeColumn) ||
                 SameName(names[c], layout.map.clock_column);
-    for (const auto& [column, quality] : layout.map.quality_of) {
-      form = form || SameName(names[c], quality);
+    for (const auto& of_column : layout.map.quality_of) {
+      form = form || SameName(names[c], of_column.second);
     }
     tag = tall && SameName(names[c], tall->tag) ? c : tag;
     value = tall && SameName(names[c], tall->value) ? c : value;

@@ -16,7 +16,7 @@ namespace {
 constexpr double kAtmosphereKpa = 101.325;
 
 /// Kinds of quantity; signals of one kind have the same units.
-enum class Quantity { kPercent, kPressure, kTemperature, kFlow, kNumber };
+enum class Quantity { kPercent, kPressure, kTemperature, kFlow, kNumber, kOwn };
 
 Quantity QuantityOf(Signal signal) {
   switch (signal) {
@@ -35,6 +35,8 @@ Quantity QuantityOf(Signal signal) {
       return Quantity::kFlow;
     case Signal::kCvi:
       return Quantity::kNumber;
+    case Signal::kPv:
+      return Quantity::kOwn;
   }
   return Quantity::kNumber;
 }
@@ -348,6 +350,9 @@ void ReadFile(TomlReader table, ColumnMap& map) {
 }  // namespace
 
 std::optional<UnitConversion> FindUnit(Signal signal, std::string_view name) {
+  if (QuantityOf(signal) == Quantity::kOwn) {
+    return UnitConversion{};  // Whatever it is, it stays.
+  }
   std::string plain = Plain(name);
   const auto find = [&]() -> std::optional<UnitConversion> {
     for (const UnitEntry& unit : kSignalUnits) {
@@ -398,7 +403,7 @@ bool IsUnit(std::string_view name) {
   if (SameName(name, "mA")) {
     return true;  // Of any signal, over a span.
   }
-  for (std::size_t i = 0; i < kSignalCount; ++i) {
+  for (std::size_t i = 0; i < kModelSignalCount; ++i) {
     if (FindUnit(static_cast<Signal>(i), name)) {
       return true;
     }
@@ -508,7 +513,7 @@ ColumnMap ReadTagMap(const std::filesystem::path& path) {
       if (!signal) {
         signals->Refuse(name,
                         "unknown signal; there are CV P1 P2 T1 X F SP CVI Ps "
-                        "Pz");
+                        "Pz PV");
       }
       ReadSignal(*signal, *signals->Table(name), map);
     }

@@ -49,6 +49,8 @@ enum class Counter : std::uint8_t {
   kStrokes,
   kReversals,
   kSlipJumps,
+  kStrokeTests,
+  kStrokeTestsWorse,
   kCount_
 };
 inline constexpr std::size_t kCounterCount =

@@ -37,7 +37,7 @@ HealthChannel ChannelOf(const ChannelSpec& channel) {
 double Reading(const Sample& sample, Signal signal) {
   const bool good = sample.Has(signal) &&
                     sample.quality[Index(signal)] != SignalQuality::kBad &&
-                    PlausibleRange(signal).Contains(sample[signal]);
+                    IsPlausible(sample, signal);
   return good ? sample[signal] : std::nan("");
 }
 
@@ -108,6 +108,13 @@ void HealthBook::Add(const Sample& sample, const Verdict& verdict,
   hour.seen_ms += period_ms;
   AddCounts(sample, period_s, hour);
   AddStroke(sample, period_ms, hour);
+  if (verdict.intake == Intake::kAccepted) {
+    std::vector<StrokeTest> tests;
+    strokes_.Push(sample, period_s, tests);
+    for (StrokeTest& test : tests) {
+      hour.AddStroke(std::move(test));
+    }
+  }
   if (models != nullptr && verdict.quality == Quality::kLive &&
       hour.SameKey(key)) {
     AddDecision(verdict, *models, period_ms, hour);
@@ -200,6 +207,8 @@ void HealthBooks::Drain(const std::string& valve_id, HealthBook& book,
                   static_cast<std::uint64_t>(hours[i].reversals));
     counters_.Add(Counter::kSlipJumps,
                   static_cast<std::uint64_t>(hours[i].counts.slips));
+    counters_.Add(Counter::kStrokeTests,
+                  static_cast<std::uint64_t>(hours[i].strokes.size()));
   }
   counters_.Add(Counter::kStrokes,
                 static_cast<std::uint64_t>(travel_ / kStroke));

@@ -9,6 +9,7 @@
 #include "diagnosis/health_hour.h"
 #include "diagnosis/loop/valve_counters.h"
 #include "diagnosis/model_set.h"
+#include "diagnosis/stroke_watch.h"
 #include "diagnosis/verdict.h"
 #include "monitor/sinks.h"
 
@@ -62,6 +63,7 @@ class HealthBook {
   std::vector<HealthHour> hours_;
   StrokeCount stroke_;
   loop::ValveCounters counters_;
+  StrokeWatch strokes_;
   std::int64_t stamp_ns_{0};
   std::uint64_t source_id_{0};
   bool by_command_{false};  // The position is CV for want of X.

@@ -468,13 +468,15 @@ void Journal::SetAside(const Record& record, const std::string& reason) {
 // would count its time twice: the sink guarantees all or nothing.
 bool Journal::WriteCheckpoint() {
   Checkpoint checkpoint;
+  std::size_t worse = 0;
   {
     const MutexLock lock(mutex_);
     checkpoint = std::exchange(checkpoint_, {});
   }
   if (checkpoint.empty() ||
-      AttemptOrDrop([&] { history_.CommitCheckpoint(checkpoint); },
+      AttemptOrDrop([&] { worse = history_.CommitCheckpoint(checkpoint); },
                     checkpoint_failures_, [&] { checkpoint = {}; })) {
+    counters_.Add(Counter::kStrokeTestsWorse, worse);
     return true;
   }
   const MutexLock lock(mutex_);

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <exception>
 #include <utility>
 
@@ -48,13 +47,6 @@ std::string SignalNames(SignalMask signals) {
     }
   }
   return names;
-}
-
-// "1.1"
-std::string ThreeDigits(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.3g", value);
-  return text;
 }
 
 }  // namespace

@@ -146,6 +146,10 @@ class Fleet {
     for (const FleetLoop& loop : query.loops) {
       loops_[loop.valve_id] = loop;
     }
+    for (const std::string& valve : query.judged_now) {
+      Know(valve);
+      named_.insert(valve);
+    }
     if (history != nullptr) {
       ReadTimes();
       FindFaults();
@@ -187,8 +191,7 @@ class Fleet {
            query_.audits.end();
   }
   bool HasNames(const std::string& valve) const {
-    const auto time = times_.find(valve);
-    return time != times_.end() && time->second.live_hours > 0.0;
+    return named_.contains(valve);
   }
   std::string WhyNotJudged(const std::string& valve) const;
 
@@ -204,6 +207,7 @@ class Fleet {
   const FleetQuery& query_;
   std::map<std::string, FleetLoop> loops_;
   std::map<std::string, JudgedTime> times_;
+  std::set<std::string, std::less<>> named_;  // Judged by a model set.
   std::vector<Finding> findings_;
 };
 
@@ -216,6 +220,7 @@ void Fleet::ReadTimes() {
     judged.hours += time.hours;
     if (time.quality == QualityName(Quality::kLive)) {
       judged.live_hours += time.hours;
+      named_.insert(time.valve_id);
     } else if (time.hours > judged.worst_hours) {
       judged.worst_hours = time.hours;
       judged.worst = time.quality;
@@ -247,6 +252,11 @@ void Fleet::FindFaults() {
   work.since_ns = query_.since_ns;
   work.options.now_ns = query_.now_ns;
   const std::map<std::string, Episode> episodes = Episodes();
+  for (const auto& [id, episode] : episodes) {
+    if (episode.layer != LayerName(Layer::kAudit)) {
+      named_.insert(episode.valve_id);
+    }
+  }
   for (const WorkRow& row : ReadWorkList(*history_, texts_, work)) {
     if (row.work.faults.empty()) {
       continue;
@@ -480,7 +490,8 @@ Json Fleet::UnjudgedJson() const {
     const auto time = times_.find(valve);
     const double share = time == times_.end() ? 0.0 : time->second.share();
     const bool watched = HasNames(valve) || IsAudited(valve);
-    const bool partly = HasNames(valve) && share < kMostlyJudged;
+    const bool partly =
+        time != times_.end() && HasNames(valve) && share < kMostlyJudged;
     if (!watched || partly) {
       list.push_back({{"valve_id", valve},
                       {"judged_share", SixDigits(share)},

@@ -48,6 +48,9 @@ struct FleetQuery {
   std::size_t top{10};  ///< Findings with all their columns.
   std::string software{};
   std::vector<FleetLoop> loops{};
+  /// Valves that a model set judges at this moment: the history has the time
+  /// judged only up to the last minute.
+  std::vector<std::string> judged_now{};
   std::vector<FleetAudit> audits{};
   std::vector<FleetPeriod> periods{};
   /// Loops that no audit could judge, and why.

@@ -26,6 +26,7 @@ using storage::Episode;
 constexpr double kOtherReasons = 0.25;
 constexpr double kRepetition = 0.1;
 constexpr double kMaxRepetition = 2.0;
+constexpr std::size_t kDateLength = 10;  // Of "2026-11-20 14:00:00Z".
 
 template <typename Reason>
 void SortByWeight(std::vector<Reason>& reasons, const WorkOptions& options) {
@@ -98,6 +99,11 @@ std::string TrendText(const LimitTrend& trend) {
 // "Dead band of the valve: 1.40 over the last day, accepted up to 1.00"
 std::string FigureText(const FigureReason& reason) {
   const report::FigureText& text = reason.text;
+  if (!reason.worse.empty()) {
+    return text.name + " (" +
+           FormatTime(reason.last_ns, true).substr(0, kDateLength) +
+           "): " + JoinText(reason.worse, ", ");
+  }
   const bool low = text.lowest && reason.value < *text.lowest;
   return text.name + ": " + report::FormatNumber(reason.value, 2) +
          " over the last day, accepted " +
@@ -185,12 +191,10 @@ void AddEpisode(const Episode& episode, const report::FaultTexts& texts,
   place->words =
       texts.Words(fault, episode.strength,
                   fault == episode.fault ? episode.priority : std::nullopt);
-  place->named = fault != kUnknown ||
-                 storage::CertaintyOf(episode) == Certainty::kNotKnown;
+  const std::string_view no_name = storage::NoNameText(episode);
+  place->named = fault != kUnknown || no_name.empty();
   if (!place->named) {
-    place->words.name = episode.ended_ns && !episode.unconfirmed_ns
-                            ? "Fault that ended before it had a name"
-                            : "Fault without a name yet";
+    place->words.name = no_name;
   }
   place->strength = episode.strength;
   place->factor = episode.peak_factor;
@@ -245,6 +249,7 @@ std::int64_t EventsOf(loop::Figure figure, const loop::ValveCounts& counts) {
     case loop::Figure::kT86:
     case loop::Figure::kOvershoot:
     case loop::Figure::kTravelGain:
+    case loop::Figure::kStrokeTest:
       break;
   }
   return counts.steps;
@@ -272,10 +277,37 @@ std::vector<FigureReason> FiguresOf(const std::vector<HealthHour>& hours,
     if (value && EventsOf(figure, counts) >= kFewest &&
         texts.Of(figure).Exceeded(*value)) {
       reasons.push_back(
-          {texts.Of(figure), *value, hours.back().hour * kNsPerHour});
+          {texts.Of(figure), *value, hours.back().hour * kNsPerHour, {}});
     }
   }
   return reasons;
+}
+
+// Of the newest test of each kind with this equipment, what is worse than in
+// the one before.
+void AddStrokes(const std::vector<HealthHour>& hours,
+                const report::FaultTexts& texts,
+                std::vector<FigureReason>& reasons) {
+  const report::FigureText& text = texts.Of(loop::Figure::kStrokeTest);
+  std::vector<const StrokeTest*> newest;
+  for (auto hour = hours.rbegin();
+       hour != hours.rend() && hour->epoch == hours.back().epoch; ++hour) {
+    for (auto test = hour->strokes.rbegin(); test != hour->strokes.rend();
+         ++test) {
+      const auto alike = [&test](const StrokeTest* other) {
+        return loop::AreAlike(other->stroke, test->stroke);
+      };
+      if (std::ranges::any_of(newest, alike)) {
+        continue;
+      }
+      newest.push_back(&*test);
+      std::vector<std::string> worse = test->Worse();
+      const auto value = static_cast<double>(worse.size());
+      if (value > 0.0 && text.Exceeded(value)) {
+        reasons.push_back({text, value, test->start_ns, std::move(worse)});
+      }
+    }
+  }
 }
 
 void AddHealth(const std::vector<HealthHour>& hours,
@@ -302,6 +334,7 @@ void AddHealth(const std::vector<HealthHour>& hours,
   work.trends = TrendsOf(hours, query.limits);
   work.drifts = DriftsOf(hours);
   work.figures = FiguresOf(hours, texts);
+  AddStrokes(hours, texts, work.figures);
 }
 
 void RequireDiscipline(const std::string& discipline) {

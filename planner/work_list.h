@@ -37,11 +37,13 @@ struct FaultReason {
   std::int64_t last_ns{0};
 };
 
-/// A figure that was beyond its limit over the last day of the valve.
+/// A figure that was beyond its limit over the last day of the valve, or in its
+/// last stroke test.
 struct FigureReason {
   report::FigureText text;
   double value{0.0};        ///< In its own unit, over that day.
-  std::int64_t last_ns{0};  ///< The newest hour.
+  std::int64_t last_ns{0};  ///< The newest hour, or the start of the test.
+  std::vector<std::string> worse{};  ///< Of a stroke test: than in the last.
 };
 
 /// Everything known of one valve.

@@ -25,7 +25,7 @@ dpkg-deb --control "$package" "$folder/control"
 for field in Package Version Maintainer Depends Recommends Description; do
   [ -n "$(dpkg-deb --field "$package" $field)" ] || fail "no $field"
 done
-dpkg-deb --field "$package" Depends | grep -qE 'libfast(rtps|dds)' ||
+dpkg-deb --field "$package" Depends | grep >/dev/null -E 'libfast(rtps|dds)' ||
   fail "no dependencies on libraries"
 for script in postinst prerm postrm; do
   sh -n "$folder/control/$script"
@@ -39,7 +39,7 @@ dpkg-deb --contents "$package" | awk '$1 !~ /^.rw.r..r../ {bad = 1; print}
 
 for file in etc/default/fdi-monitor usr/lib/systemd/system/fdi-monitor.service \
   usr/lib/sysusers.d/fdi.conf usr/share/fdi/campaigns/paper.toml \
-  usr/share/fdi/faults.toml usr/share/fdi/idl/fdi_v1.idl \
+  usr/share/fdi/faults.toml usr/share/fdi/idl/fdi_v{1,2}.idl \
   usr/share/doc/fdi/{copyright,changelog.gz,changelog.Debian.gz,README.md} \
   usr/share/doc/fdi/docs/tutorial.md usr/share/fdi/console/index.html; do
   [ -s "$root/$file" ] || fail "$file is missing"
@@ -61,7 +61,7 @@ pages() {  # PROGRAM WORDS...
   local page name
   name=$(IFS=-; echo "$*")
   page=$root/usr/share/man/man1/$name.1.gz
-  gzip -dc "$page" | grep -q '^\.SH SYNOPSIS' || fail "no page $name(1)"
+  gzip -dc "$page" | grep >/dev/null '^\.SH SYNOPSIS' || fail "no page $name(1)"
   if [ $# -eq 1 ] && command -v man >/dev/null; then
     man --local-file "$page" >"$folder/page" 2>&1 || fail "$name(1) is no page"
   fi
@@ -72,11 +72,12 @@ pages() {  # PROGRAM WORDS...
     pages "$@" "$verb"
   done
 }
+# Not grep -q: it ends before its input does, which pipefail takes for a failure.
 gzip -dc "$root/usr/share/man/man1/fdi-monitor-run.1.gz" |
-  sed -E 's/\\f[A-Z]|\\[,/]//g' | grep -qF '[=[ADDRESS:]PORT]' || fail "fdi-monitor-run(1) cuts --http at a colon"
+  sed -E 's/\\f[A-Z]|\\[,/]//g' | grep >/dev/null -F '[=[ADDRESS:]PORT]' || fail "fdi-monitor-run(1) cuts --http at a colon"
 version=$(dpkg-deb --field "$package" Version)
 for program in fdi-monitor fdi-simulator fdi-store fdi-trainer; do
-  "$root/usr/bin/$program" --version | grep -q "^$program ${version%-*}+" ||
+  "$root/usr/bin/$program" --version | grep >/dev/null "^$program ${version%-*}+" ||
     fail "$program has another version than $version"
   bash -n "$root/usr/share/bash-completion/completions/$program"
   pages "$program"

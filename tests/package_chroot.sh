@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Installs a package in a fresh Debian of the release that it was built on, where
-# programs, pages and the service have to work, and removes it again. Needs root,
-# debootstrap and the network.
+# programs, pages and the service have to work, and removes it again. Says how
+# long the first steps of a new user take. Needs root, debootstrap and the network.
 # Usage: package_chroot.sh FILE.deb
 set -euo pipefail
 package=$(realpath "$1")
@@ -31,7 +31,14 @@ mount --bind /dev "$root/dev"
 cp "$package" "$root/fdi.deb"
 mkdir "$root/empty"
 
-quietly within apt-get install -y -q /fdi.deb man-db bash
+taken() {  # SINCE WHAT
+  times+="; $2 $(awk "BEGIN {printf \"%.1f\", $(date +%s.%N) - $1}") s"
+}
+times=
+begin=$(date +%s.%N)
+quietly within apt-get install -y -q /fdi.deb
+taken "$begin" "package with what it needs"
+quietly within apt-get install -y -q man-db bash
 within getent passwd fdi >/dev/null || fail "no user fdi"
 [ ! -e "$root/etc/systemd/system/multi-user.target.wants/fdi-monitor.service" ] ||
   fail "the service is enabled"
@@ -40,23 +47,34 @@ for program in fdi-monitor fdi-simulator fdi-store fdi-trainer; do
   quietly within man $program
 done
 
-# As a new user: from an empty directory to an episode.
+# As a new user: from an empty directory to a fault that has a name, and from a
+# file of one's own, of half an hour, to its models.
+begin=$(date +%s.%N)
 quietly within sh -ec 'cd /empty
-  fdi-trainer train --campaign /usr/share/fdi/campaigns/paper.toml
+  ln -s /usr/share/fdi/campaigns .
+  fdi-trainer train --campaign campaigns/paper.toml
   fdi-monitor run --model-set paper --console=127.0.0.1:0 2>monitor.log &
-  monitor=$!
+  echo $! >monitor.pid
   timeout 60 sh -c "until grep -q monitor_ready monitor.log; do sleep 0.1; done"
   fdi-simulator run --valve FV-101 --parameters paper-operating-point \
-    --duration 600 --speed max --set excitation.amplitude_pct=12 \
-    --set excitation.period_s=60 --fault f19:abrupt@120:strength=0.5
-  kill $monitor
-  wait $monitor
-  fdi-store history list --fault f19
+    --duration 600 --speed 20 --end-now --set excitation.amplitude_pct=12 \
+    --set excitation.period_s=60 --fault f19:abrupt@120:strength=0.5 &
+  echo $! >simulator.pid
+  timeout 60 sh -c "until fdi-store history list --json | grep f19; do sleep 0.2; done"'
+taken "$begin" "to the named fault"
+quietly within sh -ec 'cd /empty
+  kill $(cat simulator.pid monitor.pid)
+  while kill -0 $(cat monitor.pid) 2>/dev/null; do sleep 0.1; done
   fdi-store history plot last --output episode.png
   test -s episode.png
-  grep console_listening monitor.log'
-within sh -c 'cd /empty && fdi-store history list --fault f19 --json' |
-  grep -q '"fault": "f19"' || fail "no episode of f19"
+  grep console_listening monitor.log
+  fdi-simulator run --excitation sine --duration 1800 --speed max --no-publish \
+    --export own.csv'
+begin=$(date +%s.%N)
+quietly within sh -ec 'cd /empty
+  fdi-store runs sniff own.csv --map-output tags.toml
+  fdi-trainer onboard --valve OWN --file own.csv --map tags.toml'
+taken "$begin" "own file to its models"
 
 # What the administrator changed stays; so do data.
 echo 'FDI_MONITOR_OPTIONS=--record' >"$root/etc/default/fdi-monitor"
@@ -71,4 +89,4 @@ grep -q 'left in place' "$root/log" || fail "purge does not say what it leaves"
 [ ! -e "$root/etc/default/fdi-monitor" ] || fail "purge left the conffile"
 [ -z "$(within dpkg-query -W -f '${Status}' fdi 2>/dev/null)" ] ||
   fail "still known to dpkg"
-echo "package_chroot: $suite: installed, used, reinstalled, removed and purged"
+echo "package_chroot: $suite: installed, used, reinstalled, removed and purged$times"

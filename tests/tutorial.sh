@@ -68,7 +68,7 @@ port=$(sed -n 's/.*console_listening address=127.0.0.1:\([0-9]*\).*/\1/p' \
   "$out/service.log")
 exec 3<>"/dev/tcp/127.0.0.1/${port:?}"
 printf 'GET / HTTP/1.0\r\nHost: 127.0.0.1:%s\r\n\r\n' "$port" >&3
-head -n 1 <&3 | grep -q ' 200 ' || fail "the page does not answer"
+head -n 1 <&3 | grep >/dev/null ' 200 ' || fail "the page does not answer"
 
 kill -TERM "$service"
 wait "$service" || fail "the monitor ended with $?"
@@ -80,7 +80,7 @@ check_tutorial() {
   grep -q '"label": "f19"' <<<"$found" || fail "no label in the history: $found"
   [ "$(grep -c '"episode_id"' <<<"$found")" -eq 1 ] || fail "not one episode: $found"
   [ -s episode.png ] || fail "no picture"
-  fdi-store models list | grep -q '^paper@2 *yes' || fail "paper@2 is not active"
+  fdi-store models list | grep >/dev/null '^paper@2 *yes' || fail "paper@2 is not active"
 }
 check_plant() {
   local list report

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cmath>
 #include <span>
 #include <utility>
@@ -489,6 +490,29 @@ Audit AuditValve(Window window) {
                  by_flow.verdict == Verdict::kQuantised
              ? by_x
              : by_flow;
+}
+
+char ServiceOf(std::string_view name) {
+  constexpr std::string_view kFunctions = "ICTVRYASDQK";
+  for (std::size_t i = 0; i < name.size();) {
+    std::size_t end = i;
+    while (end < name.size() &&
+           std::isupper(static_cast<unsigned char>(name[end])) != 0) {
+      ++end;
+    }
+    const std::string_view letters = name.substr(i, end - i);
+    if (letters.size() >= 2 && letters.size() <= 4 &&
+        letters.substr(1).find_first_not_of(kFunctions) ==
+            std::string_view::npos) {
+      return letters.front();
+    }
+    i = std::max(end, i + 1);
+  }
+  std::string lower(name);
+  std::ranges::transform(lower, lower.begin(), [](unsigned char c) {
+    return static_cast<char>(std::tolower(c));
+  });
+  return lower.find("level") != std::string::npos ? 'L' : '\0';
 }
 
 }  // namespace fdi::loop

@@ -94,6 +94,10 @@ struct Audit : Finding {
   Evidence evidence;
 };
 
+/// The first of the function letters of a tag, which is its service: L, a
+/// level, of "20LIC101_0405". NUL: there are none.
+char ServiceOf(std::string_view name);
+
 /// Whether `op` can be % of its span: within -10 to 110.
 bool IsPercent(std::span<const double> op);
 

@@ -28,26 +28,28 @@ constexpr double kLonger = 1.5;
 constexpr double kStronger = 2.0;
 constexpr double kShifted = 1.0;  // [%]
 
-// CV stands from `begin` to before `end`.
-struct Level {
-  std::size_t begin;
-  std::size_t end;
-  double cv;
-};
+using Level = StrokeLevel;
 
 std::size_t SamplesIn(double seconds, double period_s) {
   return static_cast<std::size_t>(std::ceil(seconds / period_s));
 }
 
-// At least kLevelS long and two samples.
+// Of a level: kLevelS, and two samples.
+std::size_t ShortestLevel(double period_s) {
+  return std::max<std::size_t>(2, SamplesIn(kLevelS, period_s));
+}
+
+bool StandsAt(double cv, double level) {
+  return std::abs(cv - level) <= kLevelBand;
+}
+
 std::vector<Level> LevelsOf(const StrokeRecord& record) {
-  const std::size_t shortest =
-      std::max<std::size_t>(2, SamplesIn(kLevelS, record.period_s));
+  const std::size_t shortest = ShortestLevel(record.period_s);
   std::vector<Level> levels;
   for (std::size_t begin = 0; begin < record.cv.size();) {
     std::size_t end = begin + 1;
     while (end < record.cv.size() &&
-           std::abs(record.cv[end] - record.cv[begin]) <= kLevelBand) {
+           StandsAt(record.cv[end], record.cv[begin])) {
       ++end;
     }
     if (end - begin >= shortest) {
@@ -316,6 +318,118 @@ std::vector<Stroke> FindStrokes(const StrokeRecord& record) {
     first = std::max(end, first + 1);
   }
   return strokes;
+}
+
+StrokeFinder::StrokeFinder(double period_s, std::size_t max_samples)
+    : max_samples_(max_samples),
+      shortest_(ShortestLevel(period_s)),
+      longest_(SamplesIn(kLongestHoldS, period_s)) {
+  record_.period_s = period_s;
+}
+
+void StrokeFinder::Push(const Reading& reading,
+                        std::vector<TimedStroke>& found) {
+  if (kept() >= max_samples_) {
+    Finish(found);
+  }
+  const std::size_t now = kept();
+  stamps_.push_back(reading.stamp_ns);
+  record_.cv.push_back(reading.cv);
+  record_.x.push_back(reading.x);
+  record_.ps.push_back(reading.ps);
+  record_.automatic.push_back(reading.automatic);
+  if (!StandsAt(reading.cv, record_.cv[run_])) {
+    if (in_level_) {
+      level_->end = now;
+      in_level_ = automatic_ = false;
+    }
+    run_ = now;
+    before_run_ = automatic_;
+  }
+  automatic_ = automatic_ || reading.automatic;
+  if (in_level_) {
+    StayInLevel(found);
+  } else if (now + 1 - run_ >= shortest_) {
+    EnterLevel(found);
+  } else if (!level_) {
+    Drop(0, run_);
+  } else if (const std::size_t moved = run_ - level_->end;
+             moved > longest_ || (moved >= kStepSamples && before_run_)) {
+    // What leads away from the level is no move, whatever comes: see IsMove().
+    Evaluate(found);
+    Drop(0, run_);
+    level_.reset();
+    moves_ = 0;
+  }
+}
+
+void StrokeFinder::EnterLevel(std::vector<TimedStroke>& found) {
+  const Level next{run_, kept(), record_.cv[run_]};
+  if (level_ && IsMove(record_, *level_, next, moves_ == 0)) {
+    ++moves_;
+  } else {
+    Evaluate(found);
+    Drop(0, run_);
+    moves_ = 0;
+  }
+  level_ = Level{run_, kept(), next.cv};
+  in_level_ = true;
+}
+
+void StrokeFinder::StayInLevel(std::vector<TimedStroke>& found) {
+  level_->end = kept();
+  if (moves_ > 0 && level_->end - level_->begin > longest_) {
+    Evaluate(found);
+    Drop(0, run_);
+    moves_ = 0;
+  }
+  // A level that nothing has led to counts with its value and its end.
+  if (moves_ == 0 && kept() > 2 * shortest_ + 8) {
+    Drop(1, kept() - shortest_);
+  }
+}
+
+void StrokeFinder::Evaluate(std::vector<TimedStroke>& found) const {
+  if (moves_ == 0) {
+    return;
+  }
+  StrokeRecord record = record_;
+  if (std::ranges::any_of(record.ps,
+                          [](double ps) { return std::isnan(ps); })) {
+    record.ps.clear();
+  }
+  for (Stroke& stroke : FindStrokes(record)) {
+    const std::int64_t start_ns = stamps_[stroke.begin];
+    stroke.end -= std::exchange(stroke.begin, 0);
+    found.push_back({start_ns, std::move(stroke)});
+  }
+}
+
+// The samples of [from, to); the run and its level, if it is one, move along.
+void StrokeFinder::Drop(std::size_t from, std::size_t to) {
+  const auto drop = [from, to](auto& series) {
+    series.erase(series.begin() + static_cast<std::ptrdiff_t>(from),
+                 series.begin() + static_cast<std::ptrdiff_t>(to));
+    constexpr std::size_t kMuch = 256;
+    if (series.capacity() > std::max(kMuch, 4 * series.size())) {
+      series.shrink_to_fit();
+    }
+  };
+  drop(stamps_);
+  drop(record_.cv);
+  drop(record_.x);
+  drop(record_.ps);
+  drop(record_.automatic);
+  run_ = 0;
+  if (in_level_) {
+    level_->begin = 0;
+    level_->end = kept();
+  }
+}
+
+void StrokeFinder::Finish(std::vector<TimedStroke>& found) {
+  Evaluate(found);
+  *this = StrokeFinder(period_s(), max_samples_);
 }
 
 bool AreAlike(const Stroke& a, const Stroke& b) {

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
+#include <limits>
 #include <optional>
 #include <span>
 #include <string>
@@ -32,6 +34,8 @@ struct StrokeWay {
   /// Ps had changed [kPa].
   std::optional<double> breakaway_pct;
   std::optional<double> breakaway_kpa;
+
+  bool operator==(const StrokeWay&) const = default;
 };
 
 /// Ps over X in a test that takes X both ways over half of its travel or more;
@@ -43,6 +47,8 @@ struct Signature {
   double spring_kpa_per_pct{0.0};  ///< Slope of the mean of both ways.
   double at_0_kpa{0.0};            ///< The same line at X = 0 and at 100 %.
   double at_100_kpa{0.0};
+
+  bool operator==(const Signature&) const = default;
 };
 
 /// One test: CV leaves a level that it held and, in moves of 5 % and more
@@ -61,6 +67,7 @@ struct Stroke {
   double travel() const { return cv_high - cv_low; }
   /// Else it is a partial stroke.
   bool full() const { return travel() >= 90.0; }
+  bool operator==(const Stroke&) const = default;
 };
 
 /// The tests of a record, in order of time. In AUTO, and where the mode is not
@@ -73,6 +80,63 @@ struct Stroke {
 /// Source: terms and limits of the usual positioners and of ISA-75.25.01
 /// (docs/loops.md).
 std::vector<Stroke> FindStrokes(const StrokeRecord& record);
+
+/// CV stands from sample `begin` to before `end`.
+struct StrokeLevel {
+  std::size_t begin;
+  std::size_t end;
+  double cv;
+};
+
+/// A test, and when it began.
+struct TimedStroke {
+  std::int64_t start_ns{0};
+  Stroke stroke;  ///< `begin` is 0, so that `end` is its length.
+};
+
+/// Finds the tests of FindStrokes() while the samples come. Keeps them only
+/// from the last level on that a test may begin with: some tens while CV rests
+/// or a controller moves it, those of the test while there is one.
+class StrokeFinder {
+ public:
+  struct Reading {
+    std::int64_t stamp_ns{0};
+    double cv{0.0};
+    double x{0.0};
+    double ps{std::numeric_limits<double>::quiet_NaN()};  ///< NaN: none.
+    bool automatic{true};
+  };
+
+  /// @param max_samples of a test; a longer one is cut there.
+  StrokeFinder(double period_s, std::size_t max_samples);
+
+  /// Takes the next sample, one period after the last, and appends the tests
+  /// that are over: nothing that comes can belong to them.
+  void Push(const Reading& reading, std::vector<TimedStroke>& found);
+  /// The samples end here.
+  void Finish(std::vector<TimedStroke>& found);
+
+  double period_s() const { return record_.period_s; }
+  std::size_t kept() const { return stamps_.size(); }
+
+ private:
+  void EnterLevel(std::vector<TimedStroke>& found);
+  void StayInLevel(std::vector<TimedStroke>& found);
+  void Evaluate(std::vector<TimedStroke>& found) const;
+  void Drop(std::size_t from, std::size_t to);
+
+  std::size_t max_samples_;
+  std::size_t shortest_;  // Level,
+  std::size_t longest_;   // and hold or move within a test [samples].
+  StrokeRecord record_;
+  std::vector<std::int64_t> stamps_;
+  std::size_t run_{0};                // Since then CV stands.
+  std::optional<StrokeLevel> level_;  // The last one a test may go on from.
+  bool in_level_{false};
+  int moves_{0};            // Of that test.
+  bool automatic_{false};   // In AUTO since that level,
+  bool before_run_{false};  // before run_.
+};
 
 /// What is worse than in `last`, a test of about the same travel, in words;
 /// empty: nothing. Times count as longer from 1.5 times on, friction and

@@ -36,8 +36,8 @@ std::int64_t Quanta(double value) {
   return std::llround(value / ValveCounts::kQuantum);
 }
 
-std::optional<double> MeanOf(std::int64_t sum, std::int64_t number,
-                             double quantum) {
+std::optional<double> MeanSize(std::int64_t sum, std::int64_t number,
+                               double quantum) {
   return number > 0 ? std::optional(static_cast<double>(sum) /
                                     static_cast<double>(number) * quantum)
                     : std::nullopt;
@@ -53,8 +53,8 @@ void ValveCounts::Add(const ValveCounts& other) {
 
 std::string_view FigureName(Figure figure) {
   constexpr std::array<std::string_view, kFigureCount> kNames{
-      "at_limit", "slip_jump", "dead_band", "error_band", "delay",
-      "t63",      "t86",       "overshoot", "travel_gain"};
+      "at_limit", "slip_jump", "dead_band", "error_band",  "delay",
+      "t63",      "t86",       "overshoot", "travel_gain", "stroke_test"};
   return kNames[static_cast<std::size_t>(figure)];
 }
 
@@ -64,27 +64,29 @@ std::optional<double> FigureOf(Figure figure, const ValveCounts& counts,
   constexpr double kQuantum = ValveCounts::kQuantum;
   switch (figure) {
     case Figure::kAtLimit:
-      return MeanOf(counts.limit_ms, seen_ms, 100.0);
+      return MeanSize(counts.limit_ms, seen_ms, 100.0);
     case Figure::kSlipJump:
-      return MeanOf(counts.slip_size, counts.slips, kQuantum);
+      return MeanSize(counts.slip_size, counts.slips, kQuantum);
     case Figure::kDeadBand:
-      return MeanOf(counts.dead_band, counts.turns, kQuantum);
+      return MeanSize(counts.dead_band, counts.turns, kQuantum);
     case Figure::kErrorBand:
       if (std::min(counts.opening, counts.closing) < kRampSamples) {
         return std::nullopt;
       }
-      return *MeanOf(counts.opening_offset, counts.opening, kQuantum) -
-             *MeanOf(counts.closing_offset, counts.closing, kQuantum);
+      return *MeanSize(counts.opening_offset, counts.opening, kQuantum) -
+             *MeanSize(counts.closing_offset, counts.closing, kQuantum);
     case Figure::kDelay:
-      return MeanOf(counts.delay_ms, counts.steps, kMs);
+      return MeanSize(counts.delay_ms, counts.steps, kMs);
     case Figure::kT63:
-      return MeanOf(counts.t63_ms, counts.steps, kMs);
+      return MeanSize(counts.t63_ms, counts.steps, kMs);
     case Figure::kT86:
-      return MeanOf(counts.t86_ms, counts.steps, kMs);
+      return MeanSize(counts.t86_ms, counts.steps, kMs);
     case Figure::kOvershoot:
-      return MeanOf(counts.overshoot, counts.steps, kQuantum);
+      return MeanSize(counts.overshoot, counts.steps, kQuantum);
     case Figure::kTravelGain:
-      return MeanOf(counts.gain, counts.steps, kQuantum);
+      return MeanSize(counts.gain, counts.steps, kQuantum);
+    case Figure::kStrokeTest:
+      break;
   }
   return std::nullopt;
 }

@@ -68,16 +68,17 @@ enum class Figure : std::uint8_t {
   kT86,         ///< [s]
   kOvershoot,   ///< [% of the realised step]
   kTravelGain,  ///< ΔX/ΔCV [-].
+  kStrokeTest,  ///< Figures of a stroke test that are worse than in the last.
 };
-inline constexpr std::size_t kFigureCount = 9;
+inline constexpr std::size_t kFigureCount = 10;
 
 /// "at_limit", "slip_jump", "dead_band", "error_band", "delay", "t63", "t86",
-/// "overshoot" or "travel_gain".
+/// "overshoot", "travel_gain" or "stroke_test".
 std::string_view FigureName(Figure figure);
 
 /// The figure as `counts` of `seen_ms` have it; nothing if too little was
 /// counted: no time, jump, turn or step, or less than 60 samples of ramps
-/// either way.
+/// either way. Of stroke tests nothing is counted here.
 std::optional<double> FigureOf(Figure figure, const ValveCounts& counts,
                                std::int64_t seen_ms);
 

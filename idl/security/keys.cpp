@@ -56,16 +56,20 @@ struct RoleRow {
 
 const std::vector<RoleRow>& Roles() {
   static const std::vector<RoleRow> kRoles{
-      {Role::kGateway, "gateway", {"fdi/v1/ValveSample"}, {}},
+      {Role::kGateway,
+       "gateway",
+       {"fdi/v1/ValveSample", "fdi/v2/ValveSample"},
+       {}},
       {Role::kMonitor,
        "monitor",
        {"fdi/v1/DecisionVector", "fdi/v1/DecisionBatch", "fdi/v1/FaultEvent",
         "fdi/v1/ModelSetInfo", "fdi/v1/MonitorStatus", "fdi/v1/PairState",
         "fdi/v1/OperatorAction", "fdi/v1/MonitorShare"},
        // Besides samples, the topics of other monitors.
-       {"fdi/v1/ValveSample", "fdi/v1/DecisionVector", "fdi/v1/FaultEvent",
-        "fdi/v1/PairState", "fdi/v1/OperatorAction", "fdi/v1/MonitorShare"}},
-      {Role::kReader, "reader", {}, {"fdi/v1/*"}}};
+       {"fdi/v1/ValveSample", "fdi/v2/ValveSample", "fdi/v1/DecisionVector",
+        "fdi/v1/FaultEvent", "fdi/v1/PairState", "fdi/v1/OperatorAction",
+        "fdi/v1/MonitorShare"}},
+      {Role::kReader, "reader", {}, {"fdi/v1/*", "fdi/v2/*"}}};
   return kRoles;
 }
 
@@ -556,6 +560,7 @@ KeyInfo Examine(const fs::path& folder) {
   }
   info.role = *parsed;
   info.partitions = GatewayPartitions(permissions);
+  info.has_pv = permissions.find("<topic>fdi/v2/") != std::string::npos;
   info.from_ns =
       SecondsOf(X509_get0_notBefore(certificate.get())) * kNsPerSecond;
   info.until_ns =

@@ -38,6 +38,8 @@ struct KeyInfo {
   Role role{Role::kReader};
   /// Where a gateway may publish samples, as in --partition; empty: anywhere.
   std::string partitions{};
+  /// Permits the samples of version 2; keys of earlier versions do not.
+  bool has_pv{true};
   std::int64_t from_ns{0};   ///< UTC
   std::int64_t until_ns{0};  ///< UTC; the earlier end of key and authority.
 };

@@ -118,7 +118,9 @@ Json FaultsJson(const storage::AlarmStatistics& statistics, const Api& api) {
   Json faults = Json::array();
   for (const auto& [fault, figures] : statistics.faults) {
     faults.push_back({{"fault", TextOrNull(fault)},
-                      {"name", api.texts.Words(fault, 0.0).name},
+                      {"name", fault.empty() || fault == "unknown"
+                                   ? "Without a name"
+                                   : api.texts.Words(fault, 0.0).name},
                       {"episodes", figures.episodes},
                       {"right", figures.right},
                       {"wrong", figures.wrong}});
@@ -327,10 +329,11 @@ Json Episode(const Api& api, const httplib::Request& request) {
           {"model_hash", ModelFactsJson(*models)["hash"]}};
 }
 
-std::string ColumnName(Signal signal, FlowUnit unit) {
+std::string ColumnName(Signal signal, FlowUnit unit, bool has_pv) {
   for (const importer::SignalColumn& column : importer::kSignalColumns) {
     if (column.signal == signal &&
-        (signal != Signal::kF || column.flow_unit == unit)) {
+        (signal != Signal::kF || column.flow_unit == unit) &&
+        (signal != Signal::kSp || NeedsPv(column) == has_pv)) {
       return std::string(column.name);
     }
   }
@@ -343,11 +346,12 @@ Json CsvRow(const TracePoint& point, SignalMask signals,
   const auto value = [](const std::vector<double>& values, std::size_t i) {
     return i < values.size() ? Rounded(values[i], 6) : Json();
   };
+  const bool has_pv = (signals & MaskOf(Signal::kPv)) != 0;
   for (std::size_t s = 0; s < kSignalCount; ++s) {
     const auto signal = static_cast<Signal>(s);
     if ((signals & MaskOf(signal)) != 0) {
-      row[ColumnName(signal, models.flow_unit)] =
-          point.sample.Has(signal) ? Rounded(point.sample[signal], 6) : Json();
+      row[ColumnName(signal, models.flow_unit, has_pv)] =
+          ReadingJson(point.sample, signal, 6);
     }
   }
   for (std::size_t c = 0; c < models.channels.size(); ++c) {
@@ -401,8 +405,7 @@ File EpisodePicture(const Api& api, const httplib::Request& request) {
   const plot::EpisodeEvidence evidence =
       plot::LoadEvidence(*reader, id, api.sources.models);
   plot::EpisodeFigureOptions options;
-  options.fault_name =
-      api.texts.Words(evidence.episode.fault.value_or(""), 0.0).name;
+  options.fault_name = plot::EpisodeName(evidence.episode, api.texts);
   const bool svg = ending == "svg";
   return {svg ? "image/svg+xml" : "image/png", "episode-" + id + "." + ending,
           plot::DrawFigure(plot::EpisodeFigure(evidence, options),

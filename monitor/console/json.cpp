@@ -16,9 +16,7 @@ constexpr int kReadingDecimals = 4;
 constexpr int kFactorDecimals = 3;
 
 Json Reading(const TracePoint& point, Signal signal) {
-  return point.sample.Has(signal)
-             ? Rounded(point.sample[signal], kReadingDecimals)
-             : Json();
+  return ReadingJson(point.sample, signal, kReadingDecimals);
 }
 
 std::string_view QualityOf(const ValveState& valve) {
@@ -142,6 +140,22 @@ Json Rounded(double value, int decimals) {
 
 Json Rounded(const std::optional<double>& value, int decimals) {
   return value ? Rounded(*value, decimals) : Json();
+}
+
+Json ReadingJson(const Sample& sample, Signal signal, int decimals) {
+  constexpr int kDigits = 7;
+  constexpr int kMostDecimals = 15;
+  if (!sample.Has(signal)) {
+    return {};
+  }
+  const double size = std::abs(sample[signal]);
+  const bool own = signal == Signal::kPv ||
+                   (signal == Signal::kSp && sample.Has(Signal::kPv));
+  if (own && std::isfinite(size) && size > 0.0) {
+    const int before = static_cast<int>(std::floor(std::log10(size))) + 1;
+    decimals = std::clamp(kDigits - before, 0, kMostDecimals);
+  }
+  return Rounded(sample[signal], decimals);
 }
 
 Json TextOrNull(const std::string& text) {
@@ -297,8 +311,11 @@ Json ShelfJson(const storage::Shelf& shelf) {
 
 Json AlarmJson(const storage::Alarm& alarm, const report::FaultTexts& texts) {
   const storage::Episode& e = alarm.episode;
-  const report::FaultWords words =
+  report::FaultWords words =
       texts.Words(e.fault.value_or("unknown"), e.strength, e.priority);
+  if (const auto no_name = storage::NoNameText(e); !no_name.empty()) {
+    words.name = no_name;
+  }
   const auto strength = [&e](std::optional<double> value) {
     return IsNamed(e) ? Rounded(value, kFactorDecimals) : Json();
   };

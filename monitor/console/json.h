@@ -23,6 +23,9 @@ Json Ms(const std::optional<std::int64_t>& stamp_ns);
 /// Rounded to `decimals`; null if it is not finite.
 Json Rounded(double value, int decimals);
 Json Rounded(const std::optional<double>& value, int decimals);
+/// The reading of `signal`, null if it is missing: rounded to `decimals`, or,
+/// of a PV and its set point, whose unit nobody knows, to seven digits.
+Json ReadingJson(const Sample& sample, Signal signal, int decimals);
 /// Null if the text is empty or missing.
 Json TextOrNull(const std::string& text);
 Json TextOrNull(const std::optional<std::string>& text);

@@ -39,7 +39,7 @@ bool IsReason(Intake intake, const Sample& sample, Signal signal) {
     case Intake::kNotFinite:
       return !std::isfinite(sample[signal]);
     case Intake::kRange:
-      return !PlausibleRange(signal).Contains(sample[signal]);
+      return !IsPlausible(sample, signal);
     default:
       return false;
   }

@@ -41,10 +41,10 @@ std::shared_ptr<const ModelFacts> FactsOf(const storage::Episode& episode) {
 
 // In the order of Signal.
 constexpr std::array<std::string_view, kSignalCount> kPlainNames{
-    "command",        "inlet pressure",    "outlet pressure",
-    "temperature",    "rod position",      "flow",
-    "set point",      "positioner output", "chamber pressure",
-    "supply pressure"};
+    "command",         "inlet pressure",     "outlet pressure",
+    "temperature",     "rod position",       "flow",
+    "set point",       "positioner output",  "chamber pressure",
+    "supply pressure", "controlled variable"};
 
 // Residual relative to the threshold of its sign; abnormal above 1.
 double Excess(const ModelFacts::Channel& channel, double residual) {

@@ -33,7 +33,6 @@
 #include "monitor/pair/pair.h"
 
 #include <algorithm>
-#include <iterator>
 #include <random>
 #include <set>
 #include <utility>
@@ -58,39 +57,7 @@ constexpr std::size_t kMaxHeldVectors = 20'000;  // 46 MB
 constexpr std::size_t kMaxHeldEvents = 10'000;
 constexpr std::size_t kMaxCoveredValves = 200'000;
 constexpr milliseconds kMaxEventAge{60'000};
-// For so long a late subscriber gets the events of ended episodes once more.
-constexpr std::chrono::hours kMaxRepeatAge{1};
 constexpr std::chrono::seconds kForgetPeriod{10};
-constexpr std::size_t kMaxPublishedValves = 10'000;
-constexpr std::size_t kEventsPerValve = 16;  // The writer's DDS history depth.
-
-bool Same(const FaultEvent& a, const FaultEvent& b) {
-  return a.episode_id == b.episode_id &&
-         OnTheBus(a.transition.kind) == OnTheBus(b.transition.kind) &&
-         a.transition.stamp_ns == b.transition.stamp_ns;
-}
-
-// Whether `said` leaves nothing to say for `found`: it comes later in the same
-// episode, or is the same, though a sample earlier. An end is one until the
-// episode has ended.
-bool Covers(const FaultEvent& said, const FaultEvent& found) {
-  const Transition& a = said.transition;
-  const Transition& b = found.transition;
-  const bool like =
-      IsIsolation(OnTheBus(a.kind)) && IsIsolation(OnTheBus(b.kind))
-          ? a.faults == b.faults
-          : a.kind == b.kind;
-  return said.episode_id == found.episode_id &&
-         (a.kind == TransitionKind::kClosed ||
-          (b.kind != TransitionKind::kClosed &&
-           (like || b.stamp_ns <= a.stamp_ns)));
-}
-
-// In the order in which the monitor of one source made them.
-bool Earlier(const FaultEvent& a, const FaultEvent& b) {
-  return std::pair(a.transition.stamp_ns, a.transition.kind) <
-         std::pair(b.transition.stamp_ns, b.transition.kind);
-}
 
 PairState OwnState(const PairOptions& options, const std::string& monitor) {
   std::random_device random;
@@ -225,11 +192,7 @@ bool Pair::SendEvents() {
 }
 
 void Pair::HoldLocked(FaultEvent event) {
-  const auto known = published_.find(event.valve_id);
-  if (known != published_.end() &&
-      std::ranges::any_of(known->second, [&](const HeldEvent& each) {
-        return Covers(each.event, event);
-      })) {
+  if (published_.Cover(event)) {
     return;
   }
   // The leader does not tell of an episode of ours that gave way to its own.
@@ -252,35 +215,9 @@ void Pair::HoldLocked(FaultEvent event) {
 
 // Unless the event is on the bus already.
 void Pair::AnnounceLocked(FaultEvent event, bool repeat) {
-  if (MarkPublishedLocked(event)) {
+  if (published_.Add(event, Clock::now())) {
     outgoing_.push_back({std::move(event), repeat});
   }
-}
-
-// @returns false if the event is on the bus already.
-bool Pair::MarkPublishedLocked(const FaultEvent& event) {
-  if (published_.size() >= kMaxPublishedValves) {
-    published_.clear();
-  }
-  std::deque<HeldEvent>& last = published_[event.valve_id];
-  if (std::ranges::any_of(last, [&](const HeldEvent& each) {
-        return Same(each.event, event);
-      })) {
-    return false;
-  }
-  // The stamps of two sources are not compared.
-  auto place = last.end();
-  while (place != last.begin() &&
-         std::prev(place)->event.source_id == event.source_id &&
-         Earlier(event, std::prev(place)->event)) {
-    --place;
-  }
-  // A model set lasts no longer for it.
-  last.insert(place, {Clock::now(), event})->event.models = nullptr;
-  if (last.size() > kEventsPerValve) {
-    last.pop_front();
-  }
-  return true;
 }
 
 void Pair::OnVector(const idl::DecisionMessage& message) {
@@ -296,7 +233,7 @@ void Pair::OnVector(const idl::DecisionMessage& message) {
 void Pair::OnEvent(const FaultEvent& event, Pipeline& pipeline) {
   {
     const MutexLock lock(mutex_);
-    if (!MarkPublishedLocked(event)) {
+    if (!published_.Add(event, Clock::now())) {
       return;
     }
     std::erase_if(held_events_, [&](const HeldEvent& held) {
@@ -336,7 +273,7 @@ void Pair::Tick(std::uint64_t received, Pipeline& pipeline) {
       {[&](const FaultEvent& event, const auto&) { heard.push_back(event); },
        {}},
       kNow);
-  std::ranges::stable_sort(heard, Earlier);
+  std::ranges::stable_sort(heard, IsEarlier);
   for (const FaultEvent& event : heard) {
     OnEvent(event, pipeline);
   }
@@ -347,7 +284,11 @@ void Pair::Tick(std::uint64_t received, Pipeline& pipeline) {
   }
   election_.Step(received, static_cast<int>(pipeline.census().judged), now);
   DropCovered(now);
-  ForgetEnded(now);
+  if (now - forgot_ >= kForgetPeriod) {
+    forgot_ = now;
+    const MutexLock lock(mutex_);
+    published_.ForgetEnded(now);
+  }
   ApplyElection(now);
   pipeline.StandBy(!led_);
   if (led_ && events_lacked_ >= 0 && bus_.total_matched() > events_lacked_) {
@@ -394,7 +335,7 @@ void Pair::ApplyElection(TimePoint now) {
   if (changed && leads) {
     const MutexLock lock(mutex_);
     vectors_lacked_ = covered_.empty() ? -1 : decisions_.total_matched();
-    events_lacked_ = published_.empty() ? -1 : bus_.total_matched();
+    events_lacked_ = published_.size() == 0 ? -1 : bus_.total_matched();
   }
   led_ = leads;
   if (changed && leads) {
@@ -488,30 +429,11 @@ void Pair::DropCovered(TimePoint now) {
   });
 }
 
-// Nothing is repeated for ever: of a valve whose last episode ended long ago
-// subscribers need not hear.
-void Pair::ForgetEnded(TimePoint now) {
-  if (now - forgot_ < kForgetPeriod) {
-    return;
-  }
-  forgot_ = now;
-  const MutexLock lock(mutex_);
-  std::erase_if(published_, [&](const auto& each) {
-    const HeldEvent& last = each.second.back();
-    return last.event.transition.kind == TransitionKind::kClosed &&
-           now - last.since > kMaxRepeatAge;
-  });
-}
-
 // Republishes the events heard at `since` or later.
 void Pair::RepeatEvents(TimePoint since) {
   const MutexLock lock(mutex_);
-  for (const auto& [valve_id, events] : published_) {
-    for (const HeldEvent& held : events) {
-      if (held.since >= since) {
-        outgoing_.push_back({held.event, true});
-      }
-    }
+  for (FaultEvent& event : published_.Since(since)) {
+    outgoing_.push_back({std::move(event), true});
   }
 }
 

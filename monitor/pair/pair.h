@@ -4,7 +4,6 @@
 #include <chrono>
 #include <cstdint>
 #include <deque>
-#include <map>
 #include <string>
 #include <unordered_map>
 #include <unordered_set>
@@ -14,6 +13,7 @@
 #include "idl/endpoint.h"
 #include "monitor/bus/bus_sinks.h"
 #include "monitor/pair/pair_election.h"
+#include "monitor/pair/published_events.h"
 #include "monitor/pipeline.h"
 #include "monitor/throttled_log.h"
 
@@ -111,12 +111,10 @@ class Pair : public DecisionSink, public EventSink {
   void PublishHeld(TimePoint now);
   void PublishHeldVectors(TimePoint now);
   void DropCovered(TimePoint now);
-  void ForgetEnded(TimePoint now);
   void RepeatEvents(TimePoint since);
   bool SendEvents() REQUIRES(sending_) EXCLUDES(mutex_);
   void HoldLocked(FaultEvent event) REQUIRES(mutex_);
   void AnnounceLocked(FaultEvent event, bool repeat) REQUIRES(mutex_);
-  bool MarkPublishedLocked(const FaultEvent& event) REQUIRES(mutex_);
 
   const PairOptions options_;
   const Clock::duration patience_;
@@ -158,8 +156,7 @@ class Pair : public DecisionSink, public EventSink {
   mutable Mutex sending_ ACQUIRED_BEFORE(mutex_);
   mutable Mutex mutex_;  // Never while writing.
   Status status_ GUARDED_BY(mutex_);
-  // The last events of each valve that are on the bus, by stamp.
-  std::map<std::string, std::deque<HeldEvent>> published_ GUARDED_BY(mutex_);
+  PublishedEvents published_ GUARDED_BY(mutex_);
   std::deque<HeldEvent> held_events_
       GUARDED_BY(mutex_);  // Ours, not heard from the leader yet.
   std::deque<Outgoing> outgoing_

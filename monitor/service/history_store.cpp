@@ -84,8 +84,10 @@ void HistoryStore::CommitBatch(const std::function<void()>& batch) {
   OnCurrentFile([&] { writer_.CommitBatch(batch); });
 }
 
-void HistoryStore::CommitCheckpoint(const Checkpoint& checkpoint) {
-  OnCurrentFile([&] { writer_.CommitCheckpoint(checkpoint); });
+std::size_t HistoryStore::CommitCheckpoint(const Checkpoint& checkpoint) {
+  std::size_t worse = 0;
+  OnCurrentFile([&] { worse = writer_.CommitCheckpoint(checkpoint); });
+  return worse;
 }
 
 void HistoryStore::Commit() {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
@@ -60,7 +61,7 @@ class HistoryStore : public HistorySink {
   }
   void AddTrace(const EpisodeTrace& trace) override;
   void AddGap(const DataGap& gap) override { writer_.AddGap(gap); }
-  void CommitCheckpoint(const Checkpoint& checkpoint) override;
+  std::size_t CommitCheckpoint(const Checkpoint& checkpoint) override;
   void MarkSent(const FaultEvent& event) override { writer_.MarkSent(event); }
   void Commit() override;
   void DropBuffered() override { writer_.DropPending(); }

@@ -346,30 +346,30 @@ idl::MonitorStatusMessage StatusOf(const StatusFacts& facts) {
   return status;
 }
 
+std::string NewMonitorName() {
+  // 47 bytes of the host, a colon, the pid and the suffix fit the 64 bytes that
+  // the wire has for the name of a monitor. gethostname() need not terminate a
+  // name that it cuts: the last byte, which it is not given, remains 0.
+  std::array<char, 48> host{};
+  if (gethostname(host.data(), host.size() - 1) != 0) {
+    host = {'?'};
+  }
+  std::string name = std::string(host.data()) + ":" + std::to_string(getpid());
+  // In containers every monitor may be HOST:1.
+  constexpr ino_t kFirstPidNamespace = 0xEFFFFFFC;  // Linux, proc_ns.h
+  struct stat pids {};
+  if (stat("/proc/self/ns/pid", &pids) != 0 ||
+      pids.st_ino != kFirstPidNamespace) {
+    std::array<char, 8> suffix{};
+    std::snprintf(suffix.data(), suffix.size(), "-%06x",
+                  std::random_device()() & 0xFFFFFFU);
+    name += suffix.data();
+  }
+  return name;
+}
+
 std::string MonitorName() {
-  static const std::string name = [] {
-    // 47 bytes of the host, a colon, the pid and the suffix fit the 64 bytes
-    // that the wire has for the name of a monitor. gethostname() need not
-    // terminate a name that it cuts: the last byte, which it is not given,
-    // remains 0.
-    std::array<char, 48> host{};
-    if (gethostname(host.data(), host.size() - 1) != 0) {
-      host = {'?'};
-    }
-    std::string unique =
-        std::string(host.data()) + ":" + std::to_string(getpid());
-    // In containers every monitor may be HOST:1.
-    constexpr ino_t kFirstPidNamespace = 0xEFFFFFFC;  // Linux, proc_ns.h
-    struct stat pids {};
-    if (stat("/proc/self/ns/pid", &pids) != 0 ||
-        pids.st_ino != kFirstPidNamespace) {
-      std::array<char, 8> suffix{};
-      std::snprintf(suffix.data(), suffix.size(), "-%06x",
-                    std::random_device()() & 0xFFFFFFU);
-      unique += suffix.data();
-    }
-    return unique;
-  }();
+  static const std::string name = NewMonitorName();
   return name;
 }
 

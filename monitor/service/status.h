@@ -51,7 +51,9 @@ std::vector<Measure> MeasuresOf(const StatusFacts& facts);
 idl::MonitorStatusMessage StatusOf(const StatusFacts& facts);
 
 /// "host:pid"; with a random suffix in a pid namespace of its own (a
-/// container).
+/// container). Another one with each call; MonitorName() is that of this
+/// process.
+std::string NewMonitorName();
 std::string MonitorName();
 
 /// One line for a service manager, without values that change all the time.

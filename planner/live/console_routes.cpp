@@ -138,6 +138,7 @@ Json Health(const Api& api, const httplib::Request& request) {
       history->Health({valve_id, since_ns, now_ns + kNsPerHour});
   Json json{{"valve", valve_id}, {"step", hourly ? "hour" : "day"}};
   json.update(ColumnsJson(hourly ? hours : DaysOf(hours), api.texts));
+  json["strokes"] = StrokesJson(hours);
   json["trends"] = TrendsJson(TrendsOf(hours, limits));
   json["note"] = console::TextOrNull(storage::TakeNote(*history));
   return json;
@@ -167,6 +168,12 @@ report::Report ReadFleet(FleetCache& cache, const Api& api,
     if (!api.sources.plant_history) {
       query.loops = LoopsOf(api.sources.models);
       query.causes = CausesOf(api.sources.history, query.since_ns);
+    }
+    for (const console::ValveState& valve : api.board.Valves(false)) {
+      if (valve.models && valve.quality == Quality::kLive &&
+          valve.silence == monitor::Silence::kNone) {
+        query.judged_now.push_back(valve.id);
+      }
     }
     const auto history = api.History();
     cache.report = FleetReport(history.get(), api.texts, query);

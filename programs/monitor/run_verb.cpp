@@ -188,8 +188,8 @@ void AddRunVerb(report::Program& program) {
       AddVerb(program, "run",
               "Diagnose the valves on the bus until SIGINT or SIGTERM", Run);
   run.add_option("--model-set", arguments.model_set,
-                 "NAME[@VERSION] for valves that none is assigned to; without "
-                 "it the only active one, if no valve is assigned any");
+                 "NAME[@VERSION] for valves without a set of their own "
+                 "(default: the only active set, if no valve has its own)");
   run.add_option("--shadow", arguments.shadow,
                  "Run a candidate beside the active sets and record where they "
                  "differ; without VERSION the newest one")

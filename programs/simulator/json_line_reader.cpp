@@ -1,5 +1,6 @@
 #include "programs/simulator/json_line_reader.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include <nlohmann/json.hpp>
@@ -13,9 +14,10 @@ using Json = nlohmann::json;
 
 constexpr double kMaxSeconds = 3.2e9;  // Longer would overflow nanoseconds.
 
-const importer::SignalColumn* FindColumn(std::string_view key) {
+// "sp" only beside a "pv".
+const importer::SignalColumn* FindColumn(std::string_view key, bool has_pv) {
   for (const importer::SignalColumn& column : importer::kSignalColumns) {
-    if (SameName(column.name, key)) {
+    if (SameName(column.name, key) && (has_pv || !NeedsPv(column))) {
       return &column;
     }
   }
@@ -52,6 +54,9 @@ std::optional<JsonRow> JsonLineReader::TakeLine(std::string_view line) {
     Refuse("not a JSON object");
   }
   JsonRow row;
+  const bool has_pv = std::ranges::any_of(object.items(), [](const auto& item) {
+    return SameName(item.key(), SignalName(Signal::kPv));
+  });
   for (const auto& [key, value] : object.items()) {
     if (SameName(key, importer::kModeColumn)) {
       const auto mode =
@@ -61,7 +66,7 @@ std::optional<JsonRow> JsonLineReader::TakeLine(std::string_view line) {
                " is none of " + std::string(kValveModeNames));
       }
       row.sample.mode = *mode;
-    } else if (FindColumn(key) == nullptr && !IsTime(key)) {
+    } else if (FindColumn(key, has_pv) == nullptr && !IsTime(key)) {
       if (rows_ == 0 && !IsTruth(key)) {
         ignored_keys_.push_back(key);
       }
@@ -72,11 +77,13 @@ std::optional<JsonRow> JsonLineReader::TakeLine(std::string_view line) {
              " is not a finite number");
     }
   }
+  importer::DropLoneSetPoint(has_pv ? MaskOf(Signal::kPv) : SignalMask{0},
+                             row.sample);
   if (!row.sample.Has(Signal::kCv)) {
     Refuse("missing key CV_pct");
   }
-  if (!row.sample.Has(Signal::kX) && !row.sample.Has(Signal::kF)) {
-    Refuse("missing key: one of X_pct, F_m3_h, F_t_h");
+  if ((row.sample.present & importer::kAnswers) == 0) {
+    Refuse("missing key: one of X_pct, F_m3_h, F_t_h, pv");
   }
   CheckTime(row.t_s);
   row.sample.flow_unit = flow_unit_.value_or(FlowUnit::kM3PerHour);
@@ -90,7 +97,7 @@ void JsonLineReader::Set(const std::string& key, double value, JsonRow& row) {
     row.t_s = value;
     return;
   }
-  const importer::SignalColumn& column = *FindColumn(key);
+  const importer::SignalColumn& column = *FindColumn(key, true);
   if (row.sample.Has(column.signal)) {
     Refuse("key \"" + key + "\": the signal is there twice");
   }

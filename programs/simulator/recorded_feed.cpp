@@ -83,10 +83,14 @@ void ReportConversion(const LogSink& log, const std::string& run, FlowUnit from,
 }
 
 std::optional<FedSample> StoredFeed::Next() {
-  if (next_ == samples_.size()) {
+  while (part_ < parts_.size() && next_ == parts_[part_].size()) {
+    parts_[part_++] = {};
+    next_ = 0;
+  }
+  if (part_ == parts_.size()) {
     return std::nullopt;
   }
-  FedSample fed{0, samples_[next_++]};
+  FedSample fed{0, parts_[part_][next_++]};
   restamper_.Apply(fed.labelled.sample);
   return fed;
 }

@@ -47,13 +47,15 @@ void ReportConversion(const LogSink& log, const std::string& run, FlowUnit from,
 /// Samples that are known in advance: a stored run or a file.
 class StoredFeed final : public Feed {
  public:
-  StoredFeed(std::vector<LabelledSample> samples, Restamping restamping)
-      : samples_(std::move(samples)), restamper_(std::move(restamping)) {}
+  using Parts = std::vector<std::vector<LabelledSample>>;
+  StoredFeed(Parts parts, Restamping restamping)
+      : parts_(std::move(parts)), restamper_(std::move(restamping)) {}
   std::optional<FedSample> Next() override;
 
  private:
-  std::vector<LabelledSample> samples_;
+  Parts parts_;  // Each is freed behind its last sample.
   Restamper restamper_;
+  std::size_t part_{0};
   std::size_t next_{0};
 };
 

@@ -37,7 +37,7 @@ struct ReplayOptions {
 // The samples to replay, and their valve.
 struct Recording {
   std::string valve_id;
-  std::vector<LabelledSample> samples;
+  StoredFeed::Parts parts;  // None is empty.
 };
 
 Recording LoadRun(const ReplayOptions& options,
@@ -50,9 +50,12 @@ Recording LoadRun(const ReplayOptions& options,
   storage::RunStore store(data.runs());
   storage::StoredRun run = store.Load(options.run);
   Recording recording{std::move(run.info.run.valve_id), {}};
-  recording.samples.reserve(run.samples.size());
-  for (const storage::StoredSample& stored : run.samples) {
-    recording.samples.push_back({stored.sample, stored.truth});
+  if (!run.samples.empty()) {
+    auto& samples = recording.parts.emplace_back();
+    samples.reserve(run.samples.size());
+    for (const storage::StoredSample& stored : run.samples) {
+      samples.push_back({stored.sample, stored.truth});
+    }
   }
   return recording;
 }
@@ -90,12 +93,7 @@ Recording LoadCsv(const ReplayOptions& options,
     for (LabelledSample& labelled : run.samples) {
       conversion.Apply(labelled.sample);
     }
-    if (recording.samples.empty()) {
-      recording.samples = std::move(run.samples);
-    } else {
-      recording.samples.insert(recording.samples.end(), run.samples.begin(),
-                               run.samples.end());
-    }
+    recording.parts.push_back(std::move(run.samples));
   }
   return recording;
 }
@@ -143,16 +141,17 @@ std::unique_ptr<Feed> OpenFeed(const ReplayOptions& options, double speed,
   if (valve_id.empty()) {
     valve_id = recording.valve_id;
   }
-  if (!recording.samples.empty()) {
+  if (!recording.parts.empty()) {
     restamping.start =
         [&options, speed,
-         duration_s = 1e-9 * static_cast<double>(
-                                 recording.samples.back().sample.stamp_ns -
-                                 recording.samples.front().sample.stamp_ns)] {
+         duration_s =
+             1e-9 * static_cast<double>(
+                        recording.parts.back().back().sample.stamp_ns -
+                        recording.parts.front().front().sample.stamp_ns)] {
           return StartOf(options.delivery, duration_s, speed);
         };
   }
-  return std::make_unique<StoredFeed>(std::move(recording.samples), restamping);
+  return std::make_unique<StoredFeed>(std::move(recording.parts), restamping);
 }
 
 report::Report Replay(const ReplayOptions& given,

@@ -246,7 +246,7 @@ void AddAlarmVerbs(report::Program& program, CLI::App& group) {
       Shelve);
   shelve.add_option("valve", shelved.valve, "Valve id")->required();
   shelve.add_option("--fault", shelved.fault,
-                    "Only this answer: f19, 'f3|f6', unknown");
+                    "Only alarms of this fault: f19, 'f3|f6', unknown");
   shelve.add_option("--from", shelved.from,
                     "Planned: from this time on, '2026-11-27 06:00' (default "
                     "now; 90 days ahead at most)");

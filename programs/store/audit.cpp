@@ -128,7 +128,7 @@ struct LoopRecord {
   std::string loop;
   std::string source;
   bool dated{false};
-  bool has_sp{true};
+  bool has_sp{true};  // In the unit of F.
   int gain_sign{0};
   std::vector<SampleSeries> stretches;
 };
@@ -197,12 +197,14 @@ LoopRecord ReadLoop(const std::string& file, const AuditOptions& options,
   record.loop = std::filesystem::path(file).stem().string();
   record.source = file;
   record.dated = table.dated;
-  const bool contract = std::ranges::any_of(
-      csv.map.columns, [](const importer::ColumnMapping& m) {
-        return SameName(m.column, "CV_pct");
-      });
+  const auto has = [&](std::string_view name) {
+    return std::ranges::any_of(csv.map.columns,
+                               [&](const importer::ColumnMapping& m) {
+                                 return SameName(m.column, name);
+                               });
+  };
   // The contract's CV is % of closing: flow falls with it.
-  record.gain_sign = contract ? -1 : 0;
+  record.gain_sign = has("CV_pct") && !has("PV") ? -1 : 0;
   record.stretches = std::move(table.runs);
   return record;
 }
@@ -214,7 +216,7 @@ LoopRecord ReadRun(const std::string& selector, RunStore& store) {
   record.source = "run " + run.info.id;
   record.dated = true;
   record.gain_sign = -1;
-  // The set point of a valve's loop is in % and its PV is not in the record.
+  // Beside F, the set point of a valve's loop is in %.
   record.has_sp = false;
   for (const StoredSample& stored : run.samples) {
     if (stored.intake != Intake::kAccepted) {
@@ -236,7 +238,8 @@ LoopRecord ReadRun(const std::string& selector, RunStore& store) {
 
 bool IsJudged(const Sample& sample) {
   return sample.mode == ValveMode::kAuto && sample.Has(Signal::kCv) &&
-         (sample.Has(Signal::kF) || sample.Has(Signal::kX));
+         (sample.Has(Signal::kPv) || sample.Has(Signal::kF) ||
+          sample.Has(Signal::kX));
 }
 
 using Samples = std::span<const LabelledSample>;
@@ -295,30 +298,6 @@ std::vector<double> Series(Samples samples, Signal signal) {
   return values;
 }
 
-// The first letter of the tag's function letters: L of "20LIC101_0405".
-char ServiceOf(const std::string& name) {
-  constexpr std::string_view kFunctions = "ICTVRYASDQK";
-  for (std::size_t i = 0; i < name.size();) {
-    std::size_t end = i;
-    while (end < name.size() &&
-           std::isupper(static_cast<unsigned char>(name[end])) != 0) {
-      ++end;
-    }
-    const std::string_view letters = std::string_view(name).substr(i, end - i);
-    if (letters.size() >= 2 && letters.size() <= 4 &&
-        letters.substr(1).find_first_not_of(kFunctions) ==
-            std::string_view::npos) {
-      return letters.front();
-    }
-    i = std::max(end, i + 1);
-  }
-  std::string lower = name;
-  std::ranges::transform(lower, lower.begin(), [](unsigned char c) {
-    return static_cast<char>(std::tolower(c));
-  });
-  return lower.find("level") != std::string::npos ? 'L' : '\0';
-}
-
 struct Judged {
   std::string loop;
   std::string source;
@@ -330,15 +309,32 @@ struct Judged {
   std::string hint;
 };
 
-// The loop of `part`; nothing if neither PV nor X is there throughout.
+void SetService(char service, loop::Window& window) {
+  if (service != '\0' && service != 'T') {
+    window.integrating = service == 'L';
+  }
+}
+
+// The loop of `part`; nothing if no PV, F or X is there throughout.
 std::optional<loop::Window> WindowOf(Samples part, double period_s,
                                      char service, const LoopRecord& record,
-                                     bool ignore_x) {
+                                     const AuditOptions& options) {
   loop::Window window;
   window.period_s = period_s;
   window.op = Series(part, Signal::kCv);
-  if (!ignore_x) {
+  if (!options.ignore_x) {
     window.x = Series(part, Signal::kX);
+  }
+  const bool of_valve = record.gain_sign != 0;
+  window.pv = Series(part, Signal::kPv);
+  if (!window.pv.empty()) {
+    // Of a valve's PV only the record tells the sense. Its tag is that of the
+    // valve: FV101 may be in a level loop.
+    window.sp = Series(part, Signal::kSp);
+    if (service == 'L' || !of_valve || !options.service.empty()) {
+      SetService(service, window);
+    }
+    return window;
   }
   window.pv = Series(part, Signal::kF);
   if (window.pv.empty()) {
@@ -347,15 +343,15 @@ std::optional<loop::Window> WindowOf(Samples part, double period_s,
   if (window.pv.empty()) {
     return std::nullopt;
   }
+  window.gain_sign = record.gain_sign;
   if (record.has_sp) {
     window.sp = Series(part, Signal::kSp);
   }
-  window.gain_sign = record.gain_sign;
-  // F over CV of a stored valve is no integral, whatever the loop is.
-  if (record.gain_sign != 0) {
+  if (of_valve) {
+    // F over CV of a valve is no integral, whatever the loop is.
     window.integrating = false;
-  } else if (service != '\0' && service != 'T') {
-    window.integrating = service == 'L';
+  } else {
+    SetService(service, window);
   }
   return window;
 }
@@ -392,7 +388,7 @@ void JudgeRecord(const LoopRecord& record, const AuditOptions& options,
                  std::vector<Judged>& judged, Json& skipped) {
   const char service =
       options.service.empty()
-          ? ServiceOf(record.loop)
+          ? loop::ServiceOf(record.loop)
           : static_cast<char>(std::toupper(
                 static_cast<unsigned char>(options.service.front())));
   std::size_t short_ones = 0;
@@ -407,8 +403,7 @@ void JudgeRecord(const LoopRecord& record, const AuditOptions& options,
       while (!rest.empty()) {
         const Samples part = rest.first(EndOfWindow(rest, length));
         rest = rest.subspan(part.size());
-        auto window =
-            WindowOf(part, series.period_s, service, record, options.ignore_x);
+        auto window = WindowOf(part, series.period_s, service, record, options);
         if (part.size() < loop::kMinSamples || !window) {
           ++short_ones;
           continue;
@@ -754,7 +749,8 @@ LoopAudits AuditStoredRuns(const DataDirectory& data, std::int64_t since_ns,
   RunStore store(data.runs());
   std::map<std::string, RunInfo> newest;
   for (const RunInfo& info : store.List()) {  // Ordered by start.
-    if (info.samples > 0 && info.last_stamp_ns >= since_ns) {
+    if (info.samples > 0 && info.last_stamp_ns >= since_ns &&
+        info.run.origin != RunOrigin::kSimulated) {
       newest.insert_or_assign(info.run.valve_id, info);
     }
   }

@@ -161,7 +161,10 @@ void NameFaults(std::vector<Episode>& episodes, const Context& context) {
       if (!texts) {
         texts = report::LoadFaultTexts(context.options);
       }
-      episode.fault_name = texts->Words(*episode.fault, episode.strength).name;
+      const std::string_view no_name = storage::NoNameText(episode);
+      episode.fault_name =
+          no_name.empty() ? texts->Words(*episode.fault, episode.strength).name
+                          : std::string(no_name);
     }
   }
 }

@@ -366,8 +366,11 @@ std::string CsvNumber(double value) {
 }
 
 // CSV heading of a signal, as in the import format.
-std::string Heading(Signal signal, FlowUnit flow_unit) {
-  const std::string name(SignalName(signal));
+std::string Heading(Signal signal, FlowUnit flow_unit, bool has_pv) {
+  std::string name(SignalName(signal));
+  if (signal == Signal::kSp && has_pv) {
+    return name;  // In the unit of PV.
+  }
   if (signal == Signal::kF) {
     return name + (flow_unit == FlowUnit::kM3PerHour ? "_m3_h" : "_t_h");
   }
@@ -390,7 +393,8 @@ void WriteTrace(const Episode& episode, const std::vector<TracePoint>& trace,
     const auto signal = static_cast<Signal>(i);
     if ((present & MaskOf(signal)) != 0) {
       signals.push_back(signal);
-      cells.push_back(Heading(signal, episode.flow_unit));
+      cells.push_back(Heading(signal, episode.flow_unit,
+                              (present & MaskOf(Signal::kPv)) != 0));
     }
   }
   for (const std::string& channel : episode.channels) {
@@ -462,9 +466,8 @@ Report PlotEpisode(const PlotOptions& options, const Context& context) {
       plot::LoadEvidence(reader, options.id, data.models());
   const Episode& episode = evidence.episode;
   plot::EpisodeFigureOptions figure = options.figure;
-  figure.fault_name = report::LoadFaultTexts(context.options)
-                          .Words(episode.fault.value_or(""), episode.strength)
-                          .name;
+  figure.fault_name =
+      plot::EpisodeName(episode, report::LoadFaultTexts(context.options));
   const std::filesystem::path path =
       options.output.empty() ? episode.episode_id + ".png" : options.output;
   plot::DrawFigure(plot::EpisodeFigure(evidence, figure), path);

@@ -31,7 +31,8 @@ struct LoopAudits {
 };
 
 /// Audits of each loop at most `windows` windows of two hours, spread over its
-/// newest run since `since_ns`. Empty without runs.
+/// newest run since `since_ns`. Simulated runs are of no loop of the plant.
+/// Empty without runs.
 LoopAudits AuditStoredRuns(const DataDirectory& data, std::int64_t since_ns,
                            int windows);
 

@@ -7,6 +7,7 @@
 #include "planner/work_list.h"
 #include "programs/store/verbs.h"
 #include "report/fault_texts.h"
+#include "report/stroke_rows.h"
 #include "storage/history/history.h"
 
 namespace fdi::storage {
@@ -101,7 +102,9 @@ Report ShowHealth(const HealthOptions& options, const Context& context) {
     return CsvOf(rows, options.plant.asked());
   }
   Report report;
-  report.document = {{"valve_id", options.valve}, {"hours", rows}};
+  report.document = {{"valve_id", options.valve},
+                     {"hours", rows},
+                     {"strokes", planner::StrokesJson(hours)}};
   std::vector<report::Column> columns = {
       {"from", "hour_utc", Format::kTime},
       {"seen [h]", "seen_h"},
@@ -122,7 +125,14 @@ Report ShowHealth(const HealthOptions& options, const Context& context) {
     columns.insert(columns.begin() + 1, {{"host", "host", Format::kPlain, 0, 9},
                                          {"monitor", "monitor"}});
   }
-  return report.Table("hours", std::move(columns));
+  report.Table("hours", std::move(columns));
+  if (!report.document["strokes"].empty()) {
+    std::vector<report::Column> strokes =
+        report::StrokeColumns("last_start_utc");
+    strokes.front().heading = "stroke test at";
+    report.Line("").Table("strokes", std::move(strokes));
+  }
+  return report;
 }
 
 Report Trend(const HealthOptions& options, const Context& context) {

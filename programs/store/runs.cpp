@@ -338,7 +338,8 @@ void AddImport(report::Program& program, CLI::App& group) {
   options.table.AddTo(verb);
   verb.add_option("--start", options.start,
                   "Time of t = 0, if times have no date (default: now)");
-  verb.add_option("--signals", options.signals, "Signals that must be there");
+  verb.add_option("--signals", options.signals,
+                  "Signals that must be there, where no --map names them");
   verb.add_option("--period", options.period_s,
                   "Sample period in s (0: the most usual step)")
       ->check(CLI::NonNegativeNumber);

@@ -1,14 +1,12 @@
 #pragma once
 
-#include <cstdint>
-#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
-#include "diagnosis/loop/strokes.h"
+#include "diagnosis/sample_series.h"
+#include "diagnosis/stroke_watch.h"
 #include "report/report.h"
-#include "storage/runs/runs.h"
 
 namespace fdi::storage {
 
@@ -16,11 +14,10 @@ namespace fdi::storage {
 struct FoundStroke {
   std::string loop;
   std::string source;
-  std::int64_t start_ns{0};
   bool dated{false};
   double from_s{0.0};  ///< From the start of the record.
-  double period_s{1.0};
-  loop::Stroke stroke;
+  StrokeTest test;
+  double last_from_s{0.0};  ///< Of test.last.
 };
 
 /// Adds the stroke tests of a record, whose stretches are in order of time.

@@ -42,6 +42,8 @@ namespace fdi::trainer {
 namespace {
 
 constexpr auto kPlain = report::Format::kPlain;
+// The fit needs several times the memory of the rows.
+constexpr std::size_t kMaxPackedOnboarding = 200'000;
 using report::Align;
 using report::FormatNumber;
 using report::Json;
@@ -366,6 +368,7 @@ std::vector<TrainingRun> LoadRuns(const OnboardOptions& options,
                            .log = context.log};
   importer::CheckGasFlow(csv.map, simulator::MolarMass(medium));
   csv.required = MaskOf(Signal::kCv);
+  csv.max_packed_rows = kMaxPackedOnboarding;
   std::vector<storage::StoredRun> stored = LoadRunsAndFiles(
       options.runs, options.files, {context.options.data_dir}, csv);
   std::vector<TrainingRun> runs;
@@ -375,6 +378,7 @@ std::vector<TrainingRun> LoadRuns(const OnboardOptions& options,
                     unit.value_or(stored.front().info.run.flow_unit), medium},
                 context.log);
     runs.push_back(ToTrainingRun(run, true));
+    run.samples = {};
     if (!options.signals.empty()) {
       runs.back() =
           WithSignals(std::move(runs.back()),

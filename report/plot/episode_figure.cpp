@@ -5,6 +5,8 @@
 #include <cmath>
 #include <cstdio>
 #include <iterator>
+#include <limits>
+#include <numeric>
 
 #include "base/error.h"
 #include "base/time_units.h"
@@ -21,6 +23,8 @@ using storage::HistoryEntry;
 // The first faults get colours of their own; the others are grey.
 constexpr std::array<const char*, 5> kFaultInks = {
     ink::kVermilion, ink::kBlue, ink::kGreen, ink::kOrange, ink::kSky};
+
+constexpr const char* kGapInk = "#d0d0d0";
 
 double SecondsFrom(std::int64_t stamp_ns, std::int64_t origin_ns) {
   return static_cast<double>(stamp_ns - origin_ns) * 1e-9;
@@ -121,6 +125,30 @@ Panel FlowPanel(const EpisodeEvidence& evidence,
   };
   AddSimulated(evidence, trace, &EpisodeLook::flow, "F", panel);
   return panel;
+}
+
+bool AnyHas(const std::vector<TracePoint>& trace, Signal signal) {
+  return std::ranges::any_of(trace, [signal](const TracePoint& instant) {
+    return instant.sample.Has(signal);
+  });
+}
+
+// What the valve moves: of a loop with PV that one, with F only if it is there.
+std::vector<Panel> AnswerPanels(const EpisodeEvidence& evidence,
+                                const std::vector<TracePoint>& trace) {
+  std::vector<Panel> panels;
+  const bool has_pv = AnyHas(trace, Signal::kPv);
+  if (has_pv) {
+    panels.push_back(
+        {"PV, SP [unit of PV]",
+         {{"PV", ink::kBlack, 1.6, Dash::kSolid, Readings(trace, Signal::kPv)},
+          {"SP", ink::kBlue, 1.6, Dash::kDashed,
+           Readings(trace, Signal::kSp)}}});
+  }
+  if (!has_pv || AnyHas(trace, Signal::kF)) {
+    panels.push_back(FlowPanel(evidence, trace));
+  }
+  return panels;
 }
 
 Panel TravelPanel(const EpisodeEvidence& evidence,
@@ -371,6 +399,45 @@ std::vector<Mark> Marks(const EpisodeEvidence& evidence) {
   return marks;
 }
 
+// The trace's own gaps, each with the reason that the history gives for it: a
+// monitor that was started again says nothing either until it has settled.
+std::vector<Band> Gaps(const EpisodeEvidence& evidence,
+                       const std::vector<TracePoint>& trace) {
+  constexpr double kPeriods = 3.0;  // As on the page.
+  const std::vector<double> t_s = TimesOf(evidence, trace);
+  std::vector<double> steps;
+  std::adjacent_difference(t_s.begin(), t_s.end(), std::back_inserter(steps));
+  double longest = std::numeric_limits<double>::infinity();
+  if (steps.size() > 1) {
+    const auto middle =
+        steps.begin() + static_cast<std::ptrdiff_t>((steps.size() + 1) / 2);
+    std::nth_element(steps.begin() + 1, middle, steps.end());
+    longest = std::max(kPeriods * *middle, 2.5);
+  }
+  std::vector<Band> gaps;
+  for (std::size_t i = 1; i < t_s.size(); ++i) {
+    if (t_s[i] - t_s[i - 1] > longest) {
+      gaps.push_back({t_s[i - 1], t_s[i], "no samples", kGapInk});
+    }
+  }
+  const auto found = static_cast<std::ptrdiff_t>(gaps.size());
+  for (const DataGap& gap : evidence.gaps) {
+    const std::int64_t origin_ns = evidence.episode.detected_ns;
+    const Band said{SecondsFrom(gap.from_ns, origin_ns),
+                    SecondsFrom(gap.to_ns, origin_ns), gap.reason, kGapInk};
+    const auto same = std::find_if(
+        gaps.begin(), gaps.begin() + found, [&said](const Band& band) {
+          return said.from < band.to && said.to > band.from;
+        });
+    if (same == gaps.begin() + found) {
+      gaps.push_back(said);
+    } else {
+      same->text = said.text;
+    }
+  }
+  return gaps;
+}
+
 // Periods in which the engine did not decide, and gaps in the record.
 std::vector<Band> Bands(const EpisodeEvidence& evidence,
                         const std::vector<TracePoint>& trace) {
@@ -391,10 +458,7 @@ std::vector<Band> Bands(const EpisodeEvidence& evidence,
                           ? SecondsFrom(trace[i + 1].sample.stamp_ns, origin_ns)
                           : t_s;
   }
-  for (const DataGap& gap : evidence.gaps) {
-    bands.push_back({SecondsFrom(gap.from_ns, origin_ns),
-                     SecondsFrom(gap.to_ns, origin_ns), gap.reason, "#d0d0d0"});
-  }
+  std::ranges::move(Gaps(evidence, trace), std::back_inserter(bands));
   return bands;
 }
 
@@ -458,10 +522,9 @@ Figure EpisodeFigure(const EpisodeEvidence& evidence,
     return t_s < options.from_s || t_s > options.to_s;
   });
   Figure figure;
-  const std::string name =
-      options.fault_name.empty() ? "" : "  " + options.fault_name;
-  figure.title =
-      episode.valve_id + ":  " + episode.fault.value_or("not isolated") + name;
+  figure.title = episode.valve_id + ":  " +
+                 (IsNamed(episode) ? *episode.fault + "  " + options.fault_name
+                                   : options.fault_name);
   figure.subtitle = Subtitle(episode);
   figure.is_time = true;
   figure.x = TimesOf(evidence, trace);
@@ -479,7 +542,8 @@ Figure EpisodeFigure(const EpisodeEvidence& evidence,
     figure.clock_s = SecondsFrom(episode.detected_ns % kNsPerDay, 0);
   }
   figure.gap = evidence.models ? 1.5 * evidence.models->sample_period_s : 1.5;
-  figure.panels = {FlowPanel(evidence, trace), TravelPanel(evidence, trace)};
+  figure.panels = AnswerPanels(evidence, trace);
+  figure.panels.push_back(TravelPanel(evidence, trace));
   for (std::size_t c = 0; c < episode.channels.size(); ++c) {
     figure.panels.push_back(ResidualPanel(evidence, trace, c));
   }

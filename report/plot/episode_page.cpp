@@ -46,10 +46,11 @@ std::string_view ByLayer(std::string_view layer) {
 // "likely: Flow transmitter wrong (f19), by simulation of the valve"
 std::string FaultLine(const Episode& e, const std::string& name) {
   std::string line(CertaintyName(storage::CertaintyOf(e)));
-  if (!e.fault || e.fault == "unknown") {
+  line += ": " + name;
+  if (!storage::IsNamed(e)) {
     return line;
   }
-  line += ": " + name + " (" + *e.fault + ")";
+  line += " (" + *e.fault + ")";
   for (const std::string& other : storage::LookAlikesOf(e)) {
     line += " or " + other;
   }
@@ -186,7 +187,8 @@ void AddChecks(const Episode& episode, const report::FaultTexts& texts,
     const std::string fault = rest.substr(0, bar);
     rest = bar == std::string::npos ? "" : rest.substr(bar + 1);
     const report::FaultWords words = texts.Words(fault, episode.strength);
-    page.Line(words.name + (fault == "unknown" ? "" : " (" + fault + ")") +
+    page.Line((fault == "unknown" ? EpisodeName(episode, texts)
+                                  : words.name + " (" + fault + ")") +
               ", for " + words.discipline + ":");
     page.Checks(Sentences(words.check));
   }
@@ -206,8 +208,7 @@ void AddPicture(const EpisodeEvidence& evidence,
     return;
   }
   EpisodeFigureOptions options;
-  options.fault_name =
-      texts.Words(evidence.episode.fault.value_or(""), 0.0).name;
+  options.fault_name = EpisodeName(evidence.episode, texts);
   Figure figure = EpisodeFigure(evidence, options);
   figure.width = kPictureWidth;
   figure.legend_width = kLegendWidth;
@@ -249,7 +250,7 @@ std::vector<Column> EpisodeFields(const Alarm& alarm,
   return {{"episode", "episode_id"},
           {"valve", "valve_id"},
           {"source", "source_id"},
-          Field("fault", FaultLine(e, words.name)),
+          Field("fault", FaultLine(e, EpisodeName(e, texts))),
           Field("check", words.check),
           Field("severity", std::string(SeverityName(words.severity)) +
                                 ", priority " +
@@ -310,9 +311,14 @@ std::string EventSentence(const HistoryEntry& event,
 
 std::string EpisodeTitle(const Episode& episode,
                          const report::FaultTexts& texts) {
-  return episode.valve_id + ": " +
-         (episode.fault ? texts.Words(*episode.fault, episode.strength).name
-                        : "fault not named");
+  return episode.valve_id + ": " + EpisodeName(episode, texts);
+}
+
+std::string EpisodeName(const Episode& episode,
+                        const report::FaultTexts& texts) {
+  const std::string_view no_name = storage::NoNameText(episode);
+  return no_name.empty() ? texts.Words(episode.fault.value_or(""), 0.0).name
+                         : std::string(no_name);
 }
 
 report::Report EpisodePage(const EpisodeEvidence& evidence, const Alarm& alarm,

@@ -48,6 +48,7 @@ Panel PanelOf(const std::vector<StoredSample>& samples,
 std::vector<Panel> Panels(const StoredRun& run,
                           const std::vector<StoredSample>& samples) {
   const std::string flow(FlowUnitName(run.info.run.flow_unit));
+  const bool has_pv = (run.info.signals & MaskOf(Signal::kPv)) != 0;
   return {PanelOf(samples, "closing [%]",
                   {{Signal::kCv, ink::kGrey, Dash::kSolid, 3.0},
                    {Signal::kX, ink::kBlack, Dash::kSolid}}),
@@ -60,8 +61,11 @@ std::vector<Panel> Panels(const StoredRun& run,
                    {Signal::kPz, ink::kVermilion, Dash::kDotted}}),
           PanelOf(samples, "temperature T1 [degC]",
                   {{Signal::kT1, ink::kBlack, Dash::kSolid}}),
-          PanelOf(samples, "set point SP [%]",
-                  {{Signal::kSp, ink::kBlack, Dash::kSolid}}),
+          has_pv ? PanelOf(samples, "PV, SP [unit of PV]",
+                           {{Signal::kPv, ink::kBlack, Dash::kSolid},
+                            {Signal::kSp, ink::kBlue, Dash::kDashed}})
+                 : PanelOf(samples, "set point SP [%]",
+                           {{Signal::kSp, ink::kBlack, Dash::kSolid}}),
           PanelOf(samples, "positioner CVI [-]",
                   {{Signal::kCvi, ink::kBlack, Dash::kSolid}})};
 }

@@ -1,5 +1,9 @@
 #pragma once
 
+#include <string>
+#include <string_view>
+#include <vector>
+
 #include "diagnosis/records/certainty.h"
 #include "storage/history/episode.h"
 
@@ -11,5 +15,9 @@ Certainty CertaintyOf(const Episode& episode);
 /// What may be the cause as well as the fault that names `episode`
 /// (LookAlikesBeside()).
 std::vector<std::string> LookAlikesOf(const Episode& episode);
+
+/// What stands in the place of a name, as in the view fault_history; empty for
+/// an episode that has a name or is unlike any known fault.
+std::string_view NoNameText(const Episode& episode);
 
 }  // namespace fdi::storage

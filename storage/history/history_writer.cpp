@@ -462,18 +462,20 @@ void HistoryWriter::Resume(std::uint64_t episode_id, std::int64_t stamp_ns,
   });
 }
 
-void HistoryWriter::CommitCheckpoint(const Checkpoint& checkpoint) {
+std::size_t HistoryWriter::CommitCheckpoint(const Checkpoint& checkpoint) {
+  std::size_t worse = 0;
   CommitBatch([&] {
     // Coverage and health are added to what is stored. All of it is in one
     // transaction, so that after an error the caller can merge this checkpoint
     // into the next one.
     StoreCoverage(database_, checkpoint.coverage);
     StoreAccumulators(database_, "accumulator", checkpoint.accumulators);
-    StoreHealth(database_, checkpoint.health);
+    worse = StoreHealth(database_, checkpoint.health);
     StoreShadow(database_, checkpoint.shadow);
     StoreAccumulators(database_, "shadow_accumulator",
                       checkpoint.shadow_accumulators);
   });
+  return worse;
 }
 
 std::vector<Accumulator> HistoryWriter::Accumulators() {

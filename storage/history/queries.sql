@@ -318,6 +318,11 @@ VALUES (?, ?, ?, ?, ?, ?) ON CONFLICT DO UPDATE SET
 SELECT hour, model_hash, epoch, live_ms, bytes FROM health_hour
 WHERE valve_id = ? AND hour >= ? AND hour < ?
 ORDER BY hour, epoch, model_hash
+-- Those with stroke tests: format 3, see health.cpp.
+-- name: stroke_hours
+SELECT hour, model_hash, epoch, live_ms, bytes FROM health_hour
+WHERE valve_id = ? AND hour <= ? AND substr(bytes, 1, 1) IN (x'03', x'83')
+ORDER BY hour DESC
 -- Skips from valve to valve along the key.
 -- name: next_health_valve
 SELECT min(valve_id) FROM health_hour WHERE valve_id > ?

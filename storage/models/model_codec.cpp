@@ -284,7 +284,7 @@ class Decoder {
   void Field(int& value) { value = reader_.Get<std::int32_t>(); }
   void Field(bool& value) { value = Small(1, "flag") != 0; }
   void Field(Signal& value) {
-    value = static_cast<Signal>(Small(kSignalCount - 1, "signal"));
+    value = static_cast<Signal>(Small(kModelSignalCount - 1, "signal"));
   }
   void Field(FlowUnit& value) {
     value = static_cast<FlowUnit>(

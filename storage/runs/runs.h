@@ -40,9 +40,9 @@ struct NewRun {
   double period_s{1.0};
   FlowUnit flow_unit{FlowUnit::kM3PerHour};
   RunOrigin origin{RunOrigin::kRecorded};
-  std::string scenario;  ///< TOML of a simulation, or file of an import.
-  std::optional<std::uint64_t> seed;
-  std::string software;  ///< Version and revision of the program.
+  std::string scenario{};  ///< TOML of a simulation, or file of an import.
+  std::optional<std::uint64_t> seed{};
+  std::string software{};  ///< Version and revision of the program.
 };
 
 /// A user's label for t in [from_s, to_s); overrides a stored truth.

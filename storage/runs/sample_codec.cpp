@@ -1,5 +1,6 @@
 #include "storage/runs/sample_codec.h"
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <limits>
@@ -22,7 +23,8 @@ namespace fdi::storage {
 // The 22 numbers of a sample, in this order: stamp, source, seq, present,
 // qualities (2 bits each), mode, flow unit, epoch, intake, flags, fault of the
 // truth; the ten values by signal, strength of the truth. A column of integers
-// or doubles is as in column_codec.cpp.
+// or doubles is as in column_codec.cpp. With PV there are 23 numbers, 12 of
+// them doubles: PV stands between the other values and the strength.
 namespace {
 
 constexpr unsigned kQualityBits = 2;
@@ -33,21 +35,39 @@ constexpr std::int64_t kHasTruth = 4;
 /// A StoredSample as plain numbers.
 struct Row {
   static constexpr std::size_t kIntegers = 11;
-  static constexpr std::size_t kDoubles = kSignalCount + 1;
   // stamp, source, seq, present, quality, mode, flow unit, epoch, intake,
   // flags, fault
   std::array<std::int64_t, kIntegers> integers{};
-  std::array<double, kDoubles> doubles{};  // values, strength of the truth
+  std::array<double, kSignalCount> values{};
+  double strength{0.0};  // Of the truth.
+
+  // The doubles of a form with so many signals.
+  double& Double(std::size_t i, std::size_t signals) {
+    return i < signals ? values[i] : strength;
+  }
 };
 
+std::size_t SignalsOf(ChunkCodec codec) {
+  return codec == ChunkCodec::kPlainPv || codec == ChunkCodec::kColumnsPv
+             ? kSignalCount
+             : kModelSignalCount;
+}
+
+// Anything of the PV, also what a sample does not need.
+bool HasPv(const StoredSample& stored) {
+  const Sample& s = stored.sample;
+  return s.Has(Signal::kPv) ||
+         std::bit_cast<std::uint64_t>(s[Signal::kPv]) != 0 ||
+         s.quality[Index(Signal::kPv)] != SignalQuality::kGood;
+}
+
 /// Upper bound of the inflated size of a chunk of `count` samples.
-std::size_t MaxInflated(std::size_t count) {
+std::size_t MaxInflated(std::size_t count, std::size_t signals) {
   // A column of doubles is at most two of integers behind its kind, origin and
   // step (17 bytes). A column of integers is at most its form, two seeds and
   // the width (18 bytes), and 8 bytes for every sample. So 64 bytes beside the
   // samples suffice for each.
-  constexpr std::size_t kColumns = Row::kIntegers + 2 * Row::kDoubles;
-  return kColumns * (8 * count + 64);
+  return (Row::kIntegers + 2 * (signals + 1)) * (8 * count + 64);
 }
 
 Row ToRow(const StoredSample& stored) {
@@ -71,8 +91,8 @@ Row ToRow(const StoredSample& stored) {
                   static_cast<std::int64_t>(stored.intake),
                   flags,
                   stored.truth ? stored.truth->fault : 0};
-  std::copy(s.values.begin(), s.values.end(), row.doubles.begin());
-  row.doubles[kSignalCount] = stored.truth ? stored.truth->strength : 0.0;
+  row.values = s.values;
+  row.strength = stored.truth ? stored.truth->strength : 0.0;
   return row;
 }
 
@@ -85,7 +105,8 @@ std::int64_t Within(std::int64_t value, std::int64_t max, const char* what,
   return value;
 }
 
-StoredSample FromRow(const Row& row, const ByteReader& reader) {
+StoredSample FromRow(const Row& row, std::size_t signals,
+                     const ByteReader& reader) {
   const auto& n = row.integers;
   StoredSample stored;
   Sample& s = stored.sample;
@@ -93,8 +114,8 @@ StoredSample FromRow(const Row& row, const ByteReader& reader) {
   s.source_id = static_cast<std::uint64_t>(n[1]);
   s.seq = static_cast<std::uint64_t>(n[2]);
   s.present = static_cast<SignalMask>(
-      Within(n[3], (1 << kSignalCount) - 1, "signals", reader));
-  for (std::size_t i = 0; i < kSignalCount; ++i) {
+      Within(n[3], (1 << signals) - 1, "signals", reader));
+  for (std::size_t i = 0; i < signals; ++i) {
     s.quality[i] = static_cast<SignalQuality>(
         Within((n[4] >> (kQualityBits * i)) & 3,
                static_cast<int>(SignalQuality::kBad), "quality", reader));
@@ -114,9 +135,9 @@ StoredSample FromRow(const Row& row, const ByteReader& reader) {
     stored.truth = FaultTruth{
         static_cast<int>(
             Within(n[10], std::numeric_limits<int>::max(), "fault", reader)),
-        row.doubles[kSignalCount]};
+        row.strength};
   }
-  std::copy_n(row.doubles.begin(), kSignalCount, s.values.begin());
+  s.values = row.values;
   return stored;
 }
 
@@ -131,7 +152,7 @@ std::uint32_t ChecksumOf(const Chunk& chunk) {
 }
 
 std::vector<std::byte> EncodeColumns(std::span<const StoredSample> samples,
-                                     ChunkHints* hints) {
+                                     std::size_t signals, ChunkHints* hints) {
   std::vector<Row> rows;
   rows.reserve(samples.size());
   for (const StoredSample& sample : samples) {
@@ -146,12 +167,13 @@ std::vector<std::byte> EncodeColumns(std::span<const StoredSample> samples,
     WriteIntegers(writer, integers);
   }
   std::vector<double> doubles(rows.size());
-  for (std::size_t c = 0; c < Row::kDoubles; ++c) {
+  for (std::size_t c = 0; c <= signals; ++c) {
     for (std::size_t i = 0; i < rows.size(); ++i) {
-      doubles[i] = rows[i].doubles[c];
+      doubles[i] = rows[i].Double(c, signals);
     }
+    const std::size_t hint = c < signals ? c : kSignalCount;
     WriteDoubles(writer, doubles,
-                 hints != nullptr ? &hints->columns[c] : nullptr);
+                 hints != nullptr ? &hints->columns[hint] : nullptr);
   }
   ByteWriter chunk;
   chunk.Put(static_cast<std::uint32_t>(writer.size()));
@@ -162,10 +184,11 @@ std::vector<std::byte> EncodeColumns(std::span<const StoredSample> samples,
 
 std::vector<StoredSample> DecodeColumns(const Chunk& chunk,
                                         std::string_view where) {
+  const std::size_t signals = SignalsOf(chunk.codec);
   ByteReader packed(chunk.bytes, where);
-  const std::uint32_t size =
-      packed.GetCount(static_cast<std::uint32_t>(MaxInflated(chunk.count)),
-                      "size of inflated chunk");
+  const std::uint32_t size = packed.GetCount(
+      static_cast<std::uint32_t>(MaxInflated(chunk.count, signals)),
+      "size of inflated chunk");
   const std::vector<std::byte> raw =
       Inflate(packed.TakeBytes(chunk.bytes.size() - sizeof size), size, where);
   ByteReader reader(raw, where);
@@ -176,33 +199,34 @@ std::vector<StoredSample> DecodeColumns(const Chunk& chunk,
       rows[i].integers[c] = column[i];
     }
   }
-  for (std::size_t c = 0; c < Row::kDoubles; ++c) {
+  for (std::size_t c = 0; c <= signals; ++c) {
     const auto column = ReadDoubles(reader, rows.size());
     for (std::size_t i = 0; i < rows.size(); ++i) {
-      rows[i].doubles[c] = column[i];
+      rows[i].Double(c, signals) = column[i];
     }
   }
   reader.ExpectEnd();
   std::vector<StoredSample> samples;
   samples.reserve(rows.size());
   for (const Row& row : rows) {
-    samples.push_back(FromRow(row, reader));
+    samples.push_back(FromRow(row, signals, reader));
   }
   return samples;
 }
 
 /// Zero words (all bits 0) are omitted and marked in the record's mask.
-std::vector<std::byte> EncodePlain(std::span<const StoredSample> samples) {
+std::vector<std::byte> EncodePlain(std::span<const StoredSample> samples,
+                                   std::size_t signals) {
   ByteWriter writer;
   for (const StoredSample& sample : samples) {
-    const Row row = ToRow(sample);
-    std::array<std::uint64_t, Row::kIntegers + Row::kDoubles> words{};
+    Row row = ToRow(sample);
+    std::array<std::uint64_t, Row::kIntegers + kSignalCount + 1> words{};
     std::uint32_t mask = 0;
-    for (std::size_t i = 0; i < words.size(); ++i) {
-      words[i] =
-          i < Row::kIntegers
-              ? static_cast<std::uint64_t>(row.integers[i])
-              : std::bit_cast<std::uint64_t>(row.doubles[i - Row::kIntegers]);
+    for (std::size_t i = 0; i < Row::kIntegers + signals + 1; ++i) {
+      words[i] = i < Row::kIntegers
+                     ? static_cast<std::uint64_t>(row.integers[i])
+                     : std::bit_cast<std::uint64_t>(
+                           row.Double(i - Row::kIntegers, signals));
       mask |= words[i] != 0 ? 1U << i : 0U;
     }
     writer.Put(mask);
@@ -217,22 +241,23 @@ std::vector<std::byte> EncodePlain(std::span<const StoredSample> samples) {
 
 std::vector<StoredSample> DecodePlain(const Chunk& chunk,
                                       std::string_view where) {
+  const std::size_t signals = SignalsOf(chunk.codec);
   ByteReader reader(chunk.bytes, where);
   std::vector<StoredSample> samples;
   samples.reserve(chunk.count);
   for (std::uint32_t k = 0; k < chunk.count; ++k) {
     Row row;
     const auto mask = reader.Get<std::uint32_t>();
-    for (std::size_t i = 0; i < Row::kIntegers + Row::kDoubles; ++i) {
+    for (std::size_t i = 0; i < Row::kIntegers + signals + 1; ++i) {
       const std::uint64_t word =
           (mask >> i & 1U) != 0 ? reader.Get<std::uint64_t>() : 0;
       if (i < Row::kIntegers) {
         row.integers[i] = static_cast<std::int64_t>(word);
       } else {
-        row.doubles[i - Row::kIntegers] = std::bit_cast<double>(word);
+        row.Double(i - Row::kIntegers, signals) = std::bit_cast<double>(word);
       }
     }
-    samples.push_back(FromRow(row, reader));
+    samples.push_back(FromRow(row, signals, reader));
   }
   reader.ExpectEnd();
   return samples;
@@ -244,11 +269,17 @@ Chunk EncodeChunk(std::span<const StoredSample> samples, ChunkCodec codec,
                   ChunkHints* hints) {
   Require(!samples.empty() && samples.size() <= kMaxChunkSamples,
           "a chunk holds 1 to 65536 samples");
+  const bool plain =
+      codec == ChunkCodec::kPlain || codec == ChunkCodec::kPlainPv;
   Chunk chunk;
-  chunk.codec = codec;
+  chunk.codec = plain ? ChunkCodec::kPlain : ChunkCodec::kColumns;
+  if (std::ranges::any_of(samples, HasPv)) {
+    chunk.codec = plain ? ChunkCodec::kPlainPv : ChunkCodec::kColumnsPv;
+  }
+  const std::size_t signals = SignalsOf(chunk.codec);
   chunk.count = static_cast<std::uint32_t>(samples.size());
-  chunk.bytes = codec == ChunkCodec::kPlain ? EncodePlain(samples)
-                                            : EncodeColumns(samples, hints);
+  chunk.bytes = plain ? EncodePlain(samples, signals)
+                      : EncodeColumns(samples, signals, hints);
   chunk.crc = ChecksumOf(chunk);
   return chunk;
 }
@@ -266,8 +297,10 @@ std::vector<StoredSample> DecodeChunk(const Chunk& chunk,
   }
   switch (chunk.codec) {
     case ChunkCodec::kPlain:
+    case ChunkCodec::kPlainPv:
       return DecodePlain(chunk, where);
     case ChunkCodec::kColumns:
+    case ChunkCodec::kColumnsPv:
       return DecodeColumns(chunk, where);
   }
   refuser.Refuse("unknown codec " +

@@ -98,6 +98,15 @@ TEST_F(TimeTextTest, ANameOfAZoneKeepsItsSummerTime) {
             LocalClock("Europe/Berlin").Utc(*ScanTime("2026-07-10 09:00"), 0));
 }
 
+TEST_F(TimeTextTest, ALeapSecondIsTheFirstOfTheNextDay) {
+  constexpr std::int64_t kNewYear = 1'483'228'800'000'000'000;
+  EXPECT_EQ(ParseTime("2016-12-31T23:59:60Z", false), kNewYear);
+  EXPECT_EQ(
+      LocalClock("Europe/Warsaw").Utc(*ScanTime("2017-01-01 00:59:60"), 0),
+      kNewYear);
+  EXPECT_FALSE(ScanTime("2016-12-31T23:59:61Z"));
+}
+
 TEST_F(TimeTextTest, DecimalsAreAsManyAsTheStampNeeds) {
   EXPECT_EQ(FormatTime(kStampNs + 500'000'000, true),
             "2026-11-20T14:56:11.500Z");

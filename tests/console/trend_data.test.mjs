@@ -99,3 +99,12 @@ test('the expected value is the measured one without the residual', () => {
 
   assert.deepEqual(data.table([]).x_hat, [-0.5, 0.5, 1.5]);
 });
+
+test('a PV is kept with its set point, and is null before', () => {
+  const data = new TrendData();
+  data.load(trend(seconds(0, 3)), false);
+  data.append([{t_ms: 3000, pv: 3.25, sp: 3.5, residuals: [0], d: [0]}]);
+  assert.deepEqual(data.columns.pv, [null, null, null, 3.25]);
+  assert.deepEqual(data.columns.sp, [null, null, null, 3.5]);
+  assert.ok(data.has('pv'));
+});

@@ -257,6 +257,38 @@ test('a healthy valve shows no fault, and no number for one', async () => {
   await close(page);
 });
 
+test('stroke tests are listed, the newest first, with what is worse',
+    async () => {
+      const counts = ['travel_strokes', 'reversals', 'auto_h', 'shut_h',
+        'open_h', 'at_limit', 'slip_jumps', 'slip_jump', 'dead_band',
+        'error_band', 'delay', 't63', 't86', 'overshoot', 'travel_gain'];
+      const stroke = (day, t63, worse) => ({start_utc: `2026-11-${day}T10:00:00Z`,
+        last_start_utc: worse === null ? null : '2026-11-01T10:00:00Z',
+        kind: 'partial', cv_low_pct: 40, cv_high_pct: 50, worse: worse ?? [],
+        rising: {t63_s: t63, t86_s: null}, falling: {t63_s: 2, t86_s: 4}});
+      monitor.reset([tile('V', 'NORMAL')]);
+      monitor.answers['valves/V/trend'] =
+        trend({state: 'NORMAL', d0: 0.97, d: [1, 0.99]});
+      monitor.answers['valves/V/health'] = {
+        ...Object.fromEntries(counts.map((key) => [key, [null]])),
+        valve: 'V', step: 'day', t_ms: [kNowMs], channels: [], trends: [],
+        stroke_test: [1], exceeded: [['stroke_test']],
+        status: ['maintenance required'],
+        strokes: [stroke('01', 2, null),
+          stroke('20', 8.4, ['CV rising: T63 8.4 s after 2.0 s'])]};
+      const page = await openShared(browser, address, '#/valve/V');
+      const table = page.getByRole('region', {name: 'Stroke tests'});
+      await table.waitFor();
+
+      const rows = await table.getByRole('row').allInnerTexts();
+      assert.equal(rows.length, 3);
+      assert.match(rows[1], /11-20.*40 to 50 %.*8\.40 \/ 2.*– \/ 4.*T63/s);
+      assert.match(rows[2], /the first one with these levels/);
+      assert.match(await page.getByRole('region', {name: 'Counts'}).innerText(),
+          /Stroke test.*exceeded/s);
+      await close(page);
+    });
+
 test('words say how sure a name is; the number is a hint', async () => {
   const episode = '0000000000000001';
   const more = {episode, factor: 0.93, strength: 0.004};
@@ -325,11 +357,12 @@ test('what is judged in part only is said, with the reason', async () => {
 test('what ended before it had a name is not unlike any known fault',
     async () => {
       monitor.reset([], [alarm('0000000000000001', 'V', 'unknown',
-          {certainty: 'not yet', isa: 'RTN_UNACK', state: 'CLOSED'}),
+          {certainty: 'not yet', isa: 'RTN_UNACK', state: 'CLOSED',
+            name: 'Fault that ended before it had a name'}),
       alarm('0000000000000002', 'W', 'unknown', {certainty: 'not known'})]);
       const page = await openShared(browser, address, '#/alarms');
-      await page.locator('tr', {hasText: 'V'}).getByText('not yet known which')
-          .waitFor();
+      await page.locator('tr', {hasText: 'V'})
+          .getByText('that ended before it had a name').waitFor();
       await page.locator('tr', {hasText: 'W'})
           .getByText('unlike any known fault').waitFor();
       await close(page);
@@ -675,6 +708,26 @@ test('an interval without width is never shown', async () => {
   await close(page);
 });
 
+/** Nothing of `page` is cut, wider than the window, or too pale to be read. */
+async function checkReadable(page, where, colours = true) {
+  for (const scheme of colours ? ['light', 'dark'] : []) {
+    await setScheme(page, scheme);
+    const faults = await accessibilityFaults(page, scheme === 'dark');
+    assert.deepEqual(faults, [], `${where} ${scheme}`);
+  }
+  const cut = await page.locator('.tile-how, .tile-what, .tile-quality, .tag')
+      .evaluateAll((nodes) => nodes.filter((node) =>
+        node.scrollHeight > node.clientHeight + 3)
+          .map((node) => node.textContent));
+  assert.deepEqual(cut, [], where);
+  assert.ok(await page.evaluate(() =>
+    document.documentElement.scrollWidth <= innerWidth), where);
+  const wide = await page.locator('.table-box, dialog').evaluateAll((nodes) =>
+    nodes.filter((node) => node.scrollWidth > node.clientWidth)
+        .map((node) => node.textContent));
+  assert.deepEqual(wide, [], where);
+}
+
 test('every kind of tile can be read, at any size, light and dark',
     async () => {
       const episode = '0000000000000001';
@@ -703,24 +756,7 @@ test('every kind of tile can be read, at any size, light and dark',
           await page.goto(`${address}/${hash}`);
           await page.locator('main :is(.tile, tbody tr, .panel)').first()
               .waitFor();
-          for (const colorScheme of width === 1280 ? [] : ['light', 'dark']) {
-            await setScheme(page, colorScheme);
-            const faults = await accessibilityFaults(page,
-                colorScheme === 'dark');
-            assert.deepEqual(faults, [], `${hash} ${width} ${colorScheme}`);
-          }
-          const cut = await page.locator(
-              '.tile-how, .tile-what, .tile-quality, .tag')
-              .evaluateAll((nodes) => nodes.filter((node) =>
-                node.scrollHeight > node.clientHeight + 3)
-                  .map((node) => node.textContent));
-          assert.deepEqual(cut, [], `${hash} ${width}`);
-          assert.ok(await page.evaluate(() =>
-            document.documentElement.scrollWidth <= innerWidth), hash);
-          const wide = await page.locator('.table-box').evaluateAll((nodes) =>
-            nodes.filter((node) => node.scrollWidth > node.clientWidth)
-                .map((node) => node.textContent));
-          assert.deepEqual(wide, [], `${hash} ${width}`);
+          await checkReadable(page, `${hash} ${width}`, width !== 1280);
           // Nor may what stands on top take a second line.
           for (const part of width < 1000 ? [] :
             await page.locator('.top, .plant .controls').all()) {
@@ -737,6 +773,95 @@ test('every kind of tile can be read, at any size, light and dark',
                   .map((node) => node.textContent));
           assert.deepEqual(hidden, [], `${hash} ${width}`);
         }
+        await close(page);
+      }
+    });
+
+test('every other view and dialog can be read, at any size, light and dark',
+    async () => {
+      const row = alarm('0000000000000001', kLongId, 'f19|f6', {
+        certainty: 'one of', lowest: 0.4, highest: 0.6, worst_strength: 0.7,
+        discipline: 'mechanical|instrument', acked_by: 'anna', isa: 'ACKED',
+        acked_ms: kNowMs, isolated_ms: kNowMs + 60000, layer: 'physics',
+        check: kReport.worst[0].check});
+      const early = alarm('0000000000000002', 'V', 'unknown', {
+        certainty: 'not yet', state: 'CLOSED', isa: 'RTN_UNACK',
+        name: 'Fault that ended before it had a name'});
+      const shelf = {shelf_id: 1, until_ms: kNowMs + kDayMs, who: 'bo',
+        comment: 'overhaul of the whole line, ordered'};
+      const event = (kind, more) => ({kind, at_ms: kNowMs, faults: '',
+        strength: null, layer: null, reason: null, value: null, comment: null,
+        who: null, origin: null, ...more});
+      monitor.reset([tile(kLongId, 'ISOLATED', ['f19', 'f6'],
+          {monitor: 'host-a:1', episode: row.episode}),
+      tile('V', 'NOT_JUDGED', [], {quality: 'MONITOR_SILENT',
+        monitor: 'host-b:4711', monitor_silent_since_ms: kNowMs - kDayMs})],
+      [row, early, alarm('0000000000000003', 'W', 'f6', {shelved: shelf})]);
+      Object.assign(monitor.answers.status,
+          {write: true, user: 'anna', role: 'engineer'});
+      monitor.answers.history = {episodes: [row, early], more: true};
+      monitor.answers.statistics = {
+        per_day: [0, 3, 9].map((n) => ({episodes: n, alarm_s: 900 * n,
+          day: new Date(kNowMs - n * kDayMs).toISOString().slice(0, 10)})),
+        valves: [{valve: kLongId, episodes: 12, open: 1, alarm_s: 10800,
+          chattering: 3, standing: 1, last_ms: kNowMs}],
+        faults: [{fault: 'f19', name: 'n', episodes: 9, right: 2, wrong: 1},
+          {fault: 'unknown', name: 'Without a name', episodes: 3, right: 0,
+            wrong: 0}],
+        labelled: {true: 2, false: 1, none: 9}, most_in_10_min: 4,
+        gaps: [{from_ms: kNowMs - 60000, to_ms: kNowMs}]};
+      monitor.answers.worklist = {rows: [{...kReport.worst[0], valve_id: kLongId,
+        why: 'Plug worn (f6) for three days, and it grows by 2 % a day'}]};
+      monitor.answers[`episodes/${row.episode}`] = {episode: row,
+        model_hash: '0123456789abcdef', trace: {...trend({state: 'ISOLATED',
+          d0: 0, d: [1, 0.4]}), valve: kLongId},
+        events: [event('DETECTED'), event('ISOLATED', {faults: 'f19|f6',
+          strength: 0.5, layer: 'physics'}), event('ACK', {who: 'anna',
+          origin: 'console 127.0.0.1', comment: shelf.comment})],
+        look: {misfit: 1, faults: [{fault: 'f19', strength: 0.5, lowest: 0.4,
+          highest: 0.6, begins_ms: kNowMs, growing: true}]},
+        growth: [{fault: 'f19', strength: 0.5, lowest: 0.4, highest: 0.6,
+          rate: {value: 0.1, lowest: 0.05, highest: 0.2},
+          full_in_ms: {value: 5 * kDayMs, lowest: 3 * kDayMs,
+            highest: 9 * kDayMs}, at_ms: kNowMs}]};
+      const plant = {history_away: null, monitors: [
+        {monitor: 'host-a:1', host: 'host-a', software: '0', health: 'OK',
+          text: '', pair: 'leader', valves: 1, heard_ms: kNowMs, silent: false},
+        {monitor: 'host-b:4711', host: 'host-b', software: '0',
+          health: 'DEGRADED', text: 'the history does not respond',
+          pair: null, valves: 1, heard_ms: kNowMs - kDayMs, silent: true}]};
+      for (const [width, height] of [[1400, 900], [390, 800]]) {
+        const page = await openShared(browser, address, '#/',
+            {viewport: {width, height}});
+        for (const [hash, seen] of [['#/history', '.figures'],
+          [`#/episode/${row.episode}`, '.panel'], ['#/worklist', 'tbody tr']]) {
+          await page.goto(`${address}/${hash}`);
+          await page.locator(seen).first().waitFor();
+          await checkReadable(page, `${hash} ${width}`);
+          if (width === 390) continue;
+          await page.setViewportSize({width: 1280, height});
+          await checkReadable(page, `${hash} 1280`, false);
+          await page.setViewportSize({width, height});
+        }
+        await page.goto(`${address}/#/alarms`);
+        for (const name of [`Shelve ${kLongId}`, 'Label V', 'Keys']) {
+          if (name === 'Keys') await page.keyboard.press('?');
+          else await page.getByRole('button', {name, exact: true}).click();
+          const dialog = page.getByRole('dialog');
+          await dialog.waitFor();
+          await checkReadable(page, `${name} ${width}`, width === 390);
+          const box = await dialog.boundingBox();
+          assert.ok(box.x >= 0 && box.y >= 0 && box.x + box.width <= width &&
+            box.y + box.height <= height, name);
+          await page.keyboard.press('Escape');
+          await dialog.waitFor({state: 'detached'});
+        }
+        monitor.answers.status.plant = plant;
+        await page.goto(`${address}/#/`);
+        await page.reload();
+        await page.locator('.monitors tbody tr').first().waitFor();
+        await checkReadable(page, `plant ${width}`);
+        monitor.answers.status.plant = null;
         await close(page);
       }
     });

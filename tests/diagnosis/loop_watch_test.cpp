@@ -1,5 +1,6 @@
 #include "diagnosis/loop_watch.h"
 
+#include <cmath>
 #include <set>
 #include <string>
 
@@ -125,6 +126,118 @@ TEST_F(LoopWatchTest, StickyLoopsHaveAnEpisodeAndSoundOnesHaveNone) {
   }
   EXPECT_GE(sticky, 8);
   EXPECT_EQ(others, 0);
+}
+
+// A loop whose PV is a pressure in bar or a level in m, beside an F that only
+// the noise of a pump moves.
+class LoopWatchPvTest : public LoopWatchTest {
+ protected:
+  void FeedPv(const loop::Window& loop) {
+    for (std::size_t k = 0; k < loop.op.size(); ++k) {
+      Sample sample = At(seq_ + 1, 100.0 - loop.op[k],
+                         7.0 + 0.01 * static_cast<double>(k * k % 23));
+      sample.Set(Signal::kPv, 0.2 * loop.pv[k]);
+      sample.Set(Signal::kSp, 0.2 * loop.sp[k]);
+      Give(sample);
+    }
+  }
+};
+
+TEST_F(LoopWatchPvTest, AStickyPressureLoopIsFoundAndASoundOneIsNot) {
+  int sticky = 0;
+  for (std::uint64_t seed = 1; seed <= 8; ++seed) {
+    Again();
+    FeedPv(loop::Simulate(Sticky(), seed));
+    sticky += watch_.verdict().isolated == 1U ? 1 : 0;
+    Again();
+    FeedPv(loop::Simulate({.steps = true, .samples = 1100}, seed));
+    EXPECT_THAT(told_, IsEmpty()) << seed;
+    EXPECT_EQ(normal_, 1) << seed;
+  }
+  EXPECT_GE(sticky, 6);
+}
+
+// The integral of a valve lags as a play does, and PV cannot tell the two
+// apart: of a sound one nothing is said, and of a sticky one no more.
+TEST_F(LoopWatchPvTest, ALevelIsNeverCalledSticky) {
+  for (const bool known : {false, true}) {
+    for (const std::uint64_t seed : {1, 3, 14, 20, 27, 31}) {
+      for (const LoopState state : {LoopState::kHealthy, LoopState::kSticky}) {
+        Again();
+        watch_ = LoopWatch(0, Severities(), known);
+        FeedPv(loop::Simulate({.state = state,
+                               .level = true,
+                               .band = 3.0,
+                               .noise = 0.02,
+                               .steps = true,
+                               .samples = 1100},
+                              seed));
+        EXPECT_EQ(audits_, 4) << seed;
+        EXPECT_EQ(watch_.verdict().isolated & 1U, 0U) << seed;
+        EXPECT_TRUE(told_.empty() || state == LoopState::kSticky) << seed;
+      }
+    }
+  }
+}
+
+// With SP the error is known: a PV that keeps its distance does not answer,
+// although its readings differ.
+TEST_F(LoopWatchPvTest, AnOpThatWindsUpHasNoResponse) {
+  for (int k = 0; k < 1100; ++k) {
+    Sample sample = At(seq_ + 1, 50.0 + std::abs(k % 200 - 100) * 0.3, 5.0);
+    sample.Set(Signal::kPv, 3.1 + 0.001 * ((k * 37) % 29));
+    sample.Set(Signal::kSp, 3.6);
+    Give(sample);
+  }
+  EXPECT_THAT(Kinds(), ElementsAre(TransitionKind::kDetected,
+                                   TransitionKind::kIsolated));
+  EXPECT_EQ(watch_.verdict().isolated, 0b10U);
+}
+
+TEST_F(LoopWatchPvTest, PvWithItsSetPointIsPartOfTheEvidence) {
+  for (std::uint64_t k = 1; k <= 30; ++k) {
+    Sample sample = At(k, 50.0, 5.0);
+    sample.Set(Signal::kSp, 101325.2);  // Beside a PV alone in its unit.
+    if (k > 10) {
+      sample.Set(Signal::kPv, 101325.0 + 0.1 * static_cast<double>(k));
+    }
+    EXPECT_EQ(Give(sample).intake, Intake::kAccepted);
+  }
+  const std::vector<Sample> points = watch_.Points();
+  ASSERT_EQ(points.size(), 30U);
+  EXPECT_EQ(points.back().present, MaskOf(Signal::kCv) | MaskOf(Signal::kF) |
+                                       MaskOf(Signal::kPv) |
+                                       MaskOf(Signal::kSp));
+  EXPECT_EQ(points.back()[Signal::kPv], 101328.0);
+  EXPECT_EQ(points.back()[Signal::kSp], 101325.2);
+  EXPECT_TRUE(std::isnan(points.front()[Signal::kPv]));
+  EXPECT_TRUE(std::isnan(points.front()[Signal::kSp]));
+  // A loop without PV keeps no set point.
+  Sample plain = At(31, 50.0, 5.0);
+  plain.Set(Signal::kSp, 50.0);
+  EXPECT_FALSE(LoopWatch::Reduced(plain).Has(Signal::kSp));
+}
+
+// A PV alone is enough; one that is missing now and then is not.
+TEST_F(LoopWatchPvTest, WithoutFAndXThePvIsTheLoop) {
+  const auto feed = [&](bool gaps) {
+    const loop::Window loop = loop::Simulate(Sticky(), 2);
+    for (std::size_t k = 0; k < loop.op.size(); ++k) {
+      Sample sample = At(seq_ + 1, 100.0 - loop.op[k], 0.0);
+      sample.present = MaskOf(Signal::kCv);
+      if (!gaps || k % 50 != 0) {
+        sample.Set(Signal::kPv, loop.pv[k]);
+        sample.Set(Signal::kSp, loop.sp[k]);
+      }
+      Give(sample);
+    }
+  };
+  feed(false);
+  EXPECT_EQ(audits_, 4);
+  EXPECT_EQ(watch_.verdict().isolated, 1U);
+  Again();
+  feed(true);
+  EXPECT_EQ(audits_, 0);
 }
 
 // Windows of two hours, one each twenty minutes.

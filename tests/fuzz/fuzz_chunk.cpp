@@ -46,14 +46,15 @@ void PackAgain(const std::vector<StoredSample>& samples, ChunkCodec codec) {
 
 }  // namespace
 
-// Byte 0: codec, and whether the rest is to be deflated; 1, 2: count.
+// Byte 0: bits 0 and 2 are the codec, bit 1 says whether the rest is to be
+// deflated; 1, 2: count.
 extern "C" int LLVMFuzzerTestOneInput(const unsigned char* data,
                                       std::size_t size) {
   if (size < 3) {
     return 0;
   }
   Chunk chunk;
-  chunk.codec = static_cast<ChunkCodec>(data[0] & 1);
+  chunk.codec = static_cast<ChunkCodec>((data[0] & 1) | (data[0] & 4) >> 1);
   chunk.count = data[1] + 256U * (data[2] & 3U);
   const auto* rest = reinterpret_cast<const std::byte*>(data) + 3;
   chunk.bytes = (data[0] & 2) != 0

@@ -6,9 +6,9 @@
 
 namespace {
 
-template <typename Message>
+template <typename Message, int kVersion = 1>
 void Receive(const unsigned char* data, std::size_t size) {
-  using Codec = fdi::idl::Codec<Message>;
+  using Codec = fdi::idl::Codec<Message, kVersion>;
   fdi::idl::CheckedType<typename Codec::Type> type;
   typename Codec::Wire wire;
   Message message;
@@ -30,7 +30,7 @@ extern "C" int LLVMFuzzerTestOneInput(const unsigned char* data,
   if (size < 5) {
     return 0;
   }
-  switch (data[0] % 9) {
+  switch (data[0] % 10) {
     case 0:
       Receive<fdi::idl::ValveSampleMessage>(data + 1, size - 1);
       break;
@@ -54,6 +54,9 @@ extern "C" int LLVMFuzzerTestOneInput(const unsigned char* data,
       break;
     case 7:
       Receive<fdi::MonitorShare>(data + 1, size - 1);
+      break;
+    case 9:
+      Receive<fdi::idl::ValveSampleMessage, 2>(data + 1, size - 1);
       break;
     default:
       Receive<fdi::PairState>(data + 1, size - 1);

@@ -91,34 +91,44 @@ void WriteChunks() {
   for (std::uint64_t k = 0; k < samples.size(); ++k) {
     samples[k].sample = PlantSample(k, 0.1 * static_cast<double>(k % 7));
   }
-  for (const auto codec :
-       {fdi::storage::ChunkCodec::kPlain, fdi::storage::ChunkCodec::kColumns}) {
-    const auto chunk = fdi::storage::EncodeChunk(samples, codec);
-    const std::string head{static_cast<char>(codec),
-                           static_cast<char>(samples.size()), '\0'};
-    Write("chunk", "codec" + std::to_string(static_cast<int>(codec)),
-          head + Text(chunk.bytes));
+  for (const bool with_pv : {false, true}) {
+    if (with_pv) {
+      samples[7].sample.Set(fdi::Signal::kPv, 3.2);
+    }
+    for (const auto codec : {fdi::storage::ChunkCodec::kPlain,
+                             fdi::storage::ChunkCodec::kColumns}) {
+      const auto chunk = fdi::storage::EncodeChunk(samples, codec);
+      const int number = static_cast<int>(chunk.codec);
+      // Bit 1 says whether the rest is to be deflated.
+      const char kind = static_cast<char>((number & 1) | (number & 2) << 1);
+      Write("chunk", "codec" + std::to_string(number),
+            std::string{kind, static_cast<char>(samples.size()), '\0'} +
+                Text(chunk.bytes));
+    }
   }
 }
 
-template <typename Message>
+template <int kVersion = 1, typename Message>
 std::string MessageBytes(const Message& message) {
-  using Codec = fdi::idl::Codec<Message>;
+  using Codec = fdi::idl::Codec<Message, kVersion>;
   typename Codec::Type type;
   typename Codec::Wire wire;
   Codec::Encode(message, wire);
   return fdi::idl::Serialized(type, &wire);
 }
 
-template <typename Message>
+template <int kVersion = 1, typename Message>
 void WriteMessage(char kind, const Message& message) {
   Write("wire", std::string("kind") + std::to_string(kind),
-        kind + MessageBytes(message));
+        kind + MessageBytes<kVersion>(message));
 }
 
 void WriteMessages() {
   const fdi::ModelSet models = fdi::monitor::LinearModels();
-  WriteMessage<fdi::idl::ValveSampleMessage>(0, {"V1", PlantSample(7)});
+  WriteMessage(0, fdi::idl::ValveSampleMessage{"V1", PlantSample(7)});
+  fdi::Sample with_pv = PlantSample(7);
+  with_pv.Set(fdi::Signal::kPv, 3.2);
+  WriteMessage<2>(9, fdi::idl::ValveSampleMessage{"V1", with_pv});
   fdi::idl::DecisionMessage decision;
   decision.valve_id = "V1";
   decision.channel_count = static_cast<int>(models.channels.size());
@@ -135,8 +145,8 @@ void WriteMessages() {
   status.monitor = "host:1";
   status.counters = {{"received", 12}};
   WriteMessage(4, status);
-  WriteMessage<fdi::idl::DecisionBatchMessage>(
-      5, {"host:1", {decision, decision}});
+  WriteMessage(5,
+               fdi::idl::DecisionBatchMessage{"host:1", {decision, decision}});
   WriteMessage(6, fdi::OperatorAction{"host:1", fdi::OperatorActionKind::kAck,
                                       7, "", "", 8, "anna", "seen", "console"});
   WriteMessage(7, fdi::MonitorShare{"host:1", "plant", "FV-*", "hall-1"});
@@ -144,9 +154,8 @@ void WriteMessages() {
 }
 
 void WriteDatagrams() {
-  for (const auto& [name, message] :
-       fdi::idl::RtpsMessages(MessageBytes<fdi::idl::ValveSampleMessage>(
-           {"V1", PlantSample(7)}))) {
+  for (const auto& [name, message] : fdi::idl::RtpsMessages(
+           MessageBytes(fdi::idl::ValveSampleMessage{"V1", PlantSample(7)}))) {
     Write("rtps", name, message);
   }
 }

@@ -30,15 +30,16 @@ std::uint64_t Bits(double value) {
 }
 
 // Through the generated serializer, as on the wire.
-template <typename Message>
+template <int kVersion = 1, typename Message>
 Message RoundTrip(const Message& message) {
-  typename Codec<Message>::Wire out;
-  Codec<Message>::Encode(message, out);
-  CheckedType<typename Codec<Message>::Type> type;
-  typename Codec<Message>::Wire in;
+  using Codec = Codec<Message, kVersion>;
+  typename Codec::Wire out;
+  Codec::Encode(message, out);
+  CheckedType<typename Codec::Type> type;
+  typename Codec::Wire in;
   EXPECT_TRUE(Deserialize(type, Serialized(type, &out), &in));
   Message result;
-  EXPECT_TRUE(Codec<Message>::Decode(in, result));
+  EXPECT_TRUE(Codec::Decode(in, result));
   return result;
 }
 
@@ -49,7 +50,7 @@ ValveSampleMessage SomeSample() {
   sample.stamp_ns = -1;
   sample.source_id = 0xFFFF'FFFF'FFFF'FFFFU;
   sample.seq = 1U << 31U;
-  for (std::size_t i = 0; i < kSignalCount; ++i) {
+  for (std::size_t i = 0; i < kModelSignalCount; ++i) {
     sample.values[i] = kThird * static_cast<double>(i + 1);
     sample.quality[i] = static_cast<SignalQuality>(i % 3);
   }
@@ -63,11 +64,7 @@ ValveSampleMessage SomeSample() {
   return message;
 }
 
-TEST(CodecTest, SamplesArriveBitForBit) {
-  const ValveSampleMessage sent = SomeSample();
-
-  const ValveSampleMessage got = RoundTrip(sent);
-
+void ExpectSame(const ValveSampleMessage& got, const ValveSampleMessage& sent) {
   EXPECT_EQ(got.valve_id, sent.valve_id);
   EXPECT_EQ(got.sample.stamp_ns, sent.sample.stamp_ns);
   EXPECT_EQ(got.sample.source_id, sent.sample.source_id);
@@ -80,6 +77,72 @@ TEST(CodecTest, SamplesArriveBitForBit) {
   EXPECT_EQ(got.sample.mode, sent.sample.mode);
   EXPECT_EQ(got.sample.flow_unit, sent.sample.flow_unit);
   EXPECT_EQ(got.sample.epoch, sent.sample.epoch);
+}
+
+TEST(CodecTest, SamplesArriveBitForBit) {
+  const ValveSampleMessage sent = SomeSample();
+  ExpectSame(RoundTrip(sent), sent);
+  ExpectSame(RoundTrip<2>(sent), sent);
+}
+
+ValveSampleMessage SampleWithPv() {
+  ValveSampleMessage message = SomeSample();
+  message.sample.Set(Signal::kPv, -1e12 * kThird);
+  message.sample.quality[Index(Signal::kPv)] = SignalQuality::kUncertain;
+  return message;
+}
+
+TEST(CodecTest, APvGoesByVersion2Alone) {
+  const ValveSampleMessage sent = SampleWithPv();
+  ExpectSame(RoundTrip<2>(sent), sent);
+  v1::ValveSample first;
+  EXPECT_THAT([&] { Codec<ValveSampleMessage>::Encode(sent, first); },
+              ThrowsMessage<DataError>(HasSubstr("present is 1701")));
+  // An object that held a PV does not keep it.
+  ValveSampleMessage other = SampleWithPv();
+  Codec<ValveSampleMessage>::Encode(SomeSample(), first);
+  ASSERT_TRUE(Codec<ValveSampleMessage>::Decode(first, other));
+  ExpectSame(other, SomeSample());
+}
+
+TEST(CodecTest, WhatNobodyDefinedIsNotDecodedFromVersion2) {
+  using Codec = Codec<ValveSampleMessage, 2>;
+  v2::ValveSample wire;
+  Codec::Encode(SampleWithPv(), wire);
+  ValveSampleMessage message;
+  ASSERT_TRUE(Codec::Decode(wire, message));
+
+  v2::ValveSample wrong = wire;
+  wrong.quality()[10] = static_cast<v2::SignalQuality>(3);
+  EXPECT_FALSE(Codec::Decode(wrong, message));
+  wrong = wire;
+  wrong.mode(static_cast<v2::ValveMode>(5));
+  EXPECT_FALSE(Codec::Decode(wrong, message));
+  wrong = wire;
+  wrong.flow_unit(static_cast<v2::FlowUnit>(2));
+  EXPECT_FALSE(Codec::Decode(wrong, message));
+  wrong = wire;
+  wrong.present(1U << kSignalCount);
+  EXPECT_FALSE(Codec::Decode(wrong, message));
+  wrong = wire;
+  wrong.stamp_ns(kMaxStampNs + 1);
+  EXPECT_FALSE(Codec::Decode(wrong, message));
+  wrong = wire;
+  wrong.valve_id() = "";
+  EXPECT_FALSE(Codec::Decode(wrong, message));
+}
+
+// Signals of a model set are those of version 1.
+TEST(CodecTest, NoChannelOfAModelSetIsAPv) {
+  ModelSetInfoMessage info;
+  info.model_set = "m";
+  info.channels = {{"PV", Signal::kPv, -1.0, 1.0}};
+  v1::ModelSetInfo wire;
+  EXPECT_THROW(Codec<ModelSetInfoMessage>::Encode(info, wire), DataError);
+  info.channels.front().output = Signal::kPz;
+  EXPECT_NO_THROW(Codec<ModelSetInfoMessage>::Encode(info, wire));
+  wire.channels()[0].output(10);
+  EXPECT_FALSE(Codec<ModelSetInfoMessage>::Decode(wire, info));
 }
 
 DecisionMessage FullDecision() {
@@ -372,7 +435,7 @@ TEST(CodecTest, EnumeratorsNobodyDefinedAreNotDecoded) {
   wrong.flow_unit(static_cast<v1::FlowUnit>(2));
   EXPECT_FALSE(Codec<ValveSampleMessage>::Decode(wrong, message));
   wrong = wire;
-  wrong.present(1U << kSignalCount);
+  wrong.present(1U << kModelSignalCount);
   EXPECT_FALSE(Codec<ValveSampleMessage>::Decode(wrong, message));
 }
 
@@ -427,6 +490,10 @@ TEST(CodecTest, AMessageThatIsCutAnywhereIsRefused) {
   Codec<ValveSampleMessage>::Encode(SomeSample(), sample);
   CheckedType<v1::ValveSamplePubSubType> samples;
   expect_refused(samples, sample);
+  v2::ValveSample second;
+  Codec<ValveSampleMessage, 2>::Encode(SampleWithPv(), second);
+  CheckedType<v2::ValveSamplePubSubType> seconds;
+  expect_refused(seconds, second);
   v1::DecisionVector decision;
   Codec<DecisionMessage>::Encode(FullDecision(), decision);
   CheckedType<v1::DecisionVectorPubSubType> decisions;

@@ -175,6 +175,74 @@ TEST_F(DeliveryTest, AnEndedStreamIsSeenBehindItsLastSample) {
   EXPECT_EQ(subscriber.status().ended, 1U);
 }
 
+// A valve goes over to version 2 of the samples with its first PV.
+TEST_F(DeliveryTest, SamplesWithAndWithoutPvComeInOrderFromOnePublisher) {
+  constexpr std::uint64_t kSamples = 2000;
+  Participant here(domain_.Options(), log_.Sink());
+  Participant there(domain_.Options(), log_.Sink());
+  Subscriber<ValveSampleMessage> subscriber(here);
+  Publisher<ValveSampleMessage> publisher(there, {Profile::kLossless, 3});
+  ASSERT_TRUE(publisher.WaitForReaders(1, kPatience));
+  EXPECT_EQ(publisher.status().matched, 1);
+
+  std::jthread writer([&] {
+    for (std::uint64_t k = 0; k < kSamples; ++k) {
+      for (const std::string valve : {"never", "sometimes", "late"}) {
+        ValveSampleMessage message = SampleOf(valve, k);
+        if ((valve == "sometimes" && k % 3 != 0) ||
+            (valve == "late" && k > kSamples / 2)) {
+          message.sample.Set(Signal::kPv, static_cast<double>(k));
+        }
+        publisher.Write(message);
+      }
+    }
+    for (const std::string valve : {"never", "sometimes", "late"}) {
+      publisher.Dispose(SampleOf(valve, 0));
+    }
+  });
+  OrderCheck check;
+  std::map<std::string, std::uint64_t> pvs;
+  std::map<std::string, std::uint64_t> last_writer;
+  std::map<std::string, int> changes;  // Of the writer, the first included.
+  std::set<std::string> ended;
+  Handlers<ValveSampleMessage> handlers = check.AsHandlers();
+  handlers.on_message = [&, each = handlers.on_message](
+                            const ValveSampleMessage& message,
+                            const Reception& from) {
+    each(message, from);
+    std::uint64_t& last = last_writer[message.valve_id];
+    changes[message.valve_id] += last != from.writer_id ? 1 : 0;
+    last = from.writer_id;
+    if (message.sample.Has(Signal::kPv)) {
+      ++pvs[message.valve_id];
+      EXPECT_EQ(message.sample[Signal::kPv],
+                static_cast<double>(message.sample.seq));
+    }
+  };
+  handlers.on_ended = [&](const ValveSampleMessage& message,
+                          const Reception& from) {
+    if (from.writer_id == last_writer[message.valve_id]) {
+      EXPECT_EQ(check.next[message.valve_id], kSamples);
+      ended.insert(message.valve_id);
+    }
+  };
+  TakeUntil(subscriber, handlers, [&] { return ended.size() == 3; });
+
+  EXPECT_EQ(check.count, 3 * kSamples);
+  EXPECT_EQ(check.out_of_order, 0U);
+  EXPECT_EQ(pvs["sometimes"], 1333U);
+  EXPECT_EQ(pvs["late"], kSamples / 2 - 1);
+  EXPECT_EQ(pvs.count("never"), 0U);
+  // The order of two writers is not kept, so that a valve stays with one.
+  EXPECT_EQ(changes["never"], 1);
+  EXPECT_EQ(changes["sometimes"], 2);
+  EXPECT_EQ(changes["late"], 2);
+  EXPECT_EQ(subscriber.status().received, 3 * kSamples);
+  EXPECT_EQ(subscriber.status().lost, 0U);
+  EXPECT_EQ(subscriber.status().matched, 1);
+  EXPECT_EQ(publisher.status().written, 3 * kSamples);
+}
+
 TEST_F(DeliveryTest, AnEndedValveMayComeBack) {
   Participant here(domain_.Options(), log_.Sink());
   Participant there(domain_.Options(), log_.Sink());

@@ -1,5 +1,6 @@
 #include <cstdio>
 #include <fstream>
+#include <list>
 #include <string>
 
 #include <gmock/gmock.h>
@@ -17,12 +18,17 @@ class QosTest : public ::testing::Test {
  protected:
   ~QosTest() override { std::remove(path_.c_str()); }
 
-  // Options with a file that makes the named writer best effort.
-  DdsOptions WithBestEffortWriter() {
+  // Options with a file that makes the named writer best effort, and names the
+  // peers. A process uses one file.
+  DdsOptions WithFile() {
     std::ofstream(path_)
         << "<?xml version=\"1.0\"?>\n<profiles xmlns=\"http://"
            "www.eprosima.com/XMLSchemas/fastRTPS_Profiles\">"
-           "<data_writer profile_name=\"fdi_valve_sample_writer\"><qos>"
+           "<participant profile_name=\"fdi_participant\"><rtps><builtin>"
+           "<initialPeersList><locator><udpv4><address>127.0.0.1</address>"
+           "</udpv4></locator></initialPeersList></builtin></rtps>"
+           "</participant><data_writer "
+           "profile_name=\"fdi_valve_sample_writer\"><qos>"
            "<reliability><kind>BEST_EFFORT</kind></reliability></qos>"
            "</data_writer></profiles>";
     DdsOptions options = domain_.Options();
@@ -39,7 +45,7 @@ class QosTest : public ::testing::Test {
 
 TEST_F(QosTest, IncompatibleQosIsLoggedWithBothSides) {
   Participant here(domain_.Options(), log_here_.Sink());
-  Participant there(WithBestEffortWriter(), log_there_.Sink());
+  Participant there(WithFile(), log_there_.Sink());
   Subscriber<ValveSampleMessage> subscriber(here);
   Publisher<ValveSampleMessage> publisher(there);
 
@@ -51,6 +57,8 @@ TEST_F(QosTest, IncompatibleQosIsLoggedWithBothSides) {
       "qos_incompatible topic=fdi/v1/ValveSample policy=RELIABILITY "
       "offered_here=BEST_EFFORT requested_there=RELIABLE"))
       << log_there_.text();
+  EXPECT_TRUE(log_here_.WaitFor(
+      "qos_incompatible topic=fdi/v2/ValveSample policy=RELIABILITY "));
   EXPECT_EQ(subscriber.status().incompatible, 1U);
   EXPECT_EQ(publisher.status().incompatible, 1U);
   EXPECT_EQ(subscriber.status().matched, 0);
@@ -66,7 +74,7 @@ TEST_F(QosTest, AFileWithoutAnElementIsRefused) {
 // The library's default would be ten valves again.
 TEST_F(QosTest, AFileAboutReliabilityLeavesTheLimitsAlone) {
   Participant here(domain_.Options(), log_here_.Sink());
-  Participant there(WithBestEffortWriter(), log_there_.Sink());
+  Participant there(WithFile(), log_there_.Sink());
   Subscriber<ValveSampleMessage> subscriber(here, Profile::kBestEffort);
   Publisher<ValveSampleMessage> publisher(there);
   // Both ends have to know each other: what a best-effort writer sends before
@@ -85,8 +93,23 @@ TEST_F(QosTest, AFileAboutReliabilityLeavesTheLimitsAlone) {
   EXPECT_EQ(count, 50);
 }
 
+// Where peers are named, nobody announces itself by multicast. The library's
+// default would call four participants of a host.
+TEST_F(QosTest, PeersOfAFileAreCalledWhateverTheirNumber) {
+  const DdsOptions options = WithFile();
+  std::list<Participant> there;
+  std::list<Subscriber<MonitorStatusMessage>> subscribers;
+  for (int i = 0; i < 6; ++i) {
+    subscribers.emplace_back(there.emplace_back(options));
+  }
+  Participant here(options);
+  Publisher<MonitorStatusMessage> publisher(here);
+
+  EXPECT_TRUE(publisher.WaitForReaders(6, kPatience)) << publisher.matched();
+}
+
 TEST_F(QosTest, TwoParticipantsMayUseTheSameFile) {
-  const DdsOptions options = WithBestEffortWriter();
+  const DdsOptions options = WithFile();
   Participant here(options);
   EXPECT_NO_THROW(Participant there(options));
 }

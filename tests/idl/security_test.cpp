@@ -69,6 +69,69 @@ TEST_F(SecurityTest, WhoHasAKeyIsServed) {
   EXPECT_TRUE(log_.WaitFor("security_key_expires name=monitor days=9"));
 }
 
+// Keys of earlier versions permit version 1 alone.
+TEST_F(SecurityTest, AKeyWithoutTheRightToPvsServesWithoutThem) {
+  for (const std::string key : {"gateway", "monitor"}) {
+    SignAgain(Keys() / key / "permissions.p7s", Keys() / "ca.pem",
+              Keys() / "ca.key", [](std::string text) {
+                const std::string topic = "<topic>fdi/v2/ValveSample</topic>";
+                return text.erase(text.find(topic), topic.size());
+              });
+  }
+  MakeKey(Keys(), "new", Role::kMonitor, 10, false);
+  const std::uint64_t before = RefusedPermissions();
+  Participant monitor(With("monitor"), log_.Sink());
+  Participant gateway(With("gateway"), log_.Sink());
+  Participant other(With("new"));
+  Subscriber<ValveSampleMessage> old(monitor, Profile::kLossless);
+  Subscriber<ValveSampleMessage> fresh(other, Profile::kLossless);
+  Publisher<ValveSampleMessage> publisher(gateway, {Profile::kLossless});
+  ASSERT_TRUE(publisher.WaitForReaders(2, kPatience));
+  EXPECT_TRUE(log_.WaitFor("security_key_without_pv name=monitor"));
+  EXPECT_TRUE(log_.WaitFor("security_key_without_pv name=gateway"));
+  EXPECT_EQ(RefusedPermissions() - before, 2U);
+
+  ValveSampleMessage message = SampleOf("FV-101", 0);
+  message.sample.Set(Signal::kX, 40.0);
+  message.sample.Set(Signal::kSp, 3.2);
+  message.sample.Set(Signal::kPv, 3.1);
+  ASSERT_EQ(publisher.Write(message), WriteResult::kSent);
+  for (Subscriber<ValveSampleMessage>* each : {&old, &fresh}) {
+    SignalMask present = 0;
+    TakeUntil<ValveSampleMessage>(
+        *each,
+        {[&](const ValveSampleMessage& got, const Reception&) {
+           present = got.sample.present;
+         },
+         {}},
+        [&] { return present != 0; });
+    EXPECT_EQ(present, MaskOf(Signal::kX));
+  }
+}
+
+// The gateway's key is new, that of the monitor is not.
+TEST_F(SecurityTest, AMonitorThatReadsNoPvsGetsSamplesWithoutThem) {
+  SignAgain(Keys() / "monitor" / "permissions.p7s", Keys() / "ca.pem",
+            Keys() / "ca.key", [](std::string text) {
+              const std::string topic = "<topic>fdi/v2/ValveSample</topic>";
+              return text.erase(text.find(topic), topic.size());
+            });
+  Participant monitor(With("monitor"));
+  Participant gateway(With("gateway"), log_.Sink());
+  Subscriber<ValveSampleMessage> subscriber(monitor, Profile::kLossless);
+  Publisher<ValveSampleMessage> publisher(gateway, {Profile::kLossless});
+  ASSERT_TRUE(publisher.WaitForReaders(1, kPatience));
+  ValveSampleMessage message = SampleOf("FV-101", 0);
+  message.sample.Set(Signal::kPv, 3.1);
+  for (; message.sample.seq < 3; ++message.sample.seq) {
+    ASSERT_EQ(publisher.Write(message), WriteResult::kSent);
+  }
+  OrderCheck check;
+  TakeUntil(subscriber, check.AsHandlers(), [&] { return check.count == 3; });
+  EXPECT_EQ(check.out_of_order, 0U);
+  EXPECT_TRUE(log_.WaitFor("pv_unread topic=fdi/v2/ValveSample"));
+}
+
 TEST_F(SecurityTest, WhoHasNoKeyNeitherGetsNorGivesASample) {
   Participant monitor(With("monitor"), log_.Sink());
   Participant gateway(With("gateway"));
@@ -152,7 +215,8 @@ TEST_F(SecurityTest, EndpointsWithoutTheRightAreRefusedAndCounted) {
   Participant reader(With("reader"), log_.Sink());
   const Subscriber<FaultEvent> read(reader);
   EXPECT_TRUE(log_.WaitFor("permission_refused of=reader guid="));
-  EXPECT_EQ(RefusedPermissions() - before, 2U);
+  // The writers of both versions of the samples, and the reader.
+  EXPECT_EQ(RefusedPermissions() - before, 3U);
   EXPECT_EQ(samples.status().matched, 0);
   EXPECT_EQ(events.matched(), 0);
 }

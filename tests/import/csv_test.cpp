@@ -286,6 +286,39 @@ TEST(CsvTest, AValveMayLackSignalsIfTheCallerSaysSo) {
   EXPECT_THAT(Refusal("t_s,X_pct\n0,1", options), HasSubstr("column CV_pct"));
 }
 
+// Its own unit, and with it that of SP.
+TEST(CsvTest, APvNeedsNoPositionAndNoFlow) {
+  CsvOptions options;
+  options.required = MaskOf(Signal::kCv);
+  const CsvTable table = Read(
+      "t_s,CV_pct,pv,SP\n0,41,3.125,3.5\n1,42,,3.5\n2,43,-9e11,4", options);
+  EXPECT_EQ(table.header.signals,
+            MaskOf(Signal::kCv) | MaskOf(Signal::kPv) | MaskOf(Signal::kSp));
+  const auto& samples = table.runs.at(0).samples;
+  EXPECT_EQ(samples[0].sample[Signal::kPv], 3.125);
+  EXPECT_EQ(samples[0].sample[Signal::kSp], 3.5);
+  // Nobody knows the unit of a set point alone.
+  EXPECT_EQ(samples[1].sample.present, MaskOf(Signal::kCv));
+  EXPECT_EQ(samples[2].sample[Signal::kPv], -9e11);
+  // Without PV, SP is a name of somebody else's.
+  EXPECT_EQ(Read("t_s,CV_pct,X_pct,SP\n0,1,2,3\n1,1,2,3", options)
+                .header.ignored_columns,
+            std::vector<std::string>{"SP"});
+}
+
+TEST(CsvTest, AMapNamesThePvOrThereIsNone) {
+  CsvOptions options;
+  options.required = MaskOf(Signal::kCv);
+  options.map.columns = {{"OP", Signal::kCv}, {"F", Signal::kF}};
+  options.map.flow_unit = FlowUnit::kM3PerHour;
+  const char* text = "t_s,OP,F,PV\n0,1,2,3\n1,1,2,3";
+  EXPECT_EQ(Read(text, options).header.ignored_columns,
+            std::vector<std::string>{"PV"});
+  options.map.columns = {{"OP", Signal::kCv}, {"PV", Signal::kPv, 10.0}};
+  EXPECT_EQ(Read(text, options).runs.at(0).samples[0].sample[Signal::kPv],
+            30.0);
+}
+
 TEST(CsvTest, LineByLineReaderAnswersWithEachRow) {
   CsvReader reader({});
   EXPECT_FALSE(reader.TakeLine(kHeader));
@@ -342,7 +375,9 @@ TEST(CsvTest, RunWithMissingReadingsIsReadBackBitForBit) {
     s.seq = k;
     for (std::size_t i = 0; i < kSignalCount; ++i) {
       const auto signal = static_cast<Signal>(i);
-      if (signal != Signal::kPz && (k + i) % 3 != 0) {
+      // A set point is there with its PV.
+      const std::size_t phase = signal == Signal::kSp ? Index(Signal::kPv) : i;
+      if (signal != Signal::kPz && (k + phase) % 3 != 0) {
         s.Set(signal, 0.1 * static_cast<double>(k + i));
       }
     }

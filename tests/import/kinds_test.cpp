@@ -1278,5 +1278,41 @@ TEST(KindsTest, AGzipThatUnpacksToTooMuchIsRefused) {
   }
 }
 
+// A program that needs more memory for a row takes fewer from a gzip.
+TEST(KindsTest, AGzipHasAtMostTheRowsThatAProgramTakes) {
+  const storage::TemporaryDirectory directory;
+  const std::string text = "t_s,CV_pct,X_pct\n0,1,2\n1,2,3\n2,3,4\n";
+  const auto packed = directory.path() / "packed.csv.gz";
+  gzFile file = gzopen(packed.c_str(), "wb9");
+  gzwrite(file, text.data(), static_cast<unsigned>(text.size()));
+  gzclose(file);
+  CsvOptions options{.required = MaskOf(Signal::kCv), .max_packed_rows = 3};
+  EXPECT_EQ(ReadCsvFile(packed, options).runs[0].samples.size(), 3U);
+  options.max_packed_rows = 2;
+  try {
+    ReadCsvFile(packed, options);
+    FAIL() << "not refused";
+  } catch (const DataError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("has more than 2 rows, which a gzip"));
+  }
+  EXPECT_EQ(ReadCsv(text, options).runs[0].samples.size(), 3U);
+}
+
+// Whoever takes the samples one by one does not have them twice.
+TEST(KindsTest, SamplesThatAreTakenAreInNoRun) {
+  std::vector<double> taken;
+  const CsvTable table =
+      ReadCsv("t_s,CV_pct,X_pct\n0,1,2\n1,2,3\n5,3,4\n6,3,5\n",
+              {.required = MaskOf(Signal::kCv),
+               .split_gaps = true,
+               .take = [&taken](const LabelledSample& labelled) {
+                 taken.push_back(labelled.sample[Signal::kX]);
+               }});
+  EXPECT_EQ(taken, (std::vector<double>{2, 3, 4, 5}));
+  ASSERT_EQ(table.runs.size(), 2U);
+  EXPECT_TRUE(table.runs[0].samples.empty());
+  EXPECT_TRUE(table.runs[1].samples.empty());
+}
+
 }  // namespace
 }  // namespace fdi::importer

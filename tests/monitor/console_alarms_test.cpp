@@ -44,6 +44,7 @@ TEST_F(AlarmBookTest, TellsWhatChangesFromTheFirstLookOn) {
   ASSERT_EQ(news.size(), 1U);
   EXPECT_EQ(news[0]["valve"], "NEW");
   EXPECT_EQ(news[0]["isa"], "UNACK");
+  EXPECT_EQ(news[0]["name"], "Fault without a name yet");
   EXPECT_TRUE(book_.Refresh(kDetected).empty());
   const auto valves = book_.ByValve();
   EXPECT_EQ(valves->at("OLD").since_ns, kDetected);

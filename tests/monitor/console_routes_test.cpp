@@ -72,6 +72,21 @@ TEST_F(ConsoleRoutesTest, ValvesAndTrendsOfAnyId) {
   EXPECT_EQ(Get("/api/v1/status")["model_sets"][0]["T"], 0.7);
 }
 
+TEST_F(ConsoleRoutesTest, APvAndItsSetPointHaveSevenDigitsInAnyUnit) {
+  Start();
+  const auto models = monitor::SharedLinearModels();
+  Verdict verdict;
+  verdict.quality = Quality::kLive;
+  Sample sample = monitor::PlantSample(0);
+  sample.Set(Signal::kPv, 1234567.891);
+  sample.Set(Signal::kSp, 0.000123456789);
+  console_->live().OnVerdict("V1", sample,
+                             {verdict, models.get(), false, false});
+  const Json trend = Get("/api/v1/valves/V1/trend?seconds=9");
+  EXPECT_EQ(trend["pv"], Json::array({1234568.0}));
+  EXPECT_EQ(trend["sp"], Json::array({0.0001234568}));
+}
+
 TEST_F(ConsoleRoutesTest, AValveThatIsNotJudgedIsNotCalledNormal) {
   Start();
   const auto models = monitor::SharedLinearModels();

@@ -3,6 +3,7 @@
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
+#include <cstddef>
 #include <functional>
 #include <map>
 #include <mutex>
@@ -164,7 +165,7 @@ class FakeHistory : public HistorySink {
       gaps.push_back(gap);
     });
   }
-  void CommitCheckpoint(const Checkpoint& checkpoint) override {
+  std::size_t CommitCheckpoint(const Checkpoint& checkpoint) override {
     notice.Apply([&] {
       FailIfBroken();
       if (checkpoint_poisoned) {
@@ -173,6 +174,7 @@ class FakeHistory : public HistorySink {
       checkpoint_sum = Merged(std::move(checkpoint_sum), checkpoint);
       ++checkpoints;
     });
+    return 0;
   }
   void MarkSent(const FaultEvent& /*event*/) override {
     notice.Apply([&] {

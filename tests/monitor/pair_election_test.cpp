@@ -3,6 +3,7 @@
 #include <memory>
 #include <optional>
 #include <set>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -28,12 +29,12 @@ class PairElectionTest : public testing::Test {
     int judged{0};
   };
 
-  void Add(int rank, int judged = 10) {
+  void Add(int rank, int judged = 10, const std::string& name = {}) {
     PairState self;
     self.pair = "p";
     self.rank = rank;
     self.instance = 100 + members_.size();
-    self.monitor = "m" + std::to_string(members_.size());
+    self.monitor = name.empty() ? "m" + std::to_string(members_.size()) : name;
     Member& member = members_.emplace_back();
     member.judged = judged;
     member.election =
@@ -216,6 +217,19 @@ TEST_F(PairElectionTest, TheSameRankTwiceIsToldAndOneOfThemLeads) {
   EXPECT_EQ(Leaders().size(), 1U);
   EXPECT_EQ(members_[0].election->same_rank(), "m1");
   EXPECT_EQ(members_[1].election->same_rank(), "m0");
+}
+
+// Containers of one host name, in which every monitor is HOST:1.
+TEST_F(PairElectionTest, MonitorsOfOneNameAreTwo) {
+  Add(1, 10, "host:1");
+  Add(2, 10, "host:1");
+  Pass(milliseconds(2000));
+  EXPECT_EQ(Leaders(), Who{0});
+  EXPECT_EQ(members_[0].election->others(), 1);
+  EXPECT_EQ(members_[1].election->others(), 1);
+  members_[0].runs = false;
+  Pass(milliseconds(1000));
+  EXPECT_EQ(Leaders(), Who{1});
 }
 
 TEST_F(PairElectionTest, WordsOfAnotherPairDoNotCount) {

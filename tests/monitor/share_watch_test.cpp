@@ -1,6 +1,13 @@
 #include "monitor/bus/share_watch.h"
 
+#include <algorithm>
+#include <array>
+#include <string>
+
 #include <gtest/gtest.h>
+#include <sched.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include "base/error.h"
 #include "diagnosis/records/partitions.h"
@@ -42,6 +49,47 @@ TEST(FindContestedTest, OnlyWherePartitionsOverlap) {
   EXPECT_TRUE(contested("hall-1", "hall-?"));
   EXPECT_FALSE(contested("hall-1", "hall-2"));
   EXPECT_FALSE(contested("", "hall-1"));
+}
+
+// NewMonitorName() in a pid namespace of its own, where it is process 1; empty
+// where namespaces are not permitted.
+std::string NameInAContainer() {
+  std::array<int, 2> ends{};
+  if (pipe(ends.data()) != 0) {
+    return {};
+  }
+  const pid_t child = fork();
+  if (child == 0) {
+    if (unshare(CLONE_NEWPID) != 0 &&
+        unshare(CLONE_NEWUSER | CLONE_NEWPID) != 0) {
+      _exit(0);
+    }
+    const pid_t first = fork();
+    if (first == 0) {
+      const std::string name = NewMonitorName();
+      _exit(write(ends[1], name.data(), name.size()) < 0 ? 1 : 0);
+    }
+    waitpid(first, nullptr, 0);
+    _exit(0);
+  }
+  close(ends[1]);
+  std::array<char, 128> name{};
+  const ssize_t length = read(ends[0], name.data(), name.size());
+  close(ends[0]);
+  waitpid(child, nullptr, 0);
+  return {name.data(), static_cast<std::size_t>(std::max<ssize_t>(length, 0))};
+}
+
+TEST(MonitorNameTest, InContainersOfOneHostNameItIsUnique) {
+  const std::string first = NameInAContainer();
+  if (first.empty()) {
+    GTEST_SKIP() << "no pid namespaces here";
+  }
+  const std::string second = NameInAContainer();
+
+  EXPECT_NE(first.find(":1-"), std::string::npos) << first;
+  EXPECT_NE(first, second);
+  EXPECT_EQ(Contested({first, "", "V*", ""}, {second, "", "V*", ""}), 2U);
 }
 
 // Whatever others call themselves, the status goes out.

@@ -164,6 +164,18 @@ TEST_F(FleetReportTest, WhatIsNotJudgedIsListedWithItsReason) {
   EXPECT_EQ(unjudged[3]["reason"], "PV is constant");
 }
 
+// The time judged is stored once a minute.
+TEST_F(FleetReportTest,
+       WhatIsJudgedNowOrHasAnEpisodeIsWatchedFromTheBeginning) {
+  RecordEpisode(writer_, 0b100, "A");
+  query_.judged_now = {"B"};
+  query_.loops = {{"C"}};
+  const Json json = Document();
+  EXPECT_EQ(json["coverage"]["named_faults"], 2);
+  ASSERT_EQ(json["unjudged"].size(), 1u);
+  EXPECT_EQ(json["unjudged"][0]["valve_id"], "C");
+}
+
 TEST_F(FleetReportTest, ChangesAreThoseSinceTheLastDocument) {
   RecordEpisode(writer_, 0b100, "A");
   Judge("A", 20);
@@ -177,14 +189,14 @@ TEST_F(FleetReportTest, ChangesAreThoseSinceTheLastDocument) {
   const Json changes = Document()["changes"];
   EXPECT_EQ(changes["last_utc"], (*query_.last)["made_utc"]);
   EXPECT_EQ(changes["coverage"]["loops"], 1);
-  ASSERT_EQ(changes["loops"].size(), 4u);
+  ASSERT_EQ(changes["loops"].size(), 3u);
   EXPECT_EQ(changes["loops"][0]["valve_id"], "A");
   EXPECT_EQ(changes["loops"][0]["change"], "gone");
   EXPECT_EQ(changes["loops"][0]["before"], "Flow transmitter wrong, high");
   EXPECT_EQ(changes["loops"][1]["valve_id"], "B");
   EXPECT_EQ(changes["loops"][1]["change"], "new");
-  EXPECT_EQ(changes["loops"][3]["valve_id"], "D");
-  EXPECT_EQ(changes["loops"][3]["change"], "new and not judged");
+  EXPECT_EQ(changes["loops"][2]["valve_id"], "D");
+  EXPECT_EQ(changes["loops"][2]["change"], "new and not judged");
 
   query_.last = Document();
   query_.loops.clear();

@@ -68,16 +68,15 @@ TEST(WorkListTest, WeightIsSeverityConfidenceUrgencyAndRepetition) {
 }
 
 TEST(WorkListTest, TrendsWeighTheMoreTheNearerTheirLimit) {
-  using Answer = HealthForecast::Answer;
   LimitTrend reason;
-  reason.forecast.answer = Answer::kTime;
+  reason.forecast.answer = HealthForecast::Answer::kTime;
   reason.forecast.time = TimeToLimit{45.0, 30.0, 60.0};
   EXPECT_DOUBLE_EQ(WeightOf(reason, Options()), 3.0);
   reason.forecast.time->days = 400.0;
   EXPECT_DOUBLE_EQ(WeightOf(reason, Options()), 0.0);
-  reason.forecast.answer = Answer::kReached;
+  reason.forecast.answer = HealthForecast::Answer::kReached;
   EXPECT_DOUBLE_EQ(WeightOf(reason, Options()), 4.0);
-  reason.forecast.answer = Answer::kNoTrend;
+  reason.forecast.answer = HealthForecast::Answer::kNoTrend;
   EXPECT_DOUBLE_EQ(WeightOf(reason, Options()), 0.0);
 }
 
@@ -166,12 +165,13 @@ TEST_F(ReadWorkTest, FalseAlarmsAreNoWorkAndCostTrust) {
 }
 
 TEST_F(ReadWorkTest, WhereOnlyTheDataEndedTheFaultStands) {
-  using Kind = TransitionKind;
   const auto none = EndReason::kNone;
-  writer_.Record(Event(Kind::kDetected, 0, 0, 0.3, none, "V4"), kDetected);
-  writer_.Record(Event(Kind::kIsolated, 20, 4, 0.8, none, "V4"), kDetected);
+  writer_.Record(Event(TransitionKind::kDetected, 0, 0, 0.3, none, "V4"),
+                 kDetected);
+  writer_.Record(Event(TransitionKind::kIsolated, 20, 4, 0.8, none, "V4"),
+                 kDetected);
   writer_.Record(
-      Event(Kind::kClosed, 60, 4, 0.8, EndReason::kStreamEnded, "V4"),
+      Event(TransitionKind::kClosed, 60, 4, 0.8, EndReason::kStreamEnded, "V4"),
       kDetected);
   query_.valve_glob = "V4";
 
@@ -249,6 +249,42 @@ TEST_F(ReadWorkTest, AFigureBeyondItsLimitIsAReason) {
   query_.discipline = "mechanical";
   EXPECT_EQ(Read().size(), 1u);
   query_.discipline = "air";
+  EXPECT_TRUE(Read().empty());
+}
+
+TEST_F(ReadWorkTest, AStrokeTestThatIsWorseThanTheLastIsAReason) {
+  HealthHour hour;
+  hour.valve_id = "V9";
+  hour.hour = kDetected / (kDay / 24);
+  StrokeTest test;
+  test.stroke.cv_low = 40.0;
+  test.stroke.cv_high = 50.0;
+  test.stroke.rising.t63_s = 2.0;
+  Checkpoint checkpoint;
+  const auto store = [&](int day, double t63_s) {
+    test.start_ns = kDetected + day * kDay;
+    test.stroke.falling.t63_s = t63_s;
+    checkpoint.health = {hour};
+    checkpoint.health[0].hour += 24 * day;
+    checkpoint.health[0].AddStroke(test);
+    writer_.CommitCheckpoint(checkpoint);
+  };
+  store(0, 2.0);
+  store(1, 4.0);
+  query_.valve_glob = "V9";
+  query_.options.now_ns = kDetected + 31 * kDay;
+
+  const auto rows = Read();
+
+  ASSERT_EQ(rows.size(), 1u);
+  EXPECT_THAT(rows[0].why,
+              testing::MatchesRegex(
+                  "Stroke test worse than the last one \\(....-..-..\\): CV "
+                  "falling: T63 4.0 s after 2.0 s"));
+  EXPECT_DOUBLE_EQ(rows[0].score, 0.5);  // Low, a month ago.
+  EXPECT_EQ(WorkListReport(rows).document["rows"][0]["namur"],
+            "maintenance required");
+  store(2, 4.1);  // As bad as before: that is known.
   EXPECT_TRUE(Read().empty());
 }
 

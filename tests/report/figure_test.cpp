@@ -275,6 +275,22 @@ TEST_F(EpisodeFigureTest, HasTheMarksOfTheEpisodeAndTheGapsOfTheValve) {
   EXPECT_THAT(figure.footnote, HasSubstr("thresholds are not shown"));
 }
 
+// The monitor was down for 5 s, and its successor settled for 14 s more.
+TEST_F(EpisodeFigureTest, WhatIsMissingIsGreyUntilTheNextSample) {
+  EpisodeEvidence evidence = Evidence();
+  std::erase_if(evidence.trace, [](const TracePoint& point) {
+    return point.sample.stamp_ns > kDetected + 40 * kSecond &&
+           point.sample.stamp_ns < kDetected + 60 * kSecond;
+  });
+
+  const Figure figure = EpisodeFigure(evidence);
+
+  ASSERT_EQ(figure.bands.size(), 1U);
+  EXPECT_EQ(figure.bands[0].text, "monitor_down");
+  EXPECT_NEAR(figure.bands[0].from, 40.0, 1e-9);
+  EXPECT_NEAR(figure.bands[0].to, 60.0, 1e-9);
+}
+
 TEST_F(EpisodeFigureTest, ThresholdsAreThoseOfTheSetThatGaveTheAnswer) {
   EpisodeEvidence evidence = Evidence();
   models_.channels[1].lower_threshold = -2.5;

@@ -219,7 +219,7 @@ TEST(ValveIdentificationTest, LeavesAStatedValueAloneThatRunsToABound) {
   options.least_gain = 0.0;
   options.identified_sd = 1.0;
   const ValveFit fit = FitValve({Recording(truth, 400, 3)}, nominal, options);
-  const FittedParameter& gain = Named(fit, "positioner.gain");
+  const FittedParameter gain = Named(fit, "positioner.gain");
   EXPECT_FALSE(gain.identified);
   EXPECT_EQ(gain.value, gain.nominal);
 }

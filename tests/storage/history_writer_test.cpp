@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 
 #include "base/error.h"
+#include "storage/history/certainty.h"
 #include "tests/storage/history_fixture.h"
 
 namespace fdi::storage {
@@ -63,6 +64,35 @@ TEST_F(HistoryWriterTest, ViewHasTheNamesOfTheMonitorThatStartedLast) {
             "Travel blocked or Flow wrong");
   EXPECT_EQ(HistoryReader(path_).Show("last").fault_name,
             "Travel blocked or Flow wrong");
+}
+
+TEST_F(HistoryWriterTest, WhatEndedBeforeItHadANameIsNotUnlikeAnyFault) {
+  HistoryWriter writer(path_);
+  writer.BeginSession(kDetected, "test", "", {{"unknown", "Unlike any"}});
+  const auto name_of = [&](const char* valve, Unknown why, EndReason reason) {
+    FaultEvent event = Event(Kind::kDetected, 0);
+    event.valve_id = valve;
+    event.episode_id += static_cast<std::uint64_t>(valve[0]);
+    event.transition.unknown = why;
+    writer.Record(event, kDetected);
+    event.transition.kind = Kind::kClosed;
+    event.transition.reason = reason;
+    writer.Record(event, kDetected);
+    const Episode last =
+        HistoryReader(path_).Show(EpisodeIdText(event.episode_id));
+    if (why == Unknown::kTooEarly) {
+      EXPECT_EQ(last.fault_name, NoNameText(last));
+    } else {
+      EXPECT_EQ(NoNameText(last), "");
+    }
+    return last.fault_name.value_or("");
+  };
+  EXPECT_EQ(name_of("A", Unknown::kTooEarly, EndReason::kCleared),
+            "Fault that ended before it had a name");
+  EXPECT_EQ(name_of("B", Unknown::kTooEarly, EndReason::kStaleTimeout),
+            "Fault without a name yet");
+  EXPECT_EQ(name_of("C", Unknown::kOutsideKnown, EndReason::kCleared),
+            "Unlike any");
 }
 
 TEST_F(HistoryWriterTest, ViewHasTheCommentOfTheAcknowledgementThatCounts) {

@@ -165,6 +165,29 @@ class RunRetentionTest : public testing::Test {
   const std::filesystem::path file_{directory_.path() / "runs.db"};
 };
 
+// What a publisher stamps 1970 or 2049 is as old as its arrival, which is the
+// time at which this test runs.
+TEST_F(RunRetentionTest, AgeIsThatOfTheArrivalWhereAClockWasWrong) {
+  RunRecorder recorder(file_);
+  const auto now_day = static_cast<int>((UtcNow() - kStart) / kDay);
+  constexpr int kYears = 20 * 365;
+  for (const int off : {-kYears, kYears}) {
+    const auto run = recorder.Begin(RunOn(now_day + off));
+    Append(recorder, run, now_day + off, 10);
+    recorder.End(run);
+  }
+  recorder.Close();
+  const auto deleted = [this](std::int64_t before_ns) {
+    RetentionLimits limits;
+    limits.before_ns = before_ns;
+    limits.dry_run = true;
+    return PruneRuns(file_, limits).deleted;
+  };
+
+  EXPECT_EQ(deleted(UtcNow() - kDay), 0);
+  EXPECT_EQ(deleted(UtcNow() + kDay), 2);
+}
+
 // Of four recorded days one bears a label, and one is being recorded.
 TEST_F(RunRetentionTest, TheOldestRecordedRunsGoUntilTheSizeFits) {
   RunRecorder recorder(file_);

@@ -475,7 +475,7 @@ TEST_F(ShipTest, RefusalsHaveAReasonAndCode3) {
   EXPECT_EQ(Store("history list --from '" + Url("screen") + "'").code, 0);
   owner.Run("UPDATE fdi.plant SET version = version + 1");
   refused(Ship("a"),
-          "schema fdi has version 7, this program needs 6: update "
+          "schema fdi has version 8, this program needs 7: update "
           "this program");
   refused(Store("ship --data " + Folder("a").string() +
                 " --to 'postgresql://x:secret@/plant?host=/nowhere'"),
@@ -592,6 +592,14 @@ TEST_F(ShipTest, RetentionOfBothSides) {
       "WHERE label IS NOT NULL");
   EXPECT_EQ(there(kDetected - kSecond), Pair(0, 2));
   EXPECT_EQ(there(*limits.before_ns), Pair(1, 2)) << "by its arrival";
+
+  plant.Run(
+      "INSERT INTO fdi.monitor_session (monitor_id, session_id, start_ns, "
+      "alive_ns, software) SELECT monitor_id, 1, 1, 1, '' FROM fdi.monitor");
+  const Outcome years_ahead =
+      Store("ship --prune --history-age 1s --to '" + Url() + "'");
+  EXPECT_EQ(years_ahead.code, 3);
+  EXPECT_THAT(years_ahead.err, HasSubstr("--trust-clock"));
 }
 
 // The verbs say of the plant what they say of the history.

@@ -119,11 +119,11 @@ if [ -n "$faketime" ]; then
   publish FV-1 --speed 50 --set excitation.amplitude_pct=12 \
     --set excitation.period_s=60 --fault f19:abrupt@60:strength=0.5:until=160
   store() { "$bin/fdi-store" --data "$out/clock" "$@"; }
-  closed() { store history list --state closed | grep -q FV-1; }
+  closed() { store history list --state closed | grep >/dev/null FV-1; }
   await 30 closed || fail "there is no episode"
   store history shelve FV-1 --for 8h --by anna >/dev/null
   for offset in -3600s -2min +3600s; do
-    at $offset "$bin/fdi-store" --data "$out/clock" history shelf | grep -q FV-1 ||
+    at $offset "$bin/fdi-store" --data "$out/clock" history shelf | grep >/dev/null FV-1 ||
       fail "the shelf is lifted by a clock at $offset"
   done
   store history ack last --by anna >/dev/null

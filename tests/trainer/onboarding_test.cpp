@@ -17,6 +17,7 @@
 #include "import/csv.h"
 #include "import/sniff.h"
 #include "import/tag_map.h"
+#include "simulator/random.h"
 #include "tests/storage/temporary_directory.h"
 #include "trainer/onboarding/record_checks.h"
 #include "trainer/onboarding/record_verdict.h"
@@ -339,6 +340,32 @@ TEST(RecordChecksTest, SimulationHasToBeBetterThanNone) {
   } catch (const DataError& error) {
     EXPECT_THAT(error.what(), testing::HasSubstr("type ends at 2 t/h"));
   }
+}
+
+// A command that moves within a second, read each ten.
+TEST(RecordChecksTest, APositionTellsTheFlowWhereASlowCommandDoesNot) {
+  TrainingRun run = RunOf({"r", SimulateHealthy(Lublin(), 900.0, 3)});
+  run.period_s = 10.0;
+  simulator::NormalSource position(5, 1);
+  simulator::NormalSource command(5, 2);
+  for (LabelledSample& labelled : run.samples) {
+    const double x = 60.0 + 4.0 * position();
+    labelled.sample.Set(Signal::kX, x);
+    labelled.sample.Set(Signal::kCv, 60.0 + 0.3 * (x - 60.0) + 5.0 * command());
+    labelled.sample.Set(Signal::kF, 20.0 - 0.5 * (x - 60.0));
+  }
+  const auto reason = [&] {
+    try {
+      CheckFit({run}, {5.0, 5.0, 0.0, 0.0}, {}, 40.0);
+    } catch (const DataError& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  EXPECT_THAT(reason(), testing::HasSubstr("map the column of the position as "
+                                           "[signal.CV]"));
+  run.period_s = 1.0;
+  EXPECT_THAT(reason(), testing::HasSubstr("unit or sense"));
 }
 
 TEST(RecordChecksTest, AFlowThatMovesWithoutTheCommandIsNotRefused) {

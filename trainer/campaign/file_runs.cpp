@@ -70,6 +70,27 @@ storage::RunSelector SplitStretch(const std::string& text) {
   return selector;
 }
 
+storage::StoredRun EmptyRunOf(const importer::CsvTable& table,
+                              storage::RunSelector selector) {
+  storage::StoredRun run;
+  run.selector = std::move(selector);
+  const SampleSeries& content = table.runs.front();
+  run.info.id = run.selector.id;
+  run.info.run.start_ns = table.start_ns;
+  run.info.run.origin = storage::RunOrigin::kImported;
+  run.info.run.period_s = content.period_s;
+  run.info.run.flow_unit = content.flow_unit;
+  run.info.signals = content.signals;
+  run.info.has_truth = content.has_truth;
+  return run;
+}
+
+bool IsSelected(const storage::StoredRun& run, const Sample& sample) {
+  const double t_s =
+      static_cast<double>(sample.stamp_ns - run.info.run.start_ns) * 1e-9;
+  return t_s >= run.selector.from_s && t_s < run.selector.to_s;
+}
+
 }  // namespace
 
 std::vector<path> MatchingFiles(const std::string& pattern,
@@ -99,27 +120,13 @@ std::vector<path> MatchingFiles(const std::string& pattern,
 
 storage::StoredRun RunOf(importer::CsvTable table,
                          storage::RunSelector selector) {
-  storage::StoredRun run;
-  run.selector = std::move(selector);
-  const SampleSeries& content = table.runs.front();
-  run.info.id = run.selector.id;
-  run.info.run.start_ns = table.start_ns;
-  run.info.run.origin = storage::RunOrigin::kImported;
-  run.info.run.period_s = content.period_s;
-  run.info.run.flow_unit = content.flow_unit;
-  run.info.signals = content.signals;
-  run.info.has_truth = content.has_truth;
+  storage::StoredRun run = EmptyRunOf(table, std::move(selector));
   for (SampleSeries& part : table.runs) {
     // Freed as soon as it is copied.
     const std::vector<LabelledSample> samples = std::move(part.samples);
     for (const LabelledSample& labelled : samples) {
-      const double t_s =
-          static_cast<double>(labelled.sample.stamp_ns - table.start_ns) * 1e-9;
-      if (t_s >= run.selector.from_s && t_s < run.selector.to_s) {
-        storage::StoredSample stored;
-        stored.sample = labelled.sample;
-        stored.truth = labelled.truth;
-        run.samples.push_back(stored);
+      if (IsSelected(run, labelled.sample)) {
+        run.samples.push_back({labelled.sample, labelled.truth});
       }
     }
   }
@@ -130,16 +137,22 @@ storage::StoredRun ReadRunFile(const std::string& text,
                                importer::CsvOptions csv) {
   storage::RunSelector selector = SplitStretch(text);
   csv.split_gaps = true;
-  importer::CsvTable table = importer::ReadCsvFile(selector.id, std::move(csv));
-  std::size_t count = 0;
-  for (const SampleSeries& part : table.runs) {
-    count += part.samples.size();
-  }
-  storage::StoredRun run = RunOf(std::move(table), std::move(selector));
-  if (run.samples.empty()) {
+  std::vector<storage::StoredSample> samples;
+  csv.take = [&samples](const LabelledSample& labelled) {
+    samples.push_back({labelled.sample, labelled.truth});
+  };
+  const importer::CsvTable table =
+      importer::ReadCsvFile(selector.id, std::move(csv));
+  const std::size_t count = samples.size();
+  storage::StoredRun run = EmptyRunOf(table, std::move(selector));
+  std::erase_if(samples, [&run](const storage::StoredSample& stored) {
+    return !IsSelected(run, stored.sample);
+  });
+  if (samples.empty()) {
     throw NotFoundError("file " + text + " holds no sample (of " +
                         std::to_string(count) + ")");
   }
+  run.samples = std::move(samples);
   return run;
 }
 

@@ -22,7 +22,7 @@ bool IsUsable(const Sample& sample, SignalMask signals) {
       continue;
     }
     if (sample.quality[i] == SignalQuality::kBad ||
-        !PlausibleRange(signal).Contains(sample.values[i])) {
+        !IsPlausible(sample, signal)) {
       return false;
     }
   }

@@ -251,14 +251,39 @@ void CheckKind(const std::vector<TrainingRun>& runs, const Readings& cv,
 
 // A cause beside the others, where the command moves much in a sample: what it
 // was meanwhile is not in the record.
+constexpr double kSlowS = 5.0;
 std::string SlowRecord(const std::vector<TrainingRun>& runs) {
-  constexpr double kSlowS = 5.0;
   const double period_s = runs.front().period_s;
   return period_s < kSlowS
              ? std::string()
              : ". One sample in " + Text(period_s) +
                    " s may be too slow for a command that moves faster: export "
                    "every second, or unfiltered values";
+}
+
+// The command of a slow record says nothing of the position, but the position
+// does of the flow.
+void RefuseTooSlow(double period_s, const Readings& cv, const Readings& x,
+                   const Readings& f) {
+  constexpr double kFollows = 0.7;
+  constexpr double kDetermines = 0.8;
+  if (period_s < kSlowS || x.values.size() != cv.values.size() ||
+      x.values.size() != f.values.size()) {
+    return;
+  }
+  const double follows = Correlation(cv, x);
+  const double flow = Correlation(x, f);
+  if (follows < kFollows && flow < -kDetermines) {
+    throw DataError(
+        "one sample in " + Text(period_s) +
+        " s is too slow for this command: X does not follow CV from sample to "
+        "sample (correlation " +
+        Text(follows) + "), while F follows X (" + Text(flow) +
+        "). Export every second; or map the column of the position as "
+        "[signal.CV] and none as [signal.X], here and in what is monitored. "
+        "The flow is then judged at the position, and how the rod follows the "
+        "command is not");
+  }
 }
 
 // What explains a flow that is not simulated: the flow meter of the type ends
@@ -299,8 +324,11 @@ void CheckFit(const std::vector<TrainingRun>& runs,
               const std::vector<simulator::FittedParameter>& parameters,
               double meter_end) {
   const Readings f = ReadingsOf(runs, Signal::kF);
+  const Readings cv = ReadingsOf(runs, Signal::kCv);
+  const Readings x = ReadingsOf(runs, Signal::kX);
   const auto refuse = [&](const char* what, double error, double naive,
                           const char* model, const char* unit) {
+    RefuseTooSlow(runs.front().period_s, cv, x, f);
     const std::string beyond = BeyondMeter(runs, f, meter_end);
     throw DataError(
         (beyond.empty() ? std::string("the unit or sense of a column is wrong, "
@@ -315,8 +343,6 @@ void CheckFit(const std::vector<TrainingRun>& runs,
         "--type FILE.toml states another kind or size" +
         SlowRecord(runs));
   };
-  const Readings cv = ReadingsOf(runs, Signal::kCv);
-  const Readings x = ReadingsOf(runs, Signal::kX);
   double squares = 0.0;
   for (std::size_t k = 0; k < x.values.size(); ++k) {
     squares += (x.values[k] - cv.values[k]) * (x.values[k] - cv.values[k]);

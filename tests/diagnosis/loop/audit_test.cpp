@@ -296,5 +296,13 @@ TEST(AuditTest, RefusesWhatIsNoWindow) {
   EXPECT_THROW(AuditWindow(window), std::invalid_argument);
 }
 
+TEST(ServiceTest, IsTheFirstLetterOfATag) {
+  EXPECT_EQ(ServiceOf("20LIC101_0405"), 'L');
+  EXPECT_EQ(ServiceOf("LV-101"), 'L');
+  EXPECT_EQ(ServiceOf("boiler level 2"), 'L');
+  EXPECT_EQ(ServiceOf("FV101"), 'F');
+  EXPECT_EQ(ServiceOf("V1"), '\0');
+}
+
 }  // namespace
 }  // namespace fdi::loop

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <functional>
 #include <random>
+#include <utility>
 
 #include <gtest/gtest.h>
 
@@ -139,6 +140,103 @@ TEST(StrokesTest, WhatIsWorseThanTheLastTimeIsSaid) {
       1);
   EXPECT_EQ(std::ranges::count(stuck, "upper end of X at 60.0 % after 100.0 %"),
             1);
+}
+
+// The samples one by one.
+std::vector<TimedStroke> Watched(const StrokeRecord& record,
+                                 std::size_t max_samples, std::size_t& kept) {
+  StrokeFinder finder(record.period_s, max_samples);
+  std::vector<TimedStroke> found;
+  for (std::size_t k = 0; k < record.cv.size(); ++k) {
+    StrokeFinder::Reading reading{static_cast<std::int64_t>(k), record.cv[k],
+                                  record.x[k]};
+    reading.ps = record.ps.empty() ? reading.ps : record.ps[k];
+    reading.automatic = record.automatic[k];
+    finder.Push(reading, found);
+    kept = std::max(kept, finder.kept());
+  }
+  finder.Finish(found);
+  return found;
+}
+
+// Holds of all lengths, steps, ramps, noise of a controller and changes of mode
+// in any order.
+StrokeRecord AnyRecord(std::mt19937& random, double period_s) {
+  const auto between = [&random](double low, double high) {
+    return std::uniform_real_distribution<double>(low, high)(random);
+  };
+  std::vector<double> cv{50.0};
+  std::vector<bool> automatic{true};
+  const double levels[] = {0.0, 40.0, 50.0, 53.0, 60.0, 100.0};
+  bool mode = between(0, 1) < 0.5;
+  while (cv.size() < 3000) {
+    const auto samples = static_cast<int>(between(1, 400) * between(0, 1));
+    const double to = levels[random() % 6];
+    const double from = cv.back();
+    const auto kind = random() % 8;
+    for (int k = 1; k <= samples; ++k) {
+      cv.push_back(kind == 0   ? from + (to - from) * k / samples
+                   : kind == 1 ? from + between(-0.3, 0.3)
+                   : kind == 2 ? from
+                   : kind == 3 ? to + between(-0.06, 0.06)
+                               : to);
+      automatic.push_back(mode);
+    }
+    mode = between(0, 1) < 0.15 ? !mode : mode;
+  }
+  StrokeRecord record = Moved(cv, {.lag_s = 1.5});
+  record.automatic = automatic;
+  record.period_s = period_s;
+  return record;
+}
+
+TEST(StrokeFinderTest, FindsSampleBySampleWhatTheWholeRecordHas) {
+  std::mt19937 random(7);
+  std::size_t tests = 0;
+  std::size_t kept = 0;
+  for (int i = 0; i < 200; ++i) {
+    StrokeRecord record = AnyRecord(random, i % 3 == 0 ? 3.0 : 1.0);
+    record.ps.resize(i % 2 == 0 ? record.ps.size() : 0);
+    std::vector<Stroke> whole = FindStrokes(record);
+    tests += whole.size();
+
+    const auto found = Watched(record, record.cv.size(), kept);
+
+    ASSERT_EQ(found.size(), whole.size()) << i;
+    for (std::size_t k = 0; k < whole.size(); ++k) {
+      EXPECT_EQ(found[k].start_ns, static_cast<std::int64_t>(whole[k].begin));
+      // All of it was measured where Ps is: the signature is of the test alone.
+      whole[k].end -= std::exchange(whole[k].begin, 0);
+      EXPECT_EQ(found[k].stroke, whole[k]) << i << ": " << k;
+    }
+  }
+  EXPECT_GT(tests, 200U);
+}
+
+TEST(StrokeFinderTest, KeepsLittleUnlessThereIsATest) {
+  std::mt19937 random(8);
+  std::normal_distribution<double> noise(0.0, 0.3);
+  std::size_t kept = 0;
+  for (const double sd : {0.0, 1.0}) {
+    StrokeRecord record;
+    for (int k = 0; k < 20'000; ++k) {
+      record.cv.push_back(50.0 + 20.0 * std::sin(0.01 * k) * sd +
+                          sd * noise(random));
+      record.x.push_back(50.0);
+      record.automatic.push_back(true);
+    }
+    Watched(record, 3600, kept);
+  }
+  EXPECT_LT(kept, 40U);
+  // On and off for ever: the oldest part is told, and goes.
+  std::vector<double> cv;
+  for (int k = 0; k < 20'000; ++k) {
+    cv.push_back(k / 60 % 2 == 0 ? 0.0 : 100.0);
+  }
+  StrokeRecord record = Moved(cv, {});
+  record.automatic.assign(cv.size(), true);
+  EXPECT_EQ(Watched(record, 3600, kept).size(), 6U);
+  EXPECT_EQ(kept, 3600U);
 }
 
 }  // namespace

@@ -30,7 +30,8 @@ struct Ended {
 /// fdi-simulator as a child process, with a pipe to its stdin.
 class Process {
  public:
-  explicit Process(std::vector<std::string> arguments) {
+  /// @param log takes its stderr; -1: a file, for Ended::err.
+  explicit Process(std::vector<std::string> arguments, int log = -1) {
     arguments.insert(arguments.begin(), FDI_SIMULATOR_PROGRAM);
     int input[2];
     if (pipe2(input, O_CLOEXEC) != 0) {
@@ -47,7 +48,11 @@ class Process {
     if (id_ == 0) {
       dup2(input[0], STDIN_FILENO);
       Redirect(out, STDOUT_FILENO);
-      Redirect(err, STDERR_FILENO);
+      if (log < 0) {
+        Redirect(err, STDERR_FILENO);
+      } else {
+        dup2(log, STDERR_FILENO);
+      }
       execv(argv[0], argv.data());
       _exit(127);
     }

@@ -1,3 +1,4 @@
+#include <array>
 #include <bit>
 #include <chrono>
 #include <csignal>
@@ -202,7 +203,14 @@ TEST_F(AppPublishTest, ReferenceFilesAreReplayedAsTheyAreRead) {
   }
 }
 
-TEST_F(AppPublishTest, SigtermEndsALiveRunAndItsStream) {
+class AppPublishSignalTest : public PublishTest,
+                             public testing::WithParamInterface<int> {};
+
+// SIGHUP: its terminal was closed. Nobody would see what it goes on to send.
+INSTANTIATE_TEST_SUITE_P(Stop, AppPublishSignalTest,
+                         testing::Values(SIGTERM, SIGHUP));
+
+TEST_P(AppPublishSignalTest, EndsALiveRunAndItsStream) {
   Reader reader(domain_);
   Process process(With({"run", "--valve", "S", "--duration", "1e6", "--speed",
                         "20", "--record"}));
@@ -210,7 +218,7 @@ TEST_F(AppPublishTest, SigtermEndsALiveRunAndItsStream) {
       reader.TakeUntil([&] { return reader.Samples("S").size() > 20; }));
 
   const auto start = steady_clock::now();
-  process.Signal(SIGTERM);
+  process.Signal(GetParam());
   ASSERT_TRUE(reader.TakeUntilEnded());
   const Ended ended = process.Wait();
 
@@ -219,6 +227,41 @@ TEST_F(AppPublishTest, SigtermEndsALiveRunAndItsStream) {
   const auto summary = nlohmann::json::parse(ended.out);
   EXPECT_EQ(summary["interrupted"], true);
   EXPECT_EQ(summary["published"], reader.Samples("S").size());
+}
+
+// A log that is full because nobody reads it, and one whose reader has ended;
+// it gets a line because of the column that is not used.
+TEST_F(AppPublishTest, WhatBecomesOfItsLogHoldsNothingUp) {
+  std::string rows = "t_s,CV_pct,X_pct,note\n";
+  for (int t = 0; t < 100; ++t) {
+    rows += std::to_string(t) + ",50,50,x\n";
+  }
+  const std::string file = WriteFile(folder_.path() / "run.csv", rows);
+  for (const bool read_by_nobody : {true, false}) {
+    std::array<int, 2> log{};
+    ASSERT_EQ(pipe2(log.data(), O_CLOEXEC), 0);
+    if (read_by_nobody) {
+      fcntl(log[1], F_SETFL, O_NONBLOCK);
+      const std::string page(4096, 'x');
+      while (write(log[1], page.data(), page.size()) > 0) {
+      }
+      fcntl(log[1], F_SETFL, 0);
+    } else {
+      close(log[0]);
+    }
+    Reader reader(domain_);
+    Process process(
+        With({"replay", "--csv", file, "--valve", "L", "--speed", "max"}),
+        log[1]);
+    close(log[1]);
+
+    EXPECT_TRUE(reader.TakeUntilEnded());
+    EXPECT_EQ(process.Wait().code, 0);
+    EXPECT_EQ(reader.Samples("L").size(), 100U);
+    if (read_by_nobody) {
+      close(log[0]);
+    }
+  }
 }
 
 TEST_F(AppPublishTest, SigtermEndsAWriterWhoseReaderTakesNothing) {

@@ -44,6 +44,29 @@ TEST_F(AppStdinTest, EachJsonLineIsPublishedAtOnce) {
   EXPECT_EQ(got[1].stamp_ns - got[0].stamp_ns, 1'000'000'000);
 }
 
+TEST_F(AppStdinTest, APvOfJsonLinesIsPublishedWithItsSetPoint) {
+  Reader reader(domain_);
+  Process process(With({"replay", "--csv", "-", "--valve", "J"}));
+  process.Send(
+      "{\"CV_pct\": 70, \"F_t_h\": 12, \"sp\": 40}\n"
+      "{\"CV_pct\": 71, \"pv\": 3.1, \"sp\": 3.25}\n"
+      "{\"CV_pct\": 72, \"pv\": null, \"F_t_h\": 12, \"sp\": 3.25}\n");
+  process.CloseInput();
+  ASSERT_TRUE(reader.TakeUntil([&] { return !reader.ended().empty(); }));
+
+  EXPECT_EQ(process.Wait().code, 0);
+  const auto& got = reader.Samples("J");
+  ASSERT_EQ(got.size(), 3U);
+  // "sp" without "pv" is no key of ours.
+  EXPECT_EQ(got[0].present, MaskOf(Signal::kCv) | MaskOf(Signal::kF));
+  EXPECT_EQ(got[1].present,
+            MaskOf(Signal::kCv) | MaskOf(Signal::kPv) | MaskOf(Signal::kSp));
+  EXPECT_EQ(got[1][Signal::kPv], 3.1);
+  EXPECT_EQ(got[1][Signal::kSp], 3.25);
+  EXPECT_EQ(got[2].present, MaskOf(Signal::kCv) | MaskOf(Signal::kF));
+  EXPECT_EQ(got[2].seq, 2U);
+}
+
 TEST_F(AppStdinTest, JsonLinesWithoutTimeAreStampedOnTheGridOfThePeriod) {
   Reader reader(domain_);
   Process process(With({"replay", "--csv", "-", "--valve", "J", "--period",

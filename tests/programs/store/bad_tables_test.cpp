@@ -50,7 +50,8 @@ std::string Plant(const std::string& row) {
 }
 
 std::string Gzip(const std::string& text) {
-  const std::string path = testing::TempDir() + "bad_tables.gz";
+  const TemporaryDirectory folder;
+  const std::string path = (folder.path() / "table.gz").string();
   gzFile file = gzopen(path.c_str(), "wb");
   gzwrite(file, text.data(), static_cast<unsigned>(text.size()));
   gzclose(file);

@@ -83,6 +83,33 @@ TEST_F(FdiStoreHistoryTest, AHundredColumnsSayHowBadItIsInPlainWords) {
   }
 }
 
+// With names of the history (none here), and of a catalogue that is given.
+TEST_F(FdiStoreHistoryTest, WhatEndedEarlyIsNotUnlikeAnyKnownFault) {
+  {
+    HistoryWriter writer(path_);
+    FaultEvent event = Event(TransitionKind::kDetected, 60, 0, 0.3);
+    event.valve_id = "PV-9";
+    event.episode_id = Id("PV-9");
+    event.transition.unknown = Unknown::kTooEarly;
+    writer.Record(event, kDetected);
+    event.transition.kind = TransitionKind::kClosed;
+    event.transition.reason = EndReason::kCleared;
+    writer.Record(event, kDetected);
+  }
+  for (const std::string more : {"", " --fault-catalogue names.toml"}) {
+    if (!more.empty()) {
+      Write("names.toml", "[f7]\nname = \"seven\"\n");
+    }
+    const json row =
+        StoreJson("history list --valve PV-9" + more)["episodes"][0];
+    EXPECT_EQ(row["fault"], "unknown");
+    EXPECT_EQ(row["fault_name"], "Fault that ended before it had a name");
+    EXPECT_EQ(row["certainty"], "not yet");
+  }
+  EXPECT_THAT(Store("history show last").out,
+              HasSubstr("not yet: Fault that ended before it had a name"));
+}
+
 TEST_F(FdiStoreHistoryTest, FiltersReachTheQuery) {
   const auto count = [this](const std::string& arguments) {
     return StoreJson("history list " + arguments)["episodes"].size();
@@ -444,9 +471,38 @@ TEST_F(FdiStoreHistoryTest, DoctorFindsASoundDirectorySound) {
   EXPECT_EQ(report["sound"], true);
   ASSERT_EQ(report["databases"].size(), 3U);
   EXPECT_EQ(report["databases"][0]["present"], false);
-  EXPECT_EQ(report["databases"][2]["version"], 13);
+  EXPECT_EQ(report["databases"][2]["version"], 14);
   EXPECT_EQ(report["databases"][2]["figures"]["open_episodes"], 1);
   EXPECT_EQ(report["databases"][2]["figures"]["unsent_events"], 2);
+}
+
+// Read-only media, or a member of the group after the service was stopped: root
+// without the capability that lets it write everywhere.
+TEST_F(FdiStoreHistoryTest, AFolderThatCannotBeWrittenIsRead) {
+  using std::filesystem::perms;
+  Write("x.csv", header_ + Rows(30));
+  ASSERT_EQ(Store("runs import x.csv --valve LV-1").code, 0);
+  ASSERT_EQ(Store("valves add LV-1 --flow-unit t/h").code, 0);
+  const auto data = directory_.path() / "data";
+  std::filesystem::create_directory(data);
+  for (const char* name : {"history.db", "models.db", "runs.db"}) {
+    std::filesystem::rename(directory_.path() / name, data / name);
+  }
+  std::filesystem::permissions(data, perms::owner_read | perms::owner_exec);
+  const std::string as_user =
+      geteuid() == 0 ? "setpriv --bounding-set=-dac_override " : "env ";
+
+  std::vector<std::string> verbs{"runs export last", "valves show LV-1",
+                                 "history show last", "doctor"};
+  if (FDI_PLANNER) {
+    verbs.emplace_back("worklist");
+  }
+  for (const std::string& verb : verbs) {
+    const Outcome outcome = Store(verb + " --data data", as_user);
+    EXPECT_EQ(outcome.code, 0) << verb << ": " << outcome.err;
+  }
+  EXPECT_EQ(Store("valves add LV-2 --data data", as_user).code, 3);
+  std::filesystem::permissions(data, perms::owner_all);
 }
 
 TEST_F(FdiStoreHistoryTest, DoctorExitsWithThreeOnADamagedFile) {

@@ -255,6 +255,10 @@ class JsonDocumentsTest : public FdiStoreTest {
       hour.channels = {{Signal::kX, -10}};
       hour.bins[7] = {{3600, 3600LL * 51 * i, 0, 3600LL * 71'000}};
       hour.strengths = {{1, 3600, 3600LL * 100}};
+      StrokeTest test;
+      test.start_ns = hour.hour * 3600 * kSecond;
+      test.stroke.signature = {7.0, 1.5, 40.0, 160.0};
+      hour.strokes = {test};
     }
     Checkpoint checkpoint;
     checkpoint.coverage = {day};

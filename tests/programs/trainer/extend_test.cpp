@@ -112,9 +112,9 @@ TEST_F(ExtendTest, OtherSetsAndNoNewHoursAreRefused) {
 
 TEST(CoverageChangeTest, FaultsThatAreNotDetectedAnyMoreAreLost) {
   const auto table = [](std::optional<double> f2, std::optional<double> f19) {
-    CoverageTable table;
-    table.faults = {{2, false, f2}, {6, false, 0.25}, {19, true, f19}};
-    return table;
+    CoverageTable made;
+    made.faults = {{2, false, f2}, {6, false, 0.25}, {19, true, f19}};
+    return made;
   };
   EXPECT_THAT(ChangesOf(table(0.5, 0.25), table(0.5, 0.25)), IsEmpty());
   const auto changes = ChangesOf(table(0.5, 0.25), table({}, 0.5));

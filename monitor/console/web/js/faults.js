@@ -20,16 +20,16 @@ export function faultName(fault) {
   return members(fault).map(nameOf).join(' or ');
 }
 
-/** Of an alarm; nothing for one that ended before it had a name. */
-export const faultOfRow = ({fault, certainty}) =>
-  fault === 'unknown' && certainty === 'not yet' ? null : fault;
-
 /** "flow sensor (f19)" */
 export function faultTitle(fault) {
   const name = faultName(fault);
   return members(fault).length > 0 && name !== fault ?
     `${name} (${fault})` : name;
 }
+
+/** Of an alarm; one that ended before it had a name is like no other. */
+export const rowTitle = ({fault, certainty, name}, title = faultTitle) =>
+  fault === 'unknown' && certainty === 'not yet' ? name : title(fault);
 
 /** "likely", "one of 3"; empty for what needs no word. */
 export function certaintyText({certainty, faults, fault, look_alikes}) {

@@ -89,7 +89,8 @@ function drawRibbon(u, ctx, {top}, table) {
   const {t, state} = table;
   ctx.fillStyle = cssColor('--p2');
   for (let i = 1; i < t.length; ++i) {
-    if (!state[i] || state[i] === 'NORMAL') continue;
+    // Nothing is said of a gap, which has an instant without a state.
+    if (!state[i - 1] || !state[i] || state[i] === 'NORMAL') continue;
     const from = xOf(u, t[i - 1]);
     const size = (state[i] === 'ISOLATED' ? 7 : 3) * devicePixelRatio;
     ctx.fillRect(from, top, Math.ceil(xOf(u, t[i]) - from), size);

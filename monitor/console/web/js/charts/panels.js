@@ -10,7 +10,8 @@ const kTallestResidualRows = 3;
 function signalPanel(data) {
   const flow = unitText(data.meta.flow_unit);
   const lines = [
-    {column: 'sp', label: 'SP', unit: '%', color: '--s5', dash: [2, 3]},
+    ...data.has('pv') ? [] :
+      [{column: 'sp', label: 'SP', unit: '%', color: '--s5', dash: [2, 3]}],
     {column: 'cv', label: 'CV', unit: '%', color: '--s5', dash: [6, 3]},
     {column: 'x', label: 'X', unit: '%', color: '--s1'},
     {column: 'x_hat', label: 'X expected', unit: '%', color: '--s1',
@@ -26,6 +27,17 @@ function signalPanel(data) {
   return {
     key: 'signals', title: `Signals: CV, X [%] left, F [${flow}] right`,
     height: 230, lines,
+  };
+}
+
+// The set point of a loop with PV is in its unit, which nobody tells.
+function loopPanel(data) {
+  return {
+    key: 'loop', title: 'Loop: PV and SP [unit of PV]', height: 150,
+    lines: data.has('pv') ? [
+      {column: 'sp', label: 'SP', unit: '', color: '--s5', dash: [2, 3]},
+      {column: 'pv', label: 'PV', unit: '', color: '--s1'},
+    ] : [],
   };
 }
 
@@ -73,12 +85,12 @@ export function panelsOf(data, table, everyFault) {
   const {channels} = data.meta;
   const tall = channels.length <= kTallestResidualRows;
   const panels = [
-    signalPanel(data), processPanel(),
+    signalPanel(data), loopPanel(data), processPanel(),
     ...channels.map((channel, c) => residualPanel(channel, c, tall)),
     decisionPanel(data.meta),
   ];
-  // The page of a plant has no readings.
-  const read = data.size === 0 ||
+  // The page of a plant has no readings, a loop with PV perhaps no X and F.
+  const read = data.size === 0 || !data.has('pv') &&
       ['cv', 'x', 'f'].some((name) => data.has(name));
   const {T} = data.meta;
   for (const panel of panels) {

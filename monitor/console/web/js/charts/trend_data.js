@@ -3,7 +3,7 @@
 
 const kCapacity = 7200;
 const kSignals = [
-  'cv', 'x', 'f', 'sp', 'p1', 'p2', 't1', 'x_sim', 'f_sim'];
+  'cv', 'x', 'f', 'pv', 'sp', 'p1', 'p2', 't1', 'x_sim', 'f_sim'];
 const kGapPeriods = 3;
 const kMinGapMs = 2500;
 

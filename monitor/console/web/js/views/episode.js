@@ -7,11 +7,11 @@ import {exportPng} from '../charts/export.js';
 import {Timeline} from '../charts/timeline.js';
 import {TrendData} from '../charts/trend_data.js';
 import {button, errorNote, factList, h, replace, setText} from '../dom.js';
-import {alikeText, certaintyNode, faultOfRow, faultTitle, groupName,
-  layerText, markWord, members, namurText, priorityNames, priorityOf, prioritySign, stateWord,
-  unconfirmedText} from '../faults.js';
+import {alikeText, certaintyNode, faultTitle, groupName, layerText, markWord,
+  members, namurText, priorityNames, priorityOf, prioritySign, rowTitle,
+  stateWord, unconfirmedText} from '../faults.js';
 import {durationText, intervalText, percentText, rangeText,
-  strengthText, wholePercent, zoneName}
+  strengthText, unitText, wholePercent, zoneName}
   from '../format.js';
 import {link} from '../route.js';
 import {store} from '../store.js';
@@ -34,7 +34,7 @@ function facts({episode: row, model_hash: hash}) {
     ['Valve', valveLink(row.valve)],
     ['Fault', h('span', {class: 'with-sign'},
         prioritySign(priorityOf(row), members(row.fault).length > 0),
-        [faultTitle(faultOfRow(row)) + alikeText(row), layerText(row.layer)]
+        [rowTitle(row) + alikeText(row), layerText(row.layer)]
             .filter(Boolean).join(', '))],
     ['Priority', priorityNames[priorityOf(row)]],
     ['State', [`${stateWord(row.state)}; ${groupName(row).toLowerCase()}`,
@@ -80,7 +80,7 @@ const kEventColumns = [
   {text: 'What', header: true, cell: (event) => markWord(event.kind)},
   {text: 'Details', class: 'remark', cell: eventText},
   {text: 'Who', cell: (event) => event.who ?? ''},
-  {text: 'From where', cell: (event) => event.origin ?? ''},
+  {text: 'From where', class: 'wide', cell: (event) => event.origin ?? ''},
 ];
 
 const kLookColumns = [
@@ -176,7 +176,7 @@ class EpisodePage extends View {
 
   #show(found) {
     this.#row = found.episode;
-    this.title = `${this.#row.valve}: ${faultTitle(faultOfRow(this.#row))}`;
+    this.title = `${this.#row.valve}: ${rowTitle(this.#row)}`;
     this.#showActions();
     const checks = members(this.#row.fault)
         .map((fault) => store.faults.get(fault)).filter((f) => f?.check);
@@ -196,7 +196,8 @@ class EpisodePage extends View {
             'Page to print')),
         factList(facts(found)),
         found.growth.map(growthPart),
-        this.#data.words ? h('p', {class: 'words'}, this.#data.words) : null,
+        this.#data.words ?
+          h('p', {class: 'words'}, unitText(this.#data.words)) : null,
         checks.map(({name, check}) => h('p', {class: 'checks'},
             h('strong', {}, `${name}: `), check)),
         this.#timeline ? this.#timeline.element :

@@ -76,8 +76,8 @@ class History extends View {
     const {fault} = this.#inputs;
     const value = fault.value || chosen;
     replace(fault, h('option', {value: ''}, 'any'),
-        [...store.faults.keys()].map((key) =>
-          h('option', {value: key}, faultTitle(key))));
+        [...store.faults.keys()].map((key) => h('option', {value: key},
+            key === 'unknown' ? 'without a name' : faultTitle(key))));
     if (value && !store.faults.has(value)) {
       fault.append(h('option', {value}, faultTitle(value)));
     }

@@ -95,8 +95,8 @@ class Plant extends View {
       {text: 'Monitor', header: true, cell: ({monitor}) => button(monitor,
           () => this.#choose(monitor), {'class': 'chip',
             'aria-pressed': String(monitor === this.#monitor)})},
-      {text: 'Host', cell: ({host}) => host},
-      {text: 'Pair', cell: ({pair}) => pair === null ? '–' :
+      {text: 'Host', class: 'wide', cell: ({host}) => host},
+      {text: 'Pair', class: 'wide', cell: ({pair}) => pair === null ? '–' :
         pair === 'leader' ? 'leads' : 'stands by'},
       {text: 'Health', cell: ({health, text, silent}) => silent ? 'silent' :
         [health ?? '–', text && `: ${text}`]},

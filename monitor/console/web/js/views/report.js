@@ -26,11 +26,11 @@ const kFinding = [
   {text: 'Finding', class: 'fault', cell: findingCell},
   {text: 'Severity', cell: (row) =>
     `${row.severity} · ${number(row.severity_points, 0)}`},
-  {text: 'Grade', cell: (row) =>
+  {text: 'Grade', class: 'wide', cell: (row) =>
     `${row.grade ?? '–'} · ${number(row.grade_factor, 1)}`},
   {text: 'How sure', cell: (row) =>
     `${row.certainty ?? '–'} · ${number(row.confidence, 2)}`},
-  {text: 'Score', class: 'num', cell: (row) => number(row.score, 2)},
+  {text: 'Score', class: 'num wide', cell: (row) => number(row.score, 2)},
   {text: 'State', cell: (row) => row.open ? 'open' : 'ended'},
 ];
 

@@ -2,7 +2,7 @@
 
 import {barCell, barChart} from '../charts/bars.js';
 import {factList, h} from '../dom.js';
-import {faultTitle} from '../faults.js';
+import {faultTitle, members} from '../faults.js';
 import {dateText, durationText} from '../format.js';
 import {dataTable, timeCell, valveLink} from './table.js';
 
@@ -25,7 +25,7 @@ function everyDay(perDay, {since_ms: since, until_ms: until}) {
 const countText = (n) => Number(n) > 0 ? String(Number(n)) : '–';
 
 const countColumn = (text, name) =>
-  ({text, class: 'num', cell: (row) => countText(row[name])});
+  ({text, class: 'num wide', cell: (row) => countText(row[name])});
 
 // A column of numbers with bars, each a share of the greatest.
 function barColumn(text, rows, name, textOf = String) {
@@ -44,14 +44,16 @@ function valveTable(valves) {
     barColumn('Time in alarm', top, 'alarm_s', (s) => durationText(1000 * s)),
     countColumn('Chattering', 'chattering'),
     countColumn('Standing', 'standing'),
-    {text: 'Last', cell: (row) => timeCell(row.last_ms)},
+    {text: 'Last', class: 'wider', cell: (row) => timeCell(row.last_ms)},
   ], top);
 }
 
 function faultTable(faults) {
   const top = mostFrequent(faults);
   return dataTable('Most frequent faults', [
-    {text: 'Fault', header: true, cell: (row) => faultTitle(row.fault)},
+    // Without a name: unlike any known fault, or ended before it had one.
+    {text: 'Fault', header: true, cell: (row) =>
+      members(row.fault).length > 0 ? faultTitle(row.fault) : row.name},
     barColumn('Episodes', top, 'episodes'),
     countColumn('Labelled right', 'right'),
     countColumn('Labelled wrong', 'wrong'),
@@ -65,7 +67,8 @@ function keyFigures(figures, days) {
   const judged = labelled.true + labelled.false;
   return factList([
     ['Episodes', String(episodes)],
-    ['A day', days.length > 0 ? (episodes / days.length).toFixed(1) : '–'],
+    ['A day', days.length === 0 ? '–' : (episodes / days.length).toFixed(
+        episodes < days.length ? 2 : 1)],
     ['Time in alarm', durationText(1000 * sum('alarm_s'))],
     ['Open now', String(sum('open'))],
     ['Chattering', String(sum('chattering'))],

@@ -1,9 +1,9 @@
 // Tables by declaration of their columns: {text, cell(row), class, header}.
 
 import {h} from '../dom.js';
-import {alikeText, certaintyNode, faultName, faultOfRow, faultTitle,
-  groupName, members, namurText, priorityNames, priorityOf, prioritySign,
-  qualityText, unconfirmedText} from '../faults.js';
+import {alikeText, certaintyNode, faultName, faultTitle, groupName, members,
+  namurText, priorityNames, priorityOf, prioritySign, qualityText, rowTitle,
+  unconfirmedText} from '../faults.js';
 import {durationText, percentText, strengthText, timeText} from '../format.js';
 import {link} from '../route.js';
 import {store} from '../store.js';
@@ -51,11 +51,10 @@ function priorityCell(row) {
 }
 
 function faultCell(row) {
-  const fault = faultOfRow(row);
-  const name = faultName(fault);
+  const name = rowTitle(row, faultName);
   const numbers = members(row.fault).join(', ');
   return h('a', {href: link('episode', row.episode), title:
-    faultTitle(fault) + alikeText(row)}, name, numbers && numbers !== name ?
+    rowTitle(row) + alikeText(row)}, name, numbers && numbers !== name ?
     h('span', {class: 'number'}, ` ${numbers}`) : null,
   alikeText(row, faultName));
 }

@@ -317,7 +317,7 @@ class ValvePage extends View {
 
   #showNow() {
     const partly = store.tiles.get(this.id)?.state === 'PARTLY_JUDGED';
-    setText(this.#words, this.#data.words +
+    setText(this.#words, unitText(this.#data.words) +
       (partly && this.#data.words ? ', as far as it is judged' : ''));
     if (this.#data.size > 0) replace(this.#now, nowTables(this.#data, partly));
   }
