@@ -24,14 +24,6 @@ constexpr std::uint64_t kHashBase = 0xA0D1'7000'0000'0000ULL;
 constexpr double kMsPerSecond = 1e3;
 constexpr double kOtherInterval = 0.2;  // Of the interval: it is another one.
 
-// A reading to be relied upon, else NaN.
-double ReadingOf(const Sample& sample, Signal signal) {
-  const bool good = sample.Has(signal) &&
-                    sample.quality[Index(signal)] != SignalQuality::kBad &&
-                    IsPlausible(sample, signal);
-  return good ? sample[signal] : kNone;
-}
-
 // What the evidence says of the size of a finding, in shares of the span.
 Estimate SizeOf(const loop::Audit& audit) {
   const loop::Evidence& e = audit.evidence;
@@ -149,12 +141,12 @@ const Verdict& LoopWatch::Step(const Sample& sample, double period_s) {
 
 // @returns whether the readings are there that an audit needs.
 bool LoopWatch::AddPoint(const Sample& sample, double period_s) {
-  const double cv = ReadingOf(sample, Signal::kCv);
-  const double f = ReadingOf(sample, Signal::kF);
-  const double x = ReadingOf(sample, Signal::kX);
+  const double cv = GoodReading(sample, Signal::kCv);
+  const double f = GoodReading(sample, Signal::kF);
+  const double x = GoodReading(sample, Signal::kX);
   const bool whole =
       std::isfinite(cv) && (std::isfinite(f) || std::isfinite(x) ||
-                            std::isfinite(ReadingOf(sample, Signal::kPv)));
+                            std::isfinite(GoodReading(sample, Signal::kPv)));
   if (sample.mode != ValveMode::kAuto || !whole) {
     Restart();
     return whole;
@@ -201,12 +193,13 @@ bool LoopWatch::AddPoint(const Sample& sample, double period_s) {
 
 // Loops without PV, which most are, have no memory for it.
 void LoopWatch::AddControl(const Sample& sample, std::size_t row) {
-  const double pv = ReadingOf(sample, Signal::kPv);
+  const double pv = GoodReading(sample, Signal::kPv);
   if (control_.empty() && std::isnan(pv)) {
     return;
   }
   control_.resize(ring_.size(), {kNone, kNone});
-  control_[row] = {pv, std::isnan(pv) ? kNone : ReadingOf(sample, Signal::kSp)};
+  control_[row] = {pv,
+                   std::isnan(pv) ? kNone : GoodReading(sample, Signal::kSp)};
 }
 
 void LoopWatch::Restart() {

@@ -1,5 +1,7 @@
 #include "diagnosis/sample.h"
 
+#include <limits>
+
 #include "base/csv_cells.h"
 
 namespace fdi {
@@ -56,6 +58,13 @@ SignalRange PlausibleRange(Signal signal) {
 bool IsPlausible(const Sample& sample, Signal signal) {
   const bool as_pv = signal == Signal::kSp && sample.Has(Signal::kPv);
   return PlausibleRange(as_pv ? Signal::kPv : signal).Contains(sample[signal]);
+}
+
+double GoodReading(const Sample& sample, Signal signal) {
+  const bool good = sample.Has(signal) &&
+                    sample.quality[Index(signal)] != SignalQuality::kBad &&
+                    IsPlausible(sample, signal);
+  return good ? sample[signal] : std::numeric_limits<double>::quiet_NaN();
 }
 
 std::string_view ValveModeName(ValveMode mode) {

@@ -125,6 +125,10 @@ struct Sample {
 /// in PlausibleRange(), or, of an SP beside a PV, in that of the PV.
 bool IsPlausible(const Sample& sample, Signal signal);
 
+/// A reading to be relied upon: there, plausible and not of quality BAD; else
+/// NaN.
+double GoodReading(const Sample& sample, Signal signal);
+
 /// The truth of a simulated or labelled sample; never seen by an engine.
 struct FaultTruth {
   int fault{0};          ///< 1..22, 0 = none acting.

@@ -1,20 +1,12 @@
 #include "diagnosis/stroke_watch.h"
 
 #include <cmath>
-#include <limits>
 #include <utility>
 
 namespace fdi {
 namespace {
 
 constexpr double kGapPeriods = 1.5;
-
-double GoodValue(const Sample& sample, Signal signal) {
-  return sample.Has(signal) &&
-                 sample.quality[Index(signal)] != SignalQuality::kBad
-             ? sample[signal]
-             : std::numeric_limits<double>::quiet_NaN();
-}
 
 void Append(double period_s, std::vector<loop::TimedStroke> strokes,
             std::vector<StrokeTest>& found) {
@@ -33,8 +25,8 @@ std::vector<std::string> StrokeTest::Worse() const {
 void StrokeWatch::Push(const Sample& sample, double period_s,
                        std::vector<StrokeTest>& found) {
   const loop::StrokeFinder::Reading reading{
-      sample.stamp_ns, GoodValue(sample, Signal::kCv),
-      GoodValue(sample, Signal::kX), GoodValue(sample, Signal::kPs),
+      sample.stamp_ns, GoodReading(sample, Signal::kCv),
+      GoodReading(sample, Signal::kX), GoodReading(sample, Signal::kPs),
       sample.mode == ValveMode::kAuto};
   const bool measured = std::isfinite(reading.cv) && std::isfinite(reading.x);
   const auto moved_ns = static_cast<double>(sample.stamp_ns - stamp_ns_);

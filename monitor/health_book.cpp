@@ -33,14 +33,6 @@ HealthChannel ChannelOf(const ChannelSpec& channel) {
   return {channel.output, static_cast<int>(std::clamp(exponent, -30.0, 20.0))};
 }
 
-// A reading to be relied upon, else NaN.
-double Reading(const Sample& sample, Signal signal) {
-  const bool good = sample.Has(signal) &&
-                    sample.quality[Index(signal)] != SignalQuality::kBad &&
-                    IsPlausible(sample, signal);
-  return good ? sample[signal] : std::nan("");
-}
-
 void AddResiduals(const Sample& sample, const Verdict& verdict,
                   HealthHour& hour) {
   auto& bin = hour.bins[static_cast<std::size_t>(
@@ -159,16 +151,17 @@ void HealthBook::AddCounts(const Sample& sample, double period_s,
       static_cast<double>(moved_ns) > kGapPeriods * period_s * 1e9) {
     counters_.Restart();
   }
-  counters_.Push({Reading(sample, Signal::kCv), Reading(sample, Signal::kX),
-                  period_s, sample.mode == ValveMode::kAuto},
-                 hour.counts);
+  counters_.Push(
+      {GoodReading(sample, Signal::kCv), GoodReading(sample, Signal::kX),
+       period_s, sample.mode == ValveMode::kAuto},
+      hour.counts);
 }
 
 void HealthBook::AddStroke(const Sample& sample, std::int64_t period_ms,
                            HealthHour& hour) {
-  const double x = Reading(sample, Signal::kX);
+  const double x = GoodReading(sample, Signal::kX);
   const bool by_command = !std::isfinite(x);
-  const double position = by_command ? Reading(sample, Signal::kCv) : x;
+  const double position = by_command ? GoodReading(sample, Signal::kCv) : x;
   if (!std::isfinite(position)) {
     return;
   }

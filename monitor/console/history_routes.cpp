@@ -405,7 +405,7 @@ File EpisodePicture(const Api& api, const httplib::Request& request) {
   const plot::EpisodeEvidence evidence =
       plot::LoadEvidence(*reader, id, api.sources.models);
   plot::EpisodeFigureOptions options;
-  options.fault_name = plot::EpisodeName(evidence.episode, api.texts);
+  options.fault_name = plot::PlainName(evidence.episode, api.texts);
   const bool svg = ending == "svg";
   return {svg ? "image/svg+xml" : "image/png", "episode-" + id + "." + ending,
           plot::DrawFigure(plot::EpisodeFigure(evidence, options),

@@ -467,7 +467,7 @@ Report PlotEpisode(const PlotOptions& options, const Context& context) {
   const Episode& episode = evidence.episode;
   plot::EpisodeFigureOptions figure = options.figure;
   figure.fault_name =
-      plot::EpisodeName(episode, report::LoadFaultTexts(context.options));
+      plot::PlainName(episode, report::LoadFaultTexts(context.options));
   const std::filesystem::path path =
       options.output.empty() ? episode.episode_id + ".png" : options.output;
   plot::DrawFigure(plot::EpisodeFigure(evidence, figure), path);

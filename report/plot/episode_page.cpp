@@ -187,7 +187,7 @@ void AddChecks(const Episode& episode, const report::FaultTexts& texts,
     const std::string fault = rest.substr(0, bar);
     rest = bar == std::string::npos ? "" : rest.substr(bar + 1);
     const report::FaultWords words = texts.Words(fault, episode.strength);
-    page.Line((fault == "unknown" ? EpisodeName(episode, texts)
+    page.Line((fault == "unknown" ? PlainName(episode, texts)
                                   : words.name + " (" + fault + ")") +
               ", for " + words.discipline + ":");
     page.Checks(Sentences(words.check));
@@ -208,7 +208,7 @@ void AddPicture(const EpisodeEvidence& evidence,
     return;
   }
   EpisodeFigureOptions options;
-  options.fault_name = EpisodeName(evidence.episode, texts);
+  options.fault_name = PlainName(evidence.episode, texts);
   Figure figure = EpisodeFigure(evidence, options);
   figure.width = kPictureWidth;
   figure.legend_width = kLegendWidth;
@@ -250,7 +250,7 @@ std::vector<Column> EpisodeFields(const Alarm& alarm,
   return {{"episode", "episode_id"},
           {"valve", "valve_id"},
           {"source", "source_id"},
-          Field("fault", FaultLine(e, EpisodeName(e, texts))),
+          Field("fault", FaultLine(e, PlainName(e, texts))),
           Field("check", words.check),
           Field("severity", std::string(SeverityName(words.severity)) +
                                 ", priority " +
@@ -311,11 +311,10 @@ std::string EventSentence(const HistoryEntry& event,
 
 std::string EpisodeTitle(const Episode& episode,
                          const report::FaultTexts& texts) {
-  return episode.valve_id + ": " + EpisodeName(episode, texts);
+  return episode.valve_id + ": " + PlainName(episode, texts);
 }
 
-std::string EpisodeName(const Episode& episode,
-                        const report::FaultTexts& texts) {
+std::string PlainName(const Episode& episode, const report::FaultTexts& texts) {
   const std::string_view no_name = storage::NoNameText(episode);
   return no_name.empty() ? texts.Words(episode.fault.value_or(""), 0.0).name
                          : std::string(no_name);

@@ -40,8 +40,8 @@ report::Report EpisodePage(const EpisodeEvidence& evidence,
                            const GnuplotLimits& limits = {});
 
 /// "Flow transmitter wrong", or what stands in the place of a name.
-std::string EpisodeName(const storage::Episode& episode,
-                        const report::FaultTexts& texts);
+std::string PlainName(const storage::Episode& episode,
+                      const report::FaultTexts& texts);
 
 /// Its title: "FV-101: Flow transmitter wrong".
 std::string EpisodeTitle(const storage::Episode& episode,

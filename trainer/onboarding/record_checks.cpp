@@ -249,9 +249,10 @@ void CheckKind(const std::vector<TrainingRun>& runs, const Readings& cv,
   }
 }
 
+constexpr double kSlowS = 5.0;
+
 // A cause beside the others, where the command moves much in a sample: what it
 // was meanwhile is not in the record.
-constexpr double kSlowS = 5.0;
 std::string SlowRecord(const std::vector<TrainingRun>& runs) {
   const double period_s = runs.front().period_s;
   return period_s < kSlowS
