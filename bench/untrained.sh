@@ -10,7 +10,11 @@
 # standard deviation of that signal's noise. The others look like what the set
 # knows. Faults that are not detected count for neither.
 #
-#     bench/untrained.sh build/release/bin [CAMPAIGN.toml [SEED]]
+# With `onboarded`, the set is one of a valve in its level loop, onboarded on two
+# healthy hours of its own and reduced to the same five faults; it has no second
+# look, which knows all faults.
+#
+#     bench/untrained.sh build/release/bin [CAMPAIGN.toml|onboarded [SEED]]
 set -euo pipefail
 bin=$(realpath "$1")
 campaign=${2:-campaigns/paper.toml}
@@ -18,25 +22,44 @@ seed=${3:-5200}
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 export FDI_DATA=$work/data
-set_name=$(sed -n 's/^name = "\(.*\)"/\1/p' "$campaign")
+begin=200
+seconds=600
+setting=(--parameters paper-operating-point --excitation operating-point
+  --set excitation.amplitude_pct=12 --set excitation.period_s=60)
+if [ "$campaign" = onboarded ]; then
+  begin=600
+  seconds=1200
+  setting=(--parameters lublin-actuator-3 --excitation level-loop)
+fi
 
 trained=(f1 f3 f6 f7 f19)
 untrained=(f2 f4 f5 f9 f10 f11 f12 f12- f13 f13- f15 f16 f17 f17- f18 f19- t1 t1-
   p1 p1- p2 p2-)
 
+run() {  # PROGRAM ARGUMENT...
+  "$bin/$1" "${@:2}" >/dev/null 2>"$work/log" || { cat "$work/log" >&2; exit 1; }
+}
+
 simulate() {  # FILE OPTION...
-  "$bin/fdi-simulator" run --no-publish --seed "$seed" --duration 600 \
-    --parameters paper-operating-point --excitation operating-point \
-    --set excitation.amplitude_pct=12 --set excitation.period_s=60 \
-    --export "$@" >/dev/null 2>"$work/log" || { cat "$work/log" >&2; exit 1; }
+  run fdi-simulator run --no-publish --seed "$seed" --duration "$seconds" \
+    "${setting[@]}" --export "$@"
 }
 
 simulate_fault() {  # FILE FAULT STRENGTH OPTION...
-  simulate "$1" --fault "${2%-}:abrupt@200:strength=$3" "${@:4}"
+  simulate "$1" --fault "${2%-}:abrupt@$begin:strength=$3" "${@:4}"
 }
 
-"$bin/fdi-trainer" train --campaign "$campaign" >/dev/null 2>"$work/log" ||
-  { cat "$work/log" >&2; exit 1; }
+if [ "$campaign" = onboarded ]; then
+  run fdi-simulator run --no-publish --seed $((seed + 1)) --duration 7200 \
+    "${setting[@]}" --export "$work/healthy.csv"
+  run fdi-trainer onboard --valve V --file "$work/healthy.csv" --no-coverage
+  set_name=five
+  without=f8,$(printf '%s\n' "${untrained[@]}" | grep -v -- - | paste -sd,)
+  run fdi-study reduce V --as "$set_name" --without "$without"
+else
+  run fdi-trainer train --campaign "$campaign"
+  set_name=$(sed -n 's/^name = "\(.*\)"/\1/p' "$campaign")
+fi
 
 simulate "$work/noisy.csv"
 simulate "$work/clean.csv" --set noise=false
@@ -80,7 +103,7 @@ awk -F, '
     follows[file] = FILENAME ~ /known-/ && fault == before
     before = FILENAME ~ /known-/ ? fault : ""
   }
-  $1 < 220 || $1 % 5 { next }
+  $1 < begin + 20 || $1 % 5 { next }
   {
     k = ++rows[file]
     for (c = 2; c <= 7; c++) value[file, k, c] = $c
@@ -112,7 +135,7 @@ awk -F, '
       for (q = 4; q < first; q++) if (follows[q]) Compare(a, q - 1, q)
       printf "%s,%s,%.2f\n", names[a], nearest, sqrt(least > 0 ? least : 0)
     }
-  }' first=$((3 + 24 * ${#trained[@]})) \
+  }' first=$((3 + 24 * ${#trained[@]})) begin=$begin \
   "$work/noisy.csv" "$work/clean.csv" "$work"/known-* "$work"/clean-* \
   >"$work/distances"
 

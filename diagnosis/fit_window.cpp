@@ -99,4 +99,19 @@ double FitWindow::Excess(std::size_t channel, const FitBounds& limits) const {
                   square(channel) / limits.upper_square);
 }
 
+void AccountedShare::Fade(double memory) {
+  for (double* sum : {&seen_, &left_, &noise_, &count_}) {
+    *sum *= memory;
+  }
+}
+
+void AccountedShare::Push(double normal, double residual) {
+  const double most = std::max(normal * normal, residual * residual);
+  const double weight = std::min(1.0, kMaxSquaredDistance / most);
+  seen_ += weight * normal * normal;
+  left_ += weight * residual * residual;
+  noise_ += weight;
+  count_ += 1.0;
+}
+
 }  // namespace fdi

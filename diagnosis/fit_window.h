@@ -68,4 +68,37 @@ class FitWindow {
   std::vector<Sums> sums_;
 };
 
+/// How much of what normal operation does not explain in a channel another
+/// explanation accounts for. With r_0 and r their residuals in deviations of
+/// the normal one, both scaled down where one of them is beyond 5,
+///
+///     (Σ r_0² − Σ r²)/(Σ r_0² − n).
+///
+/// An explanation that only tolerates what it sees has about 0, the right one
+/// 1, one whose effect is off by half 3/4.
+class AccountedShare {
+ public:
+  static constexpr double kLeast = 0.5;      ///< Of one that explains,
+  static constexpr double kLeastOwn = 0.75;  ///< in the data of its own fault.
+
+  /// What is gathered counts less from now on.
+  void Fade(double memory);
+  void Push(double normal, double residual);
+
+  /// Normal operation is off by more than another day would make it, over
+  /// `least` samples or more.
+  bool tells(int least) const {
+    return count_ >= 0.9 * least && seen_ > kTelling * count_;
+  }
+  double share() const { return (seen_ - left_) / (seen_ - noise_); }
+
+ private:
+  static constexpr double kTelling = 3.0;  // mean of r_0²
+
+  double seen_{0.0};
+  double left_{0.0};
+  double noise_{0.0};
+  double count_{0.0};
+};
+
 }  // namespace fdi

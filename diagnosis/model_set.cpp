@@ -150,6 +150,18 @@ void ValidateFloor(const ModelSet& models, const FloorLimits& floor) {
         "the floor takes at least one sample");
 }
 
+// By its models.
+unsigned SignalsRead(const ModelSet& models) {
+  unsigned mask = 0;
+  for (const Observer& observer : models.observers) {
+    for (const ChannelObserver& channel : observer.channels) {
+      mask |= static_cast<unsigned>(RequiredSignals(channel.model)) |
+              MaskOf(channel.model.output);
+    }
+  }
+  return mask;
+}
+
 }  // namespace
 
 // The test of too little flow came later than the others and is the last.
@@ -190,14 +202,11 @@ std::string FaultSetName(const ModelSet& models, FaultSet faults) {
 }
 
 SignalMask RequiredSignals(const ModelSet& models) {
-  unsigned mask = 0;
-  for (const Observer& observer : models.observers) {
-    for (const ChannelObserver& channel : observer.channels) {
-      mask |= static_cast<unsigned>(RequiredSignals(channel.model)) |
-              MaskOf(channel.model.output);
-    }
-  }
-  return static_cast<SignalMask>(mask);
+  const unsigned mask = SignalsRead(models);
+  const unsigned cv = MaskOf(Signal::kCv);
+  return static_cast<SignalMask>(models.position_as_command && (mask & cv) != 0
+                                     ? (mask & ~cv) | MaskOf(Signal::kX)
+                                     : mask);
 }
 
 void Validate(const ModelSet& models) {
@@ -244,6 +253,9 @@ void Validate(const ModelSet& models) {
   for (const ChannelSpec& channel : models.channels) {
     ValidateChannel(models, channel);
   }
+  Check(!models.position_as_command ||
+            (SignalsRead(models) & MaskOf(Signal::kX)) == 0,
+        models, "a set that reads the position as command has no X");
 }
 
 }  // namespace fdi

@@ -99,7 +99,8 @@ struct Observer {
   double strength{0.0};                   ///< Of the trained condition; signed.
   std::vector<ChannelObserver> channels;  ///< One per ModelSet::channels.
   /// Those of P1, P2 and T1 that are outside normal operation in all of the
-  /// condition's own data; stored with the limits of the fit.
+  /// condition's own data; stored with the limits of the fit. X and F: the
+  /// observer accounts for its own data there, and has to for what it explains.
   SignalMask moved{0};
 };
 
@@ -179,6 +180,9 @@ struct FloorLimits {
   friend bool operator==(const FloorLimits&, const FloorLimits&) = default;
 };
 
+/// That thresholds are set for where nothing else is asked.
+inline constexpr double kFalseAlarmsPerHour = 1e-3;
+
 /// The trained knowledge about one kind of valve: written by the trainer,
 /// loaded by the monitor, run by both. Observer 0 is the normal one.
 struct ModelSet {
@@ -204,9 +208,13 @@ struct ModelSet {
   std::vector<int> undetectable;         ///< Faults that look normal.
   std::vector<std::string> training_runs;
   double threshold_hours{0.0};  ///< Fault-free hours behind the thresholds.
-  double false_alarms_per_hour{1e-3};  ///< Target rate of the thresholds.
+  /// Target rate of the thresholds, over all channels together.
+  double false_alarms_per_hour{kFalseAlarmsPerHour};
   /// The fitted physics of an onboarded valve, for simulation; else empty.
   std::vector<PhysicalValue> physics{};
+  /// What its models read as CV is the position X, and they have no X: see
+  /// PositionAsCommand().
+  bool position_as_command{false};
 };
 
 /// A set of faults as bits: bit i stands for ModelSet::faults[i].
@@ -231,7 +239,8 @@ int FaultIndex(const ModelSet& models, int fault);
 /// "f3|f6"; "unknown" for the empty set.
 std::string FaultSetName(const ModelSet& models, FaultSet faults);
 
-/// The signals that the set's channels read, including their outputs.
+/// The signals of the valve that the set's channels read, including their
+/// outputs.
 SignalMask RequiredSignals(const ModelSet& models);
 
 /// @throws DataError naming the first defect that makes the set unusable.

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "diagnosis/fault_catalogue.h"
+
 namespace fdi {
 namespace {
 
@@ -13,8 +15,9 @@ constexpr int kSearchSamples = 40;  // initial samples with a grid search
 constexpr double kRateDeviation = 1.0 / 1500.0;
 // An effect on a channel counts from this share of the deviation on.
 constexpr double kMinEffect = 0.25;
-constexpr double kAccounted = 0.5;   // of the normal observer's residual
-constexpr double kOnsetError = 0.5;  // of the effect, while a fault begins
+constexpr double kAccounted = 0.5;    // of the normal observer's residual
+constexpr double kOnsetError = 0.5;   // of the effect, while a fault begins
+constexpr double kUnaccounted = 2.0;  // misfit of what only tolerates
 
 double Lane(const std::vector<Quad>& quads, std::size_t slot) {
   return quads[slot / kLanes].lane[slot % kLanes];
@@ -49,6 +52,7 @@ void StrengthTracker::Restart() {
   factor_ = 0.0;
   fit_.Restart();
   misfit_ = 0.0;
+  accounted_.fill({});
   std::fill(cells_.begin(), cells_.end(), 0.0);
 }
 
@@ -372,6 +376,7 @@ void StrengthTracker::PushFit(const ObserverBank& bank,
                     (apart ? 0.0 : p.error) + early * early);
       z[c] = p.residual / spread;
       u[c] = effect / spread;
+      PushAccount(bank, c, p.residual);
     }
   }
   fit_.Push({z.data(), channels_}, {u.data(), channels_});
@@ -382,6 +387,39 @@ void StrengthTracker::PushFit(const ObserverBank& bank,
     const FitBounds& limits = path_->points[node * channels_ + c].fit;
     misfit_ = std::max(misfit_, fit_.Excess(c, limits));
   }
+  if (!Accounts(node)) {
+    misfit_ = std::max(misfit_, kUnaccounted);
+  }
+}
+
+// The first t_k samples are those of a rod on its way.
+void StrengthTracker::PushAccount(const ObserverBank& bank, std::size_t channel,
+                                  double residual) {
+  const int c = static_cast<int>(channel);
+  const double normal = bank.residual(0, c);
+  if (age_ <= plan_->models().decision.isolation_samples || bank.saturated(c) ||
+      std::isnan(residual) || std::isnan(normal)) {
+    return;
+  }
+  const double sd = path_->points[channel].sd;  // of normal operation
+  accounted_[channel].Fade(plan_->memory());
+  accounted_[channel].Push(normal / sd, residual / sd);
+}
+
+// An observer that explains its own data, or knows none that normal operation
+// does not, has to explain what is seen.
+bool StrengthTracker::Accounts(std::size_t node) const {
+  const ModelSet& models = plan_->models();
+  const SignalMask explains =
+      models.observers[path_->nodes[node].observer].moved;
+  for (std::size_t c = 0; c < channels_; ++c) {
+    if ((explains & kRodSignals & MaskOf(models.channels[c].output)) != 0 &&
+        accounted_[c].tells(models.decision.isolation_samples) &&
+        accounted_[c].share() < AccountedShare::kLeast) {
+      return false;
+    }
+  }
+  return true;
 }
 
 }  // namespace fdi

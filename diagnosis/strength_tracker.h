@@ -116,6 +116,9 @@ class StrengthTracker {
   void Correct(const Prediction& prediction, double strength, double spread);
   void ClampEstimate();
   void UpdateFactor(const ObserverBank& bank);
+  void PushAccount(const ObserverBank& bank, std::size_t channel,
+                   double residual);
+  bool Accounts(std::size_t node) const;
 
   const FaultPlan* plan_;
   const StrengthPath* path_;
@@ -133,7 +136,8 @@ class StrengthTracker {
   bool refutable_{false};
   bool accounts_{false};
   FitWindow fit_;
-  double misfit_{0.0};         // 1 at the limit
+  double misfit_{0.0};  // 1 at the limit
+  std::array<AccountedShare, kMaxChannels> accounted_{};
   std::vector<double> cells_;  // evidence by cell and channel
 };
 

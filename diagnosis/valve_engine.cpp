@@ -115,7 +115,7 @@ struct Diagnosis {
         sees_no_fault(SeesNoFault(plan->models())) {}
 
   std::shared_ptr<const EnginePlan> plan;
-  SignalMask trained;  // Others are as if they were not measured.
+  TrainedSignals trained;
   ObserverBank bank;
   Coverage coverage;
   Detection detection;
@@ -172,7 +172,7 @@ void ValveEngine::Impl::ClearVerdict() {
 }
 
 const Verdict& ValveEngine::Impl::Step(const Sample& measured) {
-  const Sample sample = WithOnly(measured, diagnosis_->trained);
+  const Sample sample = diagnosis_->trained.Of(measured);
   verdict_.stamp_ns = sample.stamp_ns;
   verdict_.source_id = sample.source_id;
   verdict_.seq = sample.seq;
@@ -194,7 +194,7 @@ const Verdict& ValveEngine::Impl::Step(const Sample& measured) {
     return verdict_;
   }
   const Intake values =
-      CheckValues(models(), diagnosis_->plan->required(), sample,
+      CheckValues(models(), diagnosis_->plan->required(), measured,
                   episode_open(), needs_initialisation_ || placement.gap);
   if (values != Intake::kAccepted) {
     Reject(values);

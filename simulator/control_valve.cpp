@@ -39,13 +39,7 @@ ProcessInputs ValveDynamics::Effective(const ProcessInputs& inputs) const {
   ProcessInputs effective = inputs;
   effective.inlet_pressure_pa *= effects_.inlet_factor;
   effective.outlet_pressure_pa *= effects_.outlet_factor;
-  if (effects_.temperature_rise_c > 0.0) {
-    // Steam may be hotter than that already.
-    effective.temperature_c =
-        std::max(inputs.temperature_c,
-                 std::min(inputs.temperature_c + effects_.temperature_rise_c,
-                          kMaxTemperatureC));
-  }
+  effective.temperature_c = TemperatureWith(effects_, inputs.temperature_c);
   return effective;
 }
 

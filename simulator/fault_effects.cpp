@@ -1,5 +1,6 @@
 #include "simulator/fault_effects.h"
 
+#include <algorithm>
 #include <cmath>
 #include <iterator>
 
@@ -79,6 +80,15 @@ void ApplyFault(int fault, double strength, FaultEffects& effects) {
   }
 }
 
+double TemperatureWith(const FaultEffects& effects, double temperature_c) {
+  // Steam may be hotter than the limit already.
+  return effects.temperature_rise_c > 0.0
+             ? std::max(temperature_c,
+                        std::min(temperature_c + effects.temperature_rise_c,
+                                 kMaxTemperatureC))
+             : temperature_c;
+}
+
 bool LeavesRod(int fault) {
   FaultEffects effects;
   ApplyFault(fault, 1.0, effects);
@@ -92,6 +102,23 @@ bool LeavesRod(int fault) {
   effects.temperature_reading_step = none.temperature_reading_step;
   effects.inlet_reading_step = none.inlet_reading_step;
   effects.outlet_reading_step = none.outlet_reading_step;
+  return effects == none;
+}
+
+bool ShowsInRodAlone(int fault) {
+  FaultEffects effects;
+  ApplyFault(fault, 1.0, effects);
+  const FaultEffects none;
+  effects.upper_stop_factor = none.upper_stop_factor;
+  effects.play_offset = none.play_offset;
+  effects.play_slope = none.play_slope;
+  effects.air_leak = none.air_leak;
+  effects.area_factor = none.area_factor;
+  effects.spring_factor = none.spring_factor;
+  effects.transducer_factor = none.transducer_factor;
+  effects.chamber_reading_factor = none.chamber_reading_factor;
+  effects.feedback_play = none.feedback_play;
+  effects.supply_factor = none.supply_factor;
   return effects == none;
 }
 

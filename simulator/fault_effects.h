@@ -47,10 +47,18 @@ inline constexpr double kMaxTemperatureC = 300.0;
 ///   `strength` is outside [0, 1] ([-1, 1] for signed faults).
 void ApplyFault(int fault, double strength, FaultEffects& effects);
 
+/// What the medium has where `temperature_c` flows in without the fault.
+double TemperatureWith(const FaultEffects& effects, double temperature_c);
+
 /// True if `fault` acts only downstream of the rod, on the flow or on readings:
 /// X is that of the healthy valve as long as nobody reacts to the readings.
 /// @throws std::invalid_argument if `fault` is not in the catalogue.
 bool LeavesRod(int fault);
+
+/// True if `fault` changes nothing but how the rod answers the command: the
+/// flow at the position that is read is that of the healthy valve.
+/// @throws std::invalid_argument if `fault` is not in the catalogue.
+bool ShowsInRodAlone(int fault);
 
 /// False for a fault that cannot be simulated with this medium: of water alone
 /// it is known when it evaporates.

@@ -65,8 +65,8 @@ std::vector<RecordAnswer> SimulateRecord(const ValveParameters& parameters,
                                          const RecordDrive& drive = {},
                                          double tolerance_scale = 10.0);
 
-/// Reading of the flow transmitter with the rod at `x_pct`, without noise;
-/// pressures and temperature of `input` are used unchanged.
+/// Reading of the flow transmitter where the position is read as `x_pct`,
+/// without noise; `input` is what there is without the effects.
 double FlowReading(const ValveParameters& parameters,
                    const FaultEffects& effects, const InputRow& input,
                    double x_pct);

@@ -387,6 +387,20 @@ ValveParameters Resized(ValveParameters valve, double size,
   return valve;
 }
 
+HealthyRecord WithSimulatedRod(const std::vector<RecordRow>& rows,
+                               std::size_t first, std::size_t last,
+                               const ValveParameters& valve,
+                               const RecordDrive& drive) {
+  const std::vector<RecordAnswer> answers =
+      SimulateRecord(valve, rows, first, last, drive);
+  HealthyRecord record;
+  for (std::size_t k = first; k < last; ++k) {
+    record.rows.push_back(rows[k]);
+    record.rows.back().x_pct = answers[k - first].x_pct;
+  }
+  return record;
+}
+
 Trim RegressTrim(const std::vector<HealthyRecord>& records,
                  const ValveParameters& nominal) {
   Trim trim = nominal.trim;
@@ -578,7 +592,13 @@ Hypothesis Identification::Start(const ValveParameters& variant,
                                  bool friction) const {
   ValveParameters start = variant;
   if (options_.has_flow) {
-    start.trim = RegressTrim(records_, nominal_);
+    const RecordSegment& liveliest = segments_.front();
+    start.trim =
+        HasPosition(records_)
+            ? RegressTrim(records_, nominal_)
+            : RegressTrim({WithSimulatedRod(*liveliest.rows, liveliest.first,
+                                            liveliest.last, variant, drive)},
+                          nominal_);
   }
   Hypothesis h{
       {variant, drive}, Unknowns(variant, /*stated=*/false), {}, {}, {}};
@@ -732,8 +752,12 @@ Hypothesis Identification::Best(std::vector<Hypothesis> hypotheses) const {
 }
 
 // Fits; resets parameters that the records do not determine to nominal, the
-// last of the list first, and fits the others again.
+// last of the list first, and fits the others again. F alone tells a lag less
+// closely than X does. One that is surely not the nominal one is kept all the
+// same, because F would be further off with that.
 void Identification::KeepIdentified(Hypothesis& hypothesis) const {
+  constexpr double kSurely = 3.0;  // deviations
+  const bool has_position = HasPosition(records_);
   for (bool changed = true; changed && !hypothesis.unknowns.empty();) {
     hypothesis.fit = Fit(hypothesis, segments_, kMaxIterations, kFine);
     hypothesis.point = hypothesis.fit.point;
@@ -745,7 +769,12 @@ void Identification::KeepIdentified(Hypothesis& hypothesis) const {
     for (std::size_t i = kept.size(); i-- > 0;) {
       const double sd = StandardDeviations(hypothesis.fit, bounds,
                                            kept)[static_cast<Index>(i)];
-      if (sd > options_.identified_sd) {
+      const ValveUnknown& unknown = hypothesis.unknowns[i];
+      const double value = hypothesis.point[static_cast<Index>(i)];
+      const bool is_nominal =
+          has_position || unknown.nominal <= 0.0 || !Inside(unknown, value) ||
+          std::abs(value - std::log(unknown.nominal)) < kSurely * sd;
+      if (sd > options_.identified_sd && is_nominal) {
         hypothesis.rejected.push_back(Rejected(hypothesis.unknowns[i], sd));
         const auto at = static_cast<std::ptrdiff_t>(i);
         kept.erase(kept.begin() + at);

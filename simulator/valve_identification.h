@@ -24,6 +24,15 @@ double SizeOf(const std::vector<HealthyRecord>& records,
 ValveParameters Resized(ValveParameters valve, double size,
                         double largest_flow);
 
+/// Rows [first, last) of a valve without a position transmitter, with the rod
+/// of `valve` in the place of X: where a controller moves the command all the
+/// time, a trim regressed on the command is too flat, by a factor in Kv.
+/// @throws as SimulateRecord().
+HealthyRecord WithSimulatedRod(const std::vector<RecordRow>& rows,
+                               std::size_t first, std::size_t last,
+                               const ValveParameters& valve,
+                               const RecordDrive& drive);
+
 /// Kv and exponent directly from the rows, by (12) with the measured X:
 ///
 ///   ln(F / (100 sqrt(dP / rho))) = ln Kv - n X

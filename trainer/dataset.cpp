@@ -11,6 +11,7 @@
 #include "base/error.h"
 #include "base/usual_period.h"
 #include "diagnosis/fault_catalogue.h"
+#include "diagnosis/trained_signals.h"
 
 namespace fdi::trainer {
 namespace {
@@ -304,6 +305,13 @@ std::vector<Condition> BuildConditions(const std::vector<TrainingRun>& runs,
                     " samples of normal operation in a row");
   }
   return conditions;
+}
+
+TrainingRun AtPosition(TrainingRun run) {
+  for (LabelledSample& labelled : run.samples) {
+    labelled.sample = PositionAsCommand(labelled.sample);
+  }
+  return run;
 }
 
 std::vector<Stretch> SplitAtGaps(const TrainingRun& run) {

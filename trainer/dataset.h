@@ -16,6 +16,9 @@ struct TrainingRun {
   std::vector<LabelledSample> samples;
 };
 
+/// The run with every sample as PositionAsCommand().
+TrainingRun AtPosition(TrainingRun run);
+
 /// Samples one period apart from one run, under one condition.
 struct Stretch {
   std::string run_id;

@@ -202,6 +202,12 @@ NormalChannel ChooseNormal(const ChannelPlan& plan, const Condition& normal,
   return channel;
 }
 
+void PrepareFaults(const std::vector<Stretch>& healthy,
+                   NormalChannel& channel) {
+  channel.expected = PredictAll(channel.normal, healthy);
+  channel.adaptation.emplace(Base(channel), Whole(healthy));
+}
+
 }  // namespace
 
 NormalChannel FitNormalChannel(const ChannelPlan& plan, const Condition& normal,
@@ -209,8 +215,7 @@ NormalChannel FitNormalChannel(const ChannelPlan& plan, const Condition& normal,
                                const TrainingOptions& options,
                                double saturation) {
   NormalChannel channel = ChooseNormal(plan, normal, options, saturation);
-  channel.expected = PredictAll(channel.normal, healthy);
-  channel.adaptation.emplace(Base(channel), Whole(healthy));
+  PrepareFaults(healthy, channel);
   return channel;
 }
 
@@ -398,11 +403,14 @@ void FitLimits(const Healthy& healthy, const NormalResiduals& held_out,
   BalanceThresholds(models);
 }
 
+// What a fault, by its index, makes of Healthy::stretches.
+using FaultySource = std::function<std::vector<Stretch>(std::size_t)>;
+
 // Fits the observer of every fault. Returns the data on which faults are
 // compared, parallel to the observers.
 std::vector<Condition> FitFaults(const Healthy& healthy,
                                  const std::vector<FaultCondition>& faults,
-                                 const FaultSynthesis& synthesize,
+                                 const FaultySource& faulty_by,
                                  const TrainingOptions& options,
                                  Reporter& reporter, ModelSet& models) {
   // A task writes the observer and the entry of `compared` of its own fault
@@ -413,8 +421,7 @@ std::vector<Condition> FitFaults(const Healthy& healthy,
   ParallelFor(static_cast<int>(faults.size()), options.threads, [&](int i) {
     const FaultCondition& fault = faults[static_cast<std::size_t>(i)];
     Observer& observer = models.observers[static_cast<std::size_t>(i) + 1];
-    const std::vector<Stretch> faulty =
-        Synthesize(fault, healthy.stretches, synthesize);
+    const std::vector<Stretch> faulty = faulty_by(static_cast<std::size_t>(i));
     for (std::size_t c = 0; c < healthy.channels.size(); ++c) {
       observer.channels[c] = FitDifference(
           healthy.channels[c], models.observers.front().channels[c],
@@ -429,33 +436,108 @@ std::vector<Condition> FitFaults(const Healthy& healthy,
   return compared;
 }
 
+// Every step needs what earlier ones have set: FitFaults() the deviations of
+// the normal observer, FindGroups() limits and interpolation errors.
+//
+// @param like null: what the faults look like is to be found.
+ModelSet Assemble(const Healthy& fitted,
+                  const std::vector<TrainingRun>& healthy,
+                  const std::vector<FaultCondition>& faults,
+                  const FaultySource& faulty_by, const TrainingOptions& options,
+                  Reporter& reporter, const ModelSet* like = nullptr) {
+  ModelSet models = Describe(healthy, fitted.normal, faults, options);
+  const NormalResiduals held_out =
+      CalibrateHealthy(fitted, options, models.observers.front());
+  const std::vector<Condition> compared =
+      FitFaults(fitted, faults, faulty_by, options, reporter, models);
+  reporter.Report(kNormalShare + kObserverShare, "comparing faults");
+  FitLimits(fitted, held_out, options, models);
+  FitInterpolationErrors(compared, models);
+  SetFitBounds(compared, options.threads, models);
+  SetAccounting(compared, options.threads, models);
+  if (like == nullptr) {
+    FindGroups(compared, options.threads, models);
+  } else {
+    models.groups = like->groups;
+    models.undetectable = like->undetectable;
+  }
+  Validate(models);
+  reporter.Report(1.0, "done");
+  return models;
+}
+
+// Regressors and number of rules of `like`, fitted to other data.
+TsModel FitLike(const TsModel& like, double saturation, ChannelPlan plan,
+                const Condition& normal, const FitOptions& options) {
+  plan.rule_counts = {static_cast<int>(like.rules.size())};
+  FitOptions fixed = FitOptionsOf(plan, options);
+  fixed.rules.min_rules = plan.rule_counts.front();
+  return FitChannel(plan, like.regressors, normal, fixed, saturation);
+}
+
 }  // namespace
 
 ModelSet TrainDifferenceSet(const std::vector<TrainingRun>& healthy,
                             const std::vector<FaultCondition>& faults,
                             const FaultSynthesis& synthesize, double flow_limit,
                             const TrainingOptions& options,
-                            const Progress& progress) {
+                            const Progress& progress,
+                            FaultyStretches* simulated) {
   Require(!options.channels.empty(), "a model set needs a channel");
   Require(faults.size() < kMaxObservers, "there are too many faults");
   Reporter reporter(progress);
   reporter.Report(0.0, "fitting the normal observer");
-  // Every step needs what earlier ones have set: FitFaults() the deviations of
-  // the normal observer, FindGroups() limits and interpolation errors.
   const Healthy fitted = FitHealthy(healthy, flow_limit, options);
-  ModelSet models = Describe(healthy, fitted.normal, faults, options);
-  const NormalResiduals held_out =
-      CalibrateHealthy(fitted, options, models.observers.front());
-  const std::vector<Condition> compared =
-      FitFaults(fitted, faults, synthesize, options, reporter, models);
-  reporter.Report(kNormalShare + kObserverShare, "comparing faults");
-  FitLimits(fitted, held_out, options, models);
-  FitInterpolationErrors(compared, models);
-  SetFitBounds(compared, options.threads, models);
-  FindGroups(compared, options.threads, models);
-  Validate(models);
-  reporter.Report(1.0, "done");
-  return models;
+  if (simulated != nullptr) {
+    simulated->healthy = fitted.stretches;
+    simulated->faulty.resize(faults.size());
+  }
+  // Each fault is asked for once, and writes its own entry alone.
+  const auto faulty_by = [&](std::size_t i) {
+    std::vector<Stretch> faulty =
+        Synthesize(faults[i], fitted.stretches, synthesize);
+    if (simulated != nullptr) {
+      simulated->faulty[i] = faulty;
+    }
+    return faulty;
+  };
+  return Assemble(fitted, healthy, faults, faulty_by, options, reporter);
+}
+
+ModelSet RetrainDifferenceSet(const ModelSet& like,
+                              const std::vector<TrainingRun>& healthy,
+                              const std::vector<FaultCondition>& faults,
+                              const FaultyStretches& simulated,
+                              const TrainingOptions& options) {
+  Healthy fitted;
+  fitted.normal = BuildConditions(healthy, options.dataset).front();
+  fitted.stretches = simulated.healthy;
+  fitted.channels.resize(options.channels.size());
+  ParallelFor(
+      static_cast<int>(fitted.channels.size()), options.threads, [&](int c) {
+        const auto i = static_cast<std::size_t>(c);
+        const TsModel& normal = like.observers.front().channels[i].model;
+        const ChannelObserver& fault = like.observers.back().channels[i];
+        NormalChannel& channel = fitted.channels[i];
+        channel.difference = fault.difference;
+        channel.plan = fault.difference
+                           ? OwnPastPlan(options.channels[i], normal.regressors)
+                           : options.channels[i];
+        channel.normal = FitLike(normal, normal.saturation, channel.plan,
+                                 fitted.normal, options.fit);
+        channel.inputs =
+            fault.difference
+                ? FitLike(fault.model, normal.saturation, options.channels[i],
+                          fitted.normal, options.fit)
+                : channel.normal;
+        PrepareFaults(fitted.stretches, channel);
+      });
+  const Progress none;
+  Reporter reporter(none);
+  return Assemble(
+      fitted, healthy, faults,
+      [&](std::size_t i) { return simulated.faulty[i]; }, options, reporter,
+      &like);
 }
 
 namespace {

@@ -68,6 +68,13 @@ ChannelObserver FitDifference(const NormalChannel& channel,
 using FaultSynthesis =
     std::function<std::vector<Sample>(const FaultCondition&, const Stretch&)>;
 
+/// Stretches of a healthy valve, and what faults make of them.
+struct FaultyStretches {
+  std::vector<Stretch> healthy;
+  /// By fault; each parallel to `healthy`.
+  std::vector<std::vector<Stretch>> faulty;
+};
+
 /// Builds a model set for a valve that has only ever been healthy: the normal
 /// observer is fitted to the healthy runs, a fault observer is ŷ_i = ŷ_0 + δ_i
 /// with δ_i a Takagi-Sugeno model of what the fault changes (FitDifference).
@@ -77,12 +84,27 @@ using FaultSynthesis =
 /// @param healthy Every sample counts as normal operation.
 /// @param faults Ordered by fault. At most kMaxObservers − 1.
 /// @param flow_limit Upper limit of the flow transmitter [flow unit].
+/// @param simulated What the observers were fitted to; null: is not asked for.
 /// @throws DataError naming run or channel if the runs do not suffice.
 ModelSet TrainDifferenceSet(const std::vector<TrainingRun>& healthy,
                             const std::vector<FaultCondition>& faults,
                             const FaultSynthesis& synthesize, double flow_limit,
                             const TrainingOptions& options,
-                            const Progress& progress = {});
+                            const Progress& progress = {},
+                            FaultyStretches* simulated = nullptr);
+
+/// A set of other runs of the same valve, to be scored on what these leave out:
+/// observers, limits and bounds are fitted anew. Regressors, numbers of rules
+/// and groups are those of `like`, and nothing is simulated.
+///
+/// @param like By TrainDifferenceSet() with the same faults and options.
+/// @param simulated Of stretches of `healthy`.
+/// @throws DataError as TrainDifferenceSet().
+ModelSet RetrainDifferenceSet(const ModelSet& like,
+                              const std::vector<TrainingRun>& healthy,
+                              const std::vector<FaultCondition>& faults,
+                              const FaultyStretches& simulated,
+                              const TrainingOptions& options);
 
 /// True if TransferDifferenceSet() may take `of_type` for this valve: period,
 /// flow unit and channels are the same, the observers are differences or share

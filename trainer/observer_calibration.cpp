@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "diagnosis/fault_bank.h"
+#include "diagnosis/fault_catalogue.h"
 #include "diagnosis/fit_window.h"
 #include "diagnosis/observer_bank.h"
 #include "diagnosis/residual_windows.h"
@@ -574,6 +575,60 @@ void SetFitBounds(const std::vector<Condition>& conditions, int threads,
           std::max(mean + reach, room.upper_mean),
           std::max(UpperSquare(seen.logs, share), room.upper_square)};
     }
+  }
+}
+
+namespace {
+
+// `plan` has the normal observer and the one in question.
+SignalMask ExplainedBy(const Condition& condition,
+                       const std::shared_ptr<const ObserverPlan>& plan) {
+  const ModelSet& models = plan->models();
+  std::vector<AccountedShare> shares(models.channels.size());
+  for (const Stretch& stretch : condition.validation) {
+    if (stretch.samples.empty()) {
+      continue;
+    }
+    ObserverBank bank(plan);
+    bank.Initialise(stretch.samples.front());
+    for (std::size_t k = 0; k < stretch.samples.size(); ++k) {
+      bank.Step(stretch.samples[k]);
+      for (std::size_t c = 0; c < shares.size(); ++c) {
+        const int channel = static_cast<int>(c);
+        const double sd = models.observers.front().channels[c].residual_sd;
+        const double normal = bank.residual(0, channel) / sd;
+        const double own = bank.residual(1, channel) / sd;
+        if (static_cast<int>(k) >= models.decision.settling_samples &&
+            bank.active(channel) && !bank.saturated(channel) &&
+            !std::isnan(normal + own)) {
+          shares[c].Push(normal, own);
+        }
+      }
+    }
+  }
+  SignalMask explained = kRodSignals;
+  for (std::size_t c = 0; c < shares.size(); ++c) {
+    const bool tolerates = shares[c].tells(models.decision.isolation_samples) &&
+                           shares[c].share() < AccountedShare::kLeastOwn;
+    const unsigned output = MaskOf(models.channels[c].output);
+    explained &= static_cast<SignalMask>(tolerates ? ~output : ~0U);
+  }
+  return explained & RequiredSignals(models);
+}
+
+}  // namespace
+
+void SetAccounting(const std::vector<Condition>& conditions, int threads,
+                   ModelSet& models) {
+  std::vector<SignalMask> explained(models.observers.size());
+  ParallelFor(static_cast<int>(explained.size()) - 1, threads, [&](int i) {
+    const auto o = static_cast<std::size_t>(i) + 1;
+    explained[o] =
+        ExplainedBy(conditions[o], std::make_shared<const ObserverPlan>(
+                                       WithObservers(models, {0, i + 1})));
+  });
+  for (std::size_t o = 1; o < explained.size(); ++o) {
+    models.observers[o].moved |= explained[o];
   }
 }
 

@@ -79,6 +79,14 @@ void FitInterpolationErrors(const std::vector<Condition>& conditions,
 void SetFitBounds(const std::vector<Condition>& conditions, int threads,
                   ModelSet& models);
 
+/// Adds X and F to Observer::moved of a fault observer where it accounts for
+/// the residuals of normal operation in its condition's own validation
+/// stretches (AccountedShare), or where those are as in normal operation: it
+/// then has to account for what it is said to explain. An observer that only
+/// tolerates, as that of a rod that sticks, is left without them.
+void SetAccounting(const std::vector<Condition>& conditions, int threads,
+                   ModelSet& models);
+
 /// Of P1, P2 and T1, those outside normal operation in 95 % of the validation
 /// samples: Observer::moved.
 SignalMask MovedIn(const Condition& condition, const ModelSet& models);

@@ -25,10 +25,10 @@ struct TrainingOptions {
   DecisionParameters decision;
   DatasetOptions dataset;
   FitOptions fit;
-  double false_alarms_per_hour{1e-3};  ///< Over all channels together.
-  int threads{0};                      ///< 0: all of the machine.
-  std::string software;                ///< Stored with the set.
-  std::int64_t created_ns{0};          ///< Stored with the set.
+  double false_alarms_per_hour{kFalseAlarmsPerHour};
+  int threads{0};              ///< 0: all of the machine.
+  std::string software;        ///< Stored with the set.
+  std::int64_t created_ns{0};  ///< Stored with the set.
   /// FloorLimits::flow_shape of a valve whose trim is known.
   std::vector<double> flow_shape{};
 };

@@ -109,6 +109,7 @@ std::shared_ptr<const ModelFacts> FactsOf(const ModelSet& models) {
   facts->period_s = models.sample_period_s;
   facts->flow_unit = models.flow_unit;
   facts->required = RequiredSignals(models);
+  facts->command = models.position_as_command ? Signal::kX : Signal::kCv;
   return facts;
 }
 
@@ -170,8 +171,8 @@ std::vector<WindowBeyond> WindowsBeyond(const ModelFacts& models,
   for (const TracePoint& point : points) {
     if (point.quality == Quality::kLive &&
         point.residuals.size() == set.channels.size()) {
-      windows.Push(point.residuals, point.sample.Has(Signal::kCv)
-                                        ? point.sample[Signal::kCv]
+      windows.Push(point.residuals, point.sample.Has(models.command)
+                                        ? point.sample[models.command]
                                         : kNone);
     }
   }

@@ -36,7 +36,8 @@ struct ModelFacts {
   int detection_samples{2};                 ///< n_d
   double period_s{1.0};
   FlowUnit flow_unit{FlowUnit::kM3PerHour};
-  SignalMask required{0};  ///< Signals that the set needs.
+  SignalMask required{0};       ///< Signals that the set needs.
+  Signal command{Signal::kCv};  ///< What it reads as the command.
 };
 
 std::shared_ptr<const ModelFacts> FactsOf(const ModelSet& models);

@@ -20,6 +20,7 @@
 #include "report/report.h"
 #include "report/signal_list.h"
 #include "report/stop_signals.h"
+#include "simulator/fault_effects.h"
 #include "storage/database/data_directory.h"
 #include "storage/models/model_codec.h"
 #include "storage/models/models.h"
@@ -52,7 +53,7 @@ using report::Json;
 struct TypeOptions {
   std::vector<std::string> signals;
   std::string type{"lublin-actuator-3"};
-  int threads{0};
+  OnboardingOptions onboarding;
 };
 
 struct CoverageOptions : TypeOptions {
@@ -65,10 +66,6 @@ struct OnboardOptions : TypeOptions {
   std::vector<std::string> files;
   importer::TableOptions table;
   std::string save_type;
-  std::string name;
-  double false_alarms_per_hour{1e-3};
-  bool fit{true};
-  bool assess{true};
   bool gains{false};
   bool extend{false};
   bool accept{false};
@@ -78,6 +75,9 @@ struct OnboardOptions : TypeOptions {
 Json CoverageJson(const CoverageTable& table) {
   Json json = {{"signals", report::SignalsJson(table.signals)},
                {"seconds", table.seconds},
+               {"parts", table.parts},
+               {"alarmed", table.alarmed},
+               {"judged", table.judged},
                {"faults", Json::array()},
                {"gains", Json::array()}};
   for (const FaultCoverage& coverage : table.faults) {
@@ -110,7 +110,11 @@ void AddCoverage(const CoverageTable& table, const std::string& path,
   };
   report.Line("coverage with " + report::SignalsText(table.signals) +
               ", each fault given " + FormatNumber(table.seconds, 0) +
-              " s to show; smallest strength");
+              " s to show in " +
+              (table.parts == 1 ? std::string("data")
+                                : "each of " + std::to_string(table.parts) +
+                                      " parts of the record") +
+              " that the models did not see; smallest strength");
   report.Table(path + "faults",
                {{.heading = "fault", .key = "fault", .text = directed},
                 {"description", "description"},
@@ -128,6 +132,7 @@ Json OnboardingJson(const Onboarding& onboarding,
   Json json = ModelsJson(onboarding.models);
   json["hours"] = onboarding.hours;
   json["size"] = onboarding.size;
+  json["position_as_command"] = onboarding.models.position_as_command;
   json["fault_observers_of"] =
       onboarding.transferred ? Json(NameOf(*of_type)) : Json();
   json["parameters"] = Json::array();
@@ -160,8 +165,7 @@ Json OnboardingJson(const Onboarding& onboarding,
 // What the set that is extended saw of the faults, and what the new one sees.
 Json ExtendsJson(const ModelSet& before, const Onboarding& onboarding) {
   Json faults = Json::array();
-  for (const CoverageChange& change :
-       ChangesOf(*onboarding.coverage_before, *onboarding.coverage)) {
+  for (const CoverageChange& change : *onboarding.changes) {
     const auto strength = [&](const std::optional<double>& smallest) {
       return smallest ? Json(change.negative ? -*smallest : *smallest) : Json();
     };
@@ -180,8 +184,7 @@ Json ExtendsJson(const ModelSet& before, const Onboarding& onboarding) {
 // without that being said.
 void RequireAccepted(const Onboarding& onboarding) {
   std::vector<std::string> lost;
-  for (const CoverageChange& change :
-       ChangesOf(*onboarding.coverage_before, *onboarding.coverage)) {
+  for (const CoverageChange& change : *onboarding.changes) {
     if (change.lost()) {
       lost.push_back(FaultName(change.fault) + (change.negative ? " (-)" : ""));
     }
@@ -240,18 +243,41 @@ std::string LeastFlowChange(const Onboarding& onboarding) {
   return FormatNumber(100.0 * share, 0);
 }
 
+std::vector<int> FaultsOfRodAlone() {
+  std::vector<int> faults;
+  for (int fault = 1; fault <= kLastFault; ++fault) {
+    if (simulator::ShowsInRodAlone(fault) &&
+        IsVisibleIn(fault, kBasicSignals)) {
+      faults.push_back(fault);
+    }
+  }
+  return faults;
+}
+
 // What signals and period of the record keep from being seen.
 std::vector<std::string> LimitsOfRecord(const Onboarding& onboarding) {
   constexpr double kSlowS = 5.0;
   std::vector<std::string> lines;
+  const bool at_position = onboarding.models.position_as_command;
+  const double period_s = onboarding.models.sample_period_s;
   const auto has = [&](Signal signal) {
     return (onboarding.signals & MaskOf(signal)) != 0;
   };
-  if (!has(Signal::kX)) {
+  if (at_position) {
+    lines.push_back(
+        "judged at the position: one sample in " + FormatNumber(period_s, 0) +
+        " s is too slow for this command, which says nothing of X, while F "
+        "follows X. Not seen is how the rod follows the command (" +
+        FaultsText(FaultsOfRodAlone()) +
+        "): that takes a sample a second. A stuck or wrong X (f13) is seen in "
+        "F alone");
+  } else if (!has(Signal::kX)) {
     lines.push_back(
         "no position (X): faults of the rod, the trim, the flow meter and the "
         "pressures are seen in F alone, which tells few of them apart; play, "
         "friction and the position transmitter are not told at all");
+  }
+  if (at_position || !has(Signal::kX)) {
     lines.push_back("a change of F by less than " +
                     LeastFlowChange(onboarding) +
                     " % of its mean is within the limits: the healthy record "
@@ -261,10 +287,11 @@ std::vector<std::string> LimitsOfRecord(const Onboarding& onboarding) {
   if (has(Signal::kF) && !(has(Signal::kP1) && has(Signal::kP2))) {
     lines.push_back(
         "no pressures on both sides (P1, P2): a change of pressure is taken "
-        "for a change of the flow at the same opening (f2, f3, f17, f19), and "
-        "the force on the rod is not known (f1, f10, f16)");
+        "for a change of the flow at the same opening (f2, f3, f17, f19)" +
+        std::string(at_position ? ""
+                                : ", and the force on the rod is not known "
+                                  "(f1, f10, f16)"));
   }
-  const double period_s = onboarding.models.sample_period_s;
   if (period_s >= kSlowS) {
     lines.push_back(
         "one sample in " + FormatNumber(period_s, 0) +
@@ -274,6 +301,22 @@ std::vector<std::string> LimitsOfRecord(const Onboarding& onboarding) {
         FormatNumber(20.0 * period_s / 60.0, 0) + " min after its detection");
   }
   return lines;
+}
+
+void AddChannels(int decimals, report::Report& report) {
+  report.Table(
+      "fit",
+      {{"channel", "channel"},
+       {"unit", "unit"},
+       {.heading = "RMSE", .key = "rmse", .decimals = decimals},
+       {.heading = "bias", .key = "bias", .decimals = decimals},
+       {.heading = "VAF [%]", .key = "vaf", .decimals = 1},
+       {.heading = "naive RMSE", .key = "naive_rmse", .decimals = decimals},
+       {.heading = "seen from", .key = "seen_from", .decimals = decimals}});
+  report.Line(
+      "normal observer on data it was not fitted to; naive: X = CV, else the "
+      "mean; seen from: the smallest lasting change that is beyond the "
+      "limits\n");
 }
 
 // Physical parameters, fit of the normal observer against a naive model, model
@@ -292,19 +335,7 @@ report::Report ReportOf(const Onboarding& onboarding,
     AddFit(*onboarding.fit, report);
   }
   const int decimals = FlowDecimals(onboarding.type.parameters);
-  report.Table(
-      "fit",
-      {{"channel", "channel"},
-       {"unit", "unit"},
-       {.heading = "RMSE", .key = "rmse", .decimals = decimals},
-       {.heading = "bias", .key = "bias", .decimals = decimals},
-       {.heading = "VAF [%]", .key = "vaf", .decimals = 1},
-       {.heading = "naive RMSE", .key = "naive_rmse", .decimals = decimals},
-       {.heading = "seen from", .key = "seen_from", .decimals = decimals}});
-  report.Line(
-      "normal observer on data it was not fitted to; naive: X = CV, else the "
-      "mean; seen from: the smallest lasting change that is beyond the "
-      "limits\n");
+  AddChannels(decimals, report);
   report.Line("model set " + NameOf(models) + ", hash " +
               storage::HashHex(models.content_hash) + ", " +
               std::to_string(models.observers.size()) + " observers");
@@ -345,6 +376,11 @@ report::Report ReportOf(const Onboarding& onboarding,
               FaultsText(models.undetectable) + "\n");
   if (onboarding.coverage) {
     AddCoverage(*onboarding.coverage, "coverage/", report);
+  } else if (!onboarding.unscored.empty()) {
+    report.Line(
+        "no coverage table: with a part left out for scoring, the rest "
+        "is too short: " +
+        onboarding.unscored);
   }
   return report;
 }
@@ -417,17 +453,20 @@ struct OnboardingJob {
   OnboardingOptions settings;
 };
 
+std::string NameOfSet(const OnboardOptions& options) {
+  return options.onboarding.name.empty() ? options.valve
+                                         : options.onboarding.name;
+}
+
 OnboardingJob NewJob(const OnboardOptions& options, storage::ModelStore& store,
                      const report::Context& context) {
-  OnboardingJob job;
   const FoundType found = FindType(options.type, &store);
-  job.runs = LoadRuns(options, found.type, std::nullopt, context);
-  job.settings.name = options.name.empty() ? options.valve : options.name;
+  OnboardingJob job{LoadRuns(options, found.type, std::nullopt, context),
+                    options.onboarding};
+  job.settings.name = NameOfSet(options);
   job.settings.type = found.type;
-  job.settings.fit = options.fit && !found.stored;
+  job.settings.fit = job.settings.fit && !found.stored;
   job.settings.of_type = SetOf(found, store);
-  job.settings.assess = options.assess;
-  job.settings.false_alarms_per_hour = options.false_alarms_per_hour;
   return job;
 }
 
@@ -448,8 +487,8 @@ OnboardingJob ExtensionJob(const OnboardOptions& options,
     }
   }
   const FlowUnit unit = former.models->flow_unit;
-  OnboardingJob job;
-  job.runs = LoadRuns(before, former.type, unit, context);
+  OnboardingJob job{LoadRuns(before, former.type, unit, context),
+                    options.onboarding};
   job.settings.former_runs = job.runs.size();
   for (TrainingRun& run : LoadRuns(more, former.type, unit, context)) {
     job.runs.push_back(std::move(run));
@@ -473,8 +512,7 @@ report::Report OnboardValve(const OnboardOptions& options,
     throw ConfigError("--dry-run and --shard are of --plant");
   }
   if (!options.extend) {
-    RequireStorable(options.name.empty() ? options.valve : options.name,
-                    "--name");
+    RequireStorable(NameOfSet(options), "--name");
   }
   if (!options.save_type.empty()) {
     RequireStorable(options.save_type, "--save-type");
@@ -485,7 +523,6 @@ report::Report OnboardValve(const OnboardOptions& options,
                             storage::Access::kOccasionalWriter);
   auto [runs, settings] = options.extend ? ExtensionJob(options, store, context)
                                          : NewJob(options, store, context);
-  settings.threads = options.threads;
   settings.software = context.software;
   settings.created_ns = NowNs();
   report::StopSignals signals;
@@ -510,8 +547,13 @@ report::Report OnboardValve(const OnboardOptions& options,
       *store.Store(ResultOf(options.valve, onboarding, options.save_type));
   const std::chrono::duration<double> seconds =
       std::chrono::steady_clock::now() - start;
+  if (onboarding.models.position_as_command) {
+    std::ranges::transform(runs, runs.begin(), AtPosition);
+  }
   report::Report report = ReportOf(
-      onboarding, settings.of_type, JudgeRecord(runs, onboarding.hours),
+      onboarding, settings.of_type,
+      JudgeRecord(runs, onboarding.hours,
+                  onboarding.coverage ? &*onboarding.coverage : nullptr),
       "valve " + options.valve + ": " + FormatNumber(onboarding.hours, 2) +
           " h of healthy data, onboarded in " +
           std::to_string(std::lround(seconds.count())) + " s");
@@ -536,9 +578,8 @@ report::Report Assess(const CoverageOptions& options,
   if (std::filesystem::exists(directory.models())) {
     store.emplace(directory.models());
   }
-  OnboardingOptions settings;
+  OnboardingOptions settings = options.onboarding;
   settings.name = "coverage";
-  settings.threads = options.threads;
   report::StopSignals stop;
   stop.EndWithin(kOnboardPatience, "\nfdi-trainer: error: interrupted\n");
   report::Progress bar("coverage");
@@ -557,7 +598,7 @@ CLI::Option* AddTypeOptions(CLI::App& verb, const char* signals,
   verb.add_option("--type", options.type, type)
       ->type_name("NAME|FILE.toml")
       ->capture_default_str();
-  verb.add_option("--threads", options.threads,
+  verb.add_option("--threads", options.onboarding.threads,
                   "Number of threads; 0 uses all cores")
       ->check(CLI::Range(0, 1024))
       ->type_name("N");
@@ -588,16 +629,17 @@ void AddOptions(CLI::App& verb, OnboardOptions& options) {
                   "Store the fitted parameters as a valve type for others of "
                   "its kind")
       ->type_name("NAME");
-  verb.add_option("--name", options.name,
+  verb.add_option("--name", options.onboarding.name,
                   "Name of the model set (default: the id of the valve)")
       ->type_name("NAME");
-  verb.add_option("--false-alarms-per-hour", options.false_alarms_per_hour,
+  verb.add_option("--false-alarms-per-hour",
+                  options.onboarding.false_alarms_per_hour,
                   "Rate that the thresholds are set for")
       ->check(CLI::Range(1e-9, 3600.0))
       ->type_name("R");
-  verb.add_flag("!--no-fit", options.fit,
+  verb.add_flag("!--no-fit", options.onboarding.fit,
                 "Take the parameters of the type as they are");
-  verb.add_flag("!--no-coverage", options.assess,
+  verb.add_flag("!--no-coverage", options.onboarding.assess,
                 "Leave out the table of faults that can be detected");
   verb.add_flag("--extend", options.extend,
                 "Train the models of the valve again, from their former record "
@@ -625,8 +667,8 @@ void AddOnboardVerb(report::Program& program) {
         return options->plant.plant.empty()
                    ? OnboardValve(*options, context)
                    : OnboardFromTable(options->plant, options->files,
-                                      options->table, options->threads,
-                                      options->false_alarms_per_hour, context);
+                                      options->table, options->onboarding,
+                                      context);
       });
   AddOptions(verb, *options);
   // The rows of a table state these, or leave nothing to choose: a type is

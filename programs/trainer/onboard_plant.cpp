@@ -254,19 +254,18 @@ void PlantVerbOptions::AddTo(CLI::App& verb) {
 
 report::Report OnboardFromTable(const PlantVerbOptions& options,
                                 const std::vector<std::string>& files,
-                                const importer::TableOptions& form, int threads,
-                                double false_alarms_per_hour,
+                                const importer::TableOptions& form,
+                                const OnboardingOptions& onboarding,
                                 const report::Context& context) {
   const importer::PlantTable table = importer::ReadPlantTable(options.plant);
   const auto folder = options.plant.parent_path();
   PlantSettings settings;
   settings.folder = folder;
   std::tie(settings.shard, settings.shards) = ParseShard(options.shard);
-  settings.threads = threads;
-  settings.false_alarms_per_hour = false_alarms_per_hour;
+  settings.onboarding = onboarding;
+  settings.onboarding.software = context.software;
+  settings.onboarding.created_ns = NowNs();
   settings.utc = context.options.utc;
-  settings.software = context.software;
-  settings.created_ns = NowNs();
   PlantFiles shelf(FormOf(form, table, folder, context.options.utc),
                    options.dry_run ? kDryRunLines : 0);
   const std::vector<PlantJob> jobs =

@@ -7,6 +7,7 @@
 #include "import/tag_map.h"
 #include "report/program.h"
 #include "report/report.h"
+#include "trainer/onboarding/onboarding.h"
 
 namespace CLI {
 class App;
@@ -24,11 +25,12 @@ struct PlantVerbOptions {
 };
 
 /// Onboards every row of the table, or says what would be done.
+/// @param onboarding of every row; its name and type are those of the row.
 /// @param files as --file gives them; none: those of the table.
 report::Report OnboardFromTable(const PlantVerbOptions& options,
                                 const std::vector<std::string>& files,
-                                const importer::TableOptions& form, int threads,
-                                double false_alarms_per_hour,
+                                const importer::TableOptions& form,
+                                const OnboardingOptions& onboarding,
                                 const report::Context& context);
 
 }  // namespace fdi::trainer

@@ -11,7 +11,6 @@
 
 #include "base/time_units.h"
 #include "diagnosis/fault_catalogue.h"
-#include "diagnosis/trained_signals.h"
 #include "simulator/fault_effects.h"
 
 namespace fdi::simulator {
@@ -76,6 +75,17 @@ bool IsAlike(Alike alike, const SecondLook& look, const Explanation& e,
       break;
   }
   return false;
+}
+
+// Whether the best fault would have to be larger than there is, and leaves more
+// than a healthy valve does: the window shows something else. A stop and a lack
+// of force are complete at that strength.
+bool IsExhausted(const SecondLook& look) {
+  constexpr double kLargest = 0.99;
+  const Explanation& best = look.ranked.front();
+  return !look.complete && look.misfit > kGoodMisfit && IsFault(best.fault) &&
+         std::abs(best.strength) > kLargest &&
+         FaultFactsOf(best.fault).onset == Onset::kGradual;
 }
 
 void AddIndistinguishable(const SecondLook& look, double nothing,
@@ -151,11 +161,11 @@ LookAnswer AnswerOf(const SecondLook& look, bool early) {
   const double most = healthy ? kMaxHealthyMisfit : kMaxMisfit;
   // The misfit comes first: where even the best explanation does not follow the
   // record, neither health nor a fault can be concluded from it.
-  answer.outcome = look.misfit > most ? LookOutcome::kNoneFits
-                   : healthy          ? LookOutcome::kNothing
-                   : answer.faults.size() > kMaxNamedFaults
-                       ? LookOutcome::kUnclear
-                       : LookOutcome::kNamed;
+  answer.outcome =
+      look.misfit > most || IsExhausted(look)  ? LookOutcome::kNoneFits
+      : healthy                                ? LookOutcome::kNothing
+      : answer.faults.size() > kMaxNamedFaults ? LookOutcome::kUnclear
+                                               : LookOutcome::kNamed;
   return answer;
 }
 
@@ -269,10 +279,11 @@ std::optional<std::vector<int>> NamesOf(const LookAnswer& answer,
   return names;
 }
 
-EpisodeLooks::EpisodeLooks(const ValvePhysics& physics)
+EpisodeLooks::EpisodeLooks(const ValvePhysics& physics, bool at_position)
     : physics_(physics),
       period_ns_(PeriodOf(physics)),
-      slowness_(SlownessOf(physics.drive.period_s)) {}
+      slowness_(SlownessOf(physics.drive.period_s)),
+      at_position_(at_position) {}
 
 // One row a period; up to three missing ones are held, a longer gap begins
 // anew. So does another set of signals, because a window has one for all rows.
@@ -357,6 +368,7 @@ std::optional<LookTask> EpisodeLooks::Task() const {
   task.detection_stamp_ns = *detection_ns_;
   task.set_back_ns = set_back_ns_;
   task.window.signals = signals_;
+  task.window.at_position = at_position_;
   task.slowness = slowness_;
   const std::int64_t begin_ns = *detection_ns_ - set_back_ns_;
   // A routine look finds what has been there for minutes.
@@ -399,6 +411,7 @@ std::optional<LookTask> EpisodeLooks::RoutineTask(bool suspected) const {
   task.occasion = suspected ? LookOccasion::kStill : LookOccasion::kRoutine;
   task.stamp_ns = rows_.back().stamp_ns;
   task.window.signals = signals_;
+  task.window.at_position = at_position_;
   task.slowness = slowness_;
   for (const Row& row : rows_) {
     task.window.rows.push_back(row.row);
@@ -615,10 +628,9 @@ void ObserversMemory::Step(std::int64_t detection_stamp_ns,
 }
 
 ValveLooks::ValveLooks(const ValvePhysics& physics, const ModelSet* models)
-    : looks_(physics),
+    : looks_(physics, models != nullptr && models->position_as_command),
       models_(models),
-      trained_(models != nullptr ? TrainedSignals(*models)
-                                 : std::numeric_limits<SignalMask>::max()),
+      trained_(models != nullptr ? TrainedSignals(*models) : TrainedSignals()),
       period_ns_(PeriodOf(physics)) {}
 
 std::optional<LookTask> ValveLooks::Step(const Sample& sample,
@@ -629,7 +641,7 @@ std::optional<LookTask> ValveLooks::Step(const Sample& sample,
     stamp_ns_ = sample.stamp_ns;
   }
   const LookAnswer* found = suspicion_.found();
-  auto due = looks_.Step(WithOnly(sample, trained_), verdict, found != nullptr);
+  auto due = looks_.Step(trained_.Of(sample), verdict, found != nullptr);
   open_ = verdict.detected;
   for (const Transition& transition : verdict.Transitions()) {
     detection_ns_ = transition.detection_stamp_ns;

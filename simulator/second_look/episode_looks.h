@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "diagnosis/model_set.h"
+#include "diagnosis/trained_signals.h"
 #include "diagnosis/verdict.h"
 #include "simulator/second_look/second_look.h"
 
@@ -149,7 +150,8 @@ inline constexpr std::int64_t kRoutineDelayNs = 60'000'000'000;
 class EpisodeLooks {
  public:
   /// `physics` must outlive it.
-  explicit EpisodeLooks(const ValvePhysics& physics);
+  /// @param at_position see LookWindow.
+  explicit EpisodeLooks(const ValvePhysics& physics, bool at_position = false);
 
   /// The next sample and what the engine said about it.
   /// @param suspected a routine look found the valve abnormal.
@@ -175,6 +177,7 @@ class EpisodeLooks {
   const ValvePhysics& physics_;
   std::int64_t period_ns_;
   std::int64_t slowness_;
+  bool at_position_;
   SignalMask signals_{0};
   std::deque<Row> rows_{};
   // Of the last time that the rows began anew: when, if nothing was read for
@@ -296,7 +299,7 @@ class ValveLooks {
 
   EpisodeLooks looks_;
   const ModelSet* models_;
-  SignalMask trained_;
+  TrainedSignals trained_;
   std::int64_t period_ns_;
   LookBook book_;
   Suspicion suspicion_;

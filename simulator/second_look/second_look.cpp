@@ -67,6 +67,14 @@ bool ActsOnInputs(int fault) {
   return fault != 0 && FaultFactsOf(fault).acts_on == ActsOn::kInputs;
 }
 
+// The recorded inputs already have what a fault does to them, unless it hides
+// one; a transmitter fault does not reach the valve, which InputAt() has given
+// the usual value.
+bool ReachesValve(int fault) {
+  return fault != 0 && !TransmitterOf(fault) &&
+         (!ActsOnInputs(fault) || FaultFactsOf(fault).hides.has_value());
+}
+
 // A channel's share of Q, and what of it the errors alone contribute.
 struct ChannelFit {
   double cost{0.0};
@@ -149,7 +157,7 @@ double Looker::MeterEnd() const {
   constexpr int kMinReadings = 10;
   const double end = valve_.instruments.flow.high;
   double most = kLeastUse * end;
-  int equal = 0;
+  std::ptrdiff_t equal = 0;
   for (const RecordRow& row : window_.rows) {
     if (row.flow_measured && row.flow >= most) {
       equal = row.flow > most ? 1 : equal + 1;
@@ -232,7 +240,7 @@ bool Looker::IsSeenInInputs(const Hypothesis& h) const {
 
 Trajectory Looker::Simulate(int fault, double strength, Course course,
                             double supply) {
-  if (ActsOnFlowAlone(fault)) {
+  if (ActsOnFlowAlone(fault) || (window_.at_position && fault != 0)) {
     return FlowOnly(fault, strength, course);
   }
   ValveSimulationConfig config;
@@ -251,13 +259,7 @@ Trajectory Looker::Simulate(int fault, double strength, Course course,
   config.resolution = false;
   // Half the time of 1, for an error of 0.02 % of X (record_fit.h).
   config.tolerance_scale = 10.0;
-  // The recorded inputs already have what a fault does to them, unless it hides
-  // one; a transmitter fault does not reach the valve, which InputAt() has
-  // given the usual value.
-  const bool acts =
-      fault != 0 && !TransmitterOf(fault) &&
-      (!ActsOnInputs(fault) || FaultFactsOf(fault).hides.has_value());
-  if (acts) {
+  if (ReachesValve(fault)) {
     FaultSchedule schedule;
     schedule.fault = fault;
     schedule.start_s = course.start * config.period_s;
@@ -275,7 +277,8 @@ Trajectory Looker::Simulate(int fault, double strength, Course course,
   return answers;
 }
 
-// X as in the healthy valve, the flow by (12), without a simulation. The
+// X as in the healthy valve, the flow by (12), without a simulation. At the
+// position that is read, the rod is there whatever the fault does to it. The
 // command needs no delay here: FlowReading() does not use it.
 Trajectory Looker::FlowOnly(int fault, double strength, Course course) const {
   Trajectory answers = healthy_;
@@ -287,10 +290,12 @@ Trajectory Looker::FlowOnly(int fault, double strength, Course course) const {
     } else {
       ApplyFault(fault, now, effects);
     }
+    if (!ReachesValve(fault)) {
+      effects = {};
+    }
     RecordAnswer& answer = answers[static_cast<std::size_t>(k)];
-    answer.flow = FlowReading(valve_, effects,
-                              window_.rows[static_cast<std::size_t>(k)].input,
-                              answer.x_pct);
+    answer.flow =
+        FlowReading(valve_, effects, InputAt(k, fault, now), answer.x_pct);
   }
   return answers;
 }
@@ -497,7 +502,8 @@ std::vector<Hypothesis> Looker::Hypotheses() const {
   for (int fault = 1; fault <= kLastFault; ++fault) {
     const FaultFacts& facts = FaultFactsOf(fault);
     if (facts.weak || !IsVisibleIn(fault, window_.signals) ||
-        !Exists(fault, valve_)) {
+        !Exists(fault, valve_) ||
+        (window_.at_position && ShowsInRodAlone(fault))) {
       continue;
     }
     for (const double sign : {1.0, -1.0}) {
@@ -761,8 +767,8 @@ SecondLook Looker::Run(const std::stop_token& stop) {
   SecondLook look;
   look.best = faulty ? first.simulated.at(first.strength) : healthy_;
   look.readings = readings;
-  look.complete =
-      Measures(Signal::kP1) && Measures(Signal::kP2) && Measures(Signal::kX);
+  look.complete = Measures(Signal::kP1) && Measures(Signal::kP2) &&
+                  (Measures(Signal::kX) || window_.at_position);
   look.misfit = (faulty ? ErrorsOf(look.best) : unmoved.errors) / readings;
   // Where nothing fits well, little is told apart.
   const double scale = std::max(1.0, look.misfit);
@@ -783,7 +789,7 @@ SecondLook Looker::Run(const std::stop_token& stop) {
                    });
   if (faulty && first.fault == kSupplyDrop) {
     Hypothesis torn = PerforationLike(first, first.course);
-    // Hypotheses() always has f10, whatever is measured.
+    // Hypotheses() has f10 wherever it has f16.
     const auto f10 = std::ranges::find(hypotheses, kDiaphragmPerforation,
                                        &Hypothesis::fault);
     if (f10->course != first.course) {

@@ -16,6 +16,10 @@ struct LookWindow {
   std::size_t detection{0};     ///< Row of the first abnormal sample; 0 if it
                                 ///< lies before the window.
   SignalMask signals{0};        ///< That were measured.
+  /// The command of the rows is the position that was read
+  /// (PositionAsCommand): faults of which only the rod's way to it tells are no
+  /// hypotheses.
+  bool at_position{false};
 };
 
 /// How one fault, at its best, explains the window.
@@ -42,8 +46,9 @@ struct SecondLook {
   /// ones; far above 1 where none fits.
   double misfit{0.0};
   double readings{0.0};  ///< Of X and F that count as independent.
-  /// Both pressures and X were measured: the force on the rod and what drives
-  /// the flow are known, and so is which of the two a fault changes.
+  /// Both pressures and the position were measured: the force on the rod and
+  /// what drives the flow are known, and so is which of the two a fault
+  /// changes.
   bool complete{true};
   /// The valve's answer under the best explanation, one per row.
   std::vector<RecordAnswer> best;

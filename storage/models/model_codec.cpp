@@ -24,7 +24,8 @@ namespace fdi::storage {
 //   format  = 3, + 1 with physics, + 2 with a floor, + 4 with a former drift,
 //             + 8 with an interpolation allowance, + 16 with names before t_k,
 //             + 32 with the trim of a floor, + 64 with a share of the flow that
-//             is too little, + 128 with limits of a fit
+//             is too little, + 128 with limits of a fit, + 256 if the command
+//             is the position, which has no bytes
 //   payload = the fields of ModelSet in the order of Fields() below, the floor
 //             last; then [physics: list] [drift: of each channel] [allowance]
 //             [early_error] [flow shape of the floor: list]
@@ -49,9 +50,11 @@ constexpr std::uint32_t kWithEarlyNames = 16;
 constexpr std::uint32_t kWithFlowShape = 32;
 constexpr std::uint32_t kWithFlowShare = 64;
 constexpr std::uint32_t kWithFit = 128;
-constexpr std::uint32_t kLastFormat =
-    kFormat + kWithPhysics + kWithFloor + kWithDrift + kWithAllowance +
-    kWithEarlyNames + kWithFlowShape + kWithFlowShare + kWithFit;
+constexpr std::uint32_t kWithPosition = 256;
+constexpr std::uint32_t kLastFormat = kFormat + kWithPhysics + kWithFloor +
+                                      kWithDrift + kWithAllowance +
+                                      kWithEarlyNames + kWithFlowShape +
+                                      kWithFlowShare + kWithFit + kWithPosition;
 constexpr std::uint32_t kMaxPhysics = 256;
 constexpr std::size_t kFrame =
     2 * sizeof(std::uint32_t) + sizeof(std::uint64_t) + sizeof(std::uint32_t);
@@ -212,7 +215,8 @@ void Fields(A& a, T& models) {
   auto& [name, version, content_hash, created_ns, software, preset,
          sample_period_s, flow_unit, validity, stuck, floor, decision, channels,
          observers, faults, groups, undetectable, training_runs,
-         threshold_hours, false_alarms_per_hour, physics] = models;
+         threshold_hours, false_alarms_per_hour, physics, position_as_command] =
+      models;
   a(name, created_ns, software, preset, sample_period_s, flow_unit, validity,
     stuck, decision, Limited{channels, kMaxChannels},
     Limited{observers, kMaxObservers}, Limited{faults, kMaxFaults},
@@ -391,7 +395,8 @@ std::vector<std::byte> EncodeModelSet(const ModelSet& models) {
              (allowance > 0.0 ? kWithAllowance : 0U) +
              (early_error > 0.0 ? kWithEarlyNames : 0U) +
              (shaped ? kWithFlowShape : 0U) + (low_flow ? kWithFlowShare : 0U) +
-             (fits ? kWithFit : 0U));
+             (fits ? kWithFit : 0U) +
+             (models.position_as_command ? kWithPosition : 0U));
   writer.Put(static_cast<std::uint64_t>(payload.writer.size()));
   writer.Append(payload.writer.view().data(), payload.writer.size());
   writer.Put(Checksum(writer.view()));
@@ -459,6 +464,7 @@ ModelSet DecodeModelSet(std::span<const std::byte> bytes,
       observer.moved = static_cast<SignalMask>(moved);
     }
   }
+  models.position_as_command = ((format - kFormat) & kWithPosition) != 0;
   payload.ExpectEnd();
   models.content_hash = ContentHash(models);  // Of what is stored.
   RenumberFindings(models);

@@ -8,6 +8,7 @@
 #include <sys/resource.h>
 
 #include "base/passing_error.h"
+#include "tests/sanitized.h"
 
 namespace fdi {
 namespace {
@@ -37,15 +38,6 @@ constexpr std::size_t kMegabyte = 1U << 20U;
   }
   std::_Exit(0);
 }
-
-// A sanitizer ends the process itself where it gets no memory.
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-constexpr bool kSanitized = true;
-#elif defined(__has_feature)
-constexpr bool kSanitized = __has_feature(address_sanitizer);
-#else
-constexpr bool kSanitized = false;
-#endif
 
 TEST(HeadroomTest, ThreadsAndMemoryOfAnUnlimitedProcessAreThere) {
   EXPECT_NO_THROW(RequireHeadroom(64, 64 * kMegabyte));

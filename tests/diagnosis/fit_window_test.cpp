@@ -66,6 +66,39 @@ TEST(FitWindowTest, TheEffectMayBeOffByOneShareInAllSamples) {
   EXPECT_NEAR(window.square(0), 4.0, 1e-6);
 }
 
+TEST(AccountedShareTest, TellsAnExplanationFromOneThatOnlyTolerates) {
+  const auto share = [](double left) {
+    AccountedShare account;
+    for (int k = 0; k < 100; ++k) {
+      const double noise = k % 2 == 0 ? 1.0 : -1.0;
+      account.Push(12.0 + noise, left * 12.0 + noise);
+    }
+    EXPECT_TRUE(account.tells(20));
+    return account.share();
+  };
+  EXPECT_NEAR(share(0.0), 1.0, 0.01);
+  EXPECT_NEAR(share(0.5), 0.75, 0.01);
+  EXPECT_NEAR(share(1.0), 0.0, 0.01);
+  EXPECT_LT(share(-1.2), 0.0);  // the other sign
+
+  AccountedShare healthy;
+  AccountedShare few;
+  for (int k = 0; k < 100; ++k) {
+    healthy.Push(k % 2 == 0 ? 1.5 : -1.5, 0.0);
+    if (k < 10) {
+      few.Push(9.0, 9.0);
+    }
+  }
+  EXPECT_FALSE(healthy.tells(20));
+  EXPECT_FALSE(few.tells(20));
+  // What was long ago counts no more.
+  for (int k = 0; k < 400; ++k) {
+    few.Fade(0.99);
+    few.Push(9.0, 0.0);
+  }
+  EXPECT_GT(few.share(), 0.99);
+}
+
 TEST(FitWindowTest, AChannelThatSaysTooLittleIsNotJudged) {
   EXPECT_GT(Filled({kNoReading, 5.0, 5.0, kNoReading}, 4).Excess(0, kLimits),
             1.0);

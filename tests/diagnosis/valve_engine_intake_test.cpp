@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include "diagnosis/trained_signals.h"
 #include "diagnosis/valve_engine.h"
 #include "tests/diagnosis/engine_run.h"
 #include "tests/diagnosis/linear_plant.h"
@@ -71,6 +72,80 @@ TEST(ValveEngineIntakeTest, BadQualityIsRefused) {
   Sample sample = PlantSample(0);
   sample.quality[Index(Signal::kF)] = SignalQuality::kBad;
   EXPECT_EQ(engine.Step(sample).intake, Intake::kBadQuality);
+}
+
+// The plant without X; at its position, of which the command says nothing.
+std::shared_ptr<const ModelSet> FlowOfThePlant(bool position_as_command) {
+  ModelSet models = tests::LinearPlant();
+  models.channels.erase(models.channels.begin());
+  for (Observer& observer : models.observers) {
+    observer.channels.erase(observer.channels.begin());
+  }
+  models.position_as_command = position_as_command;
+  Validate(models);
+  return std::make_shared<const ModelSet>(std::move(models));
+}
+
+void LoseCommand(Sample& sample) {
+  sample.Set(Signal::kCv,
+             50.0 + 40.0 * std::sin(1.7 * static_cast<double>(sample.seq)));
+}
+
+TEST(ValveEngineIntakeTest, ASetMayReadThePositionAsCommand) {
+  ValveEngine engine(FlowOfThePlant(true));
+  ValveEngine twin(FlowOfThePlant(false));
+  const Seen healthy = StepRange(engine, 0, 100, LoseCommand);
+  EXPECT_EQ(healthy.last.quality, Quality::kLive);
+  EXPECT_TRUE(healthy.transitions.empty());
+  StepRange(twin, 0, 100);
+  const Seen faulty = StepRange(engine, 100, 150, [](Sample& sample) {
+    LoseCommand(sample);
+    AddF6(sample, 1.0);
+  });
+  const Seen same = StepRange(twin, 100, 150, FullF6);
+  ASSERT_EQ(faulty.transitions.size(), same.transitions.size());
+  ASSERT_FALSE(faulty.transitions.empty());
+  EXPECT_EQ(faulty.last.residuals[0], same.last.residuals[0]);
+  EXPECT_EQ(faulty.last.isolated, same.last.isolated);
+}
+
+TEST(ValveEngineIntakeTest, ThePositionAsCommandIsCheckedLikeACommand) {
+  const auto models = FlowOfThePlant(true);
+  EXPECT_EQ(RequiredSignals(*models), MaskOf(Signal::kX) | MaskOf(Signal::kF));
+  const auto judge = [&](const auto& change) {
+    ValveEngine engine(models);
+    StepRange(engine, 0, 50, LoseCommand);
+    Sample sample = PlantSample(50);
+    change(sample);
+    return engine.Step(sample);
+  };
+  const auto x = Index(Signal::kX);
+  EXPECT_EQ(judge([](Sample&) {}).quality, Quality::kLive);
+  EXPECT_EQ(
+      judge([&](Sample& s) { s.quality[x] = SignalQuality::kBad; }).intake,
+      Intake::kBadQuality);
+  EXPECT_EQ(judge([&](Sample& s) { s.values[x] = std::nan(""); }).intake,
+            Intake::kNotFinite);
+  // The command neither counts where it is bad nor stands in where X is not.
+  EXPECT_EQ(judge([](Sample& s) {
+              s.quality[Index(Signal::kCv)] = SignalQuality::kBad;
+            }).quality,
+            Quality::kLive);
+  EXPECT_EQ(judge([](Sample& s) { s.present ^= MaskOf(Signal::kX); }).quality,
+            Quality::kBadInput);
+}
+
+TEST(ValveEngineIntakeTest, PositionAsCommandLeavesTheOtherReadings) {
+  Sample sample = PlantSample(3);
+  sample.Set(Signal::kCv, 12.0);
+  sample.Set(Signal::kX, 34.0);
+  sample.quality[Index(Signal::kX)] = SignalQuality::kUncertain;
+  const Sample seen = PositionAsCommand(sample);
+  EXPECT_EQ(seen[Signal::kCv], 34.0);
+  EXPECT_EQ(seen.present, MaskOf(Signal::kCv) | MaskOf(Signal::kF));
+  EXPECT_EQ(seen.uncertain(), MaskOf(Signal::kCv));
+  EXPECT_EQ(seen[Signal::kF], sample[Signal::kF]);
+  EXPECT_EQ(seen.stamp_ns, sample.stamp_ns);
 }
 
 TEST(ValveEngineIntakeTest, AnotherFlowUnitIsRefused) {

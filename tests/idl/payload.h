@@ -1,6 +1,6 @@
 #pragma once
 
-#include <cstring>
+#include <algorithm>
 #include <string>
 #include <string_view>
 
@@ -29,7 +29,7 @@ inline std::string Serialized(dds::TopicDataType& type, void* data) {
 inline bool Deserialize(dds::TopicDataType& type, std::string_view bytes,
                         void* data) {
   rtps::SerializedPayload_t payload(static_cast<std::uint32_t>(bytes.size()));
-  std::memcpy(payload.data, bytes.data(), bytes.size());
+  std::copy(bytes.begin(), bytes.end(), payload.data);
   payload.length = static_cast<std::uint32_t>(bytes.size());
 #if FDI_FAST_DDS == 2
   return type.deserialize(&payload, data);

@@ -806,7 +806,7 @@ TEST(KindsTest, UnknownQualityIsNamedAndRefused) {
   EXPECT_THAT(Findings(beside), HasSubstr("\"P\" is no known quality"));
   ColumnMap more = map;
   more.quality.uncertain = {"wobbly"};
-  const auto& sample = ReadCsv(text, {.map = more}).runs[0].samples[3].sample;
+  const Sample sample = ReadCsv(text, {.map = more}).runs[0].samples[3].sample;
   EXPECT_EQ(sample.quality[Index(Signal::kX)], SignalQuality::kUncertain);
 }
 
@@ -1129,7 +1129,7 @@ TEST(KindsTest, WhatValveAndRecordTheModelsAreNotForIsSaid) {
       });
   EXPECT_THAT(Findings(split), HasSubstr("split range"));
   const ColumnMap map = MapOf(split);
-  const Sample& open = ReadCsv(split, {.map = map}).runs[0].samples[110].sample;
+  const Sample open = ReadCsv(split, {.map = map}).runs[0].samples[110].sample;
   EXPECT_EQ(open[Signal::kCv], 0.0) << "fully open, not beyond its range";
 }
 

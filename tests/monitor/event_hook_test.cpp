@@ -15,6 +15,7 @@
 #include "base/error.h"
 #include "report/shared_files.h"
 #include "tests/monitor/linear_models.h"
+#include "tests/sanitized.h"
 #include "tests/storage/temporary_directory.h"
 
 namespace fdi::monitor {
@@ -151,12 +152,18 @@ class FileLimit {
 };
 
 TEST_F(ProgramDeliveryTest, WithoutFilesADeliveryFailsAtOnceAndSaysWhy) {
+  if (kSanitized) {
+    GTEST_SKIP() << "under a sanitizer";
+  }
   const auto delivery = MakeEventDelivery("sleep 1000", seconds(1000));
   const FileLimit limit(1);  // The event itself takes it.
   EXPECT_THAT(delivery->Deliver("x").value_or(""), HasSubstr("pidfd_open"));
 }
 
 TEST_F(ProgramDeliveryTest, WithoutFilesNoDeliveryIsMade) {
+  if (kSanitized) {
+    GTEST_SKIP() << "under a sanitizer";
+  }
   const FileLimit limit(0);
   EXPECT_THROW(MakeEventDelivery("true", seconds(1)), std::system_error);
 }

@@ -87,24 +87,33 @@ TEST(FaultEffectsTest, RefusesUnknownFaultsAndStrengths) {
 }
 
 // The oracle is the integration with the fault.
-TEST(FaultEffectsTest, FaultsThatLeaveTheRodShowInTheFlowAlone) {
+TEST(FaultEffectsTest, WhatLeavesTheRodAndWhatShowsInItAlone) {
   const std::vector<InputRow> rows = RisingCommand();
   const std::vector<Sample> healthy = Answers(0);
   for (int fault = 1; fault <= kLastFault; ++fault) {
     FaultEffects effects;
     ApplyFault(fault, 0.5, effects);
     bool same = true;
+    bool same_at_position = true;
     const std::vector<Sample> faulty = Answers(fault);
     for (std::size_t k = 0; k < faulty.size(); ++k) {
       const double x = faulty[k][Signal::kX];
       same = same && x == healthy[k][Signal::kX];
-      if (LeavesRod(fault)) {
-        EXPECT_NEAR(
-            FlowReading(ParameterSet("lublin-actuator-3"), effects, rows[k], x),
-            faulty[k][Signal::kF], 1e-9);
+      const double usual =
+          FlowReading(ParameterSet("lublin-actuator-3"), {}, rows[k], x);
+      same_at_position =
+          same_at_position && std::abs(faulty[k][Signal::kF] - usual) < 1e-9;
+      for (const Signal signal : {Signal::kP1, Signal::kP2, Signal::kT1}) {
+        same_at_position =
+            same_at_position && faulty[k][signal] == healthy[k][signal];
       }
+      EXPECT_NEAR(
+          FlowReading(ParameterSet("lublin-actuator-3"), effects, rows[k], x),
+          faulty[k][Signal::kF], 1e-9)
+          << FaultName(fault);
     }
     EXPECT_EQ(LeavesRod(fault), same) << FaultName(fault);
+    EXPECT_EQ(ShowsInRodAlone(fault), same_at_position) << FaultName(fault);
   }
   EXPECT_THROW(LeavesRod(0), std::invalid_argument);
 }

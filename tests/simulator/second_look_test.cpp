@@ -12,6 +12,7 @@
 #include "base/error.h"
 #include "diagnosis/fault_catalogue.h"
 #include "diagnosis/records/growth.h"
+#include "simulator/fault_effects.h"
 #include "simulator/second_look/episode_looks.h"
 #include "tests/simulator/recorded_valve.h"
 
@@ -84,6 +85,28 @@ TEST(SecondLookTest, ComparesASupplyDropWithPerforationAtAnotherSupply) {
   EXPECT_GT(look.perforation->distance, kLookMargin);
   EXPECT_FALSE(
       RunSecondLook(Physics(), Window({Abrupt(13, -0.2)})).perforation);
+}
+
+// Judged at its position, a valve has no fault whose only sign is the way
+// there: neither f1, of which X shows the stop, nor f10 and f16.
+TEST(SecondLookTest, AtThePositionOnlyWhatActsBehindItExplains) {
+  LookWindow window = Window({Abrupt(18, 0.5)});
+  for (RecordRow& row : window.rows) {
+    row.input.cv_pct = row.x_pct;
+    row.x_measured = false;
+  }
+  window.signals &= static_cast<SignalMask>(~MaskOf(Signal::kX));
+  window.at_position = true;
+  const SecondLook look = RunSecondLook(Physics(), window);
+  EXPECT_TRUE(look.complete);
+  const LookAnswer answer = AnswerOf(look);
+  EXPECT_EQ(answer.outcome, LookOutcome::kNamed);
+  EXPECT_TRUE(std::ranges::any_of(
+      answer.faults, [](const Explanation& e) { return e.fault == 18; }));
+  for (const Explanation& e : look.ranked) {
+    EXPECT_TRUE(e.fault == 0 || IsFinding(e.fault) || !ShowsInRodAlone(e.fault))
+        << FaultName(e.fault);
+  }
 }
 
 // A fault that grows by a quarter in eight hours, as windows of seven minutes
@@ -516,6 +539,23 @@ TEST(LookAnswerTest, IsUnknownWhereNotEvenNoFaultFits) {
   };
   EXPECT_EQ(outcome(1.0), LookOutcome::kNothing);
   EXPECT_EQ(outcome(6.0), LookOutcome::kNoneFits);
+}
+
+// With fewer signals the errors of a healthy valve are wider, and the largest
+// f12 that there is comes close to a friction that no simulation has.
+TEST(LookAnswerTest, IsUnknownWhereAFaultWouldHaveToBeLargerThanThereIs) {
+  const auto outcome = [](int fault, double strength, double misfit,
+                          bool complete) {
+    SecondLook look = Looked({{fault, 0.0}, {0, 900.0}}, misfit);
+    look.ranked.front().strength = strength;
+    look.complete = complete;
+    return AnswerOf(look).outcome;
+  };
+  EXPECT_EQ(outcome(12, -1.0, 3.0, false), LookOutcome::kNoneFits);
+  EXPECT_EQ(outcome(12, -0.9, 3.0, false), LookOutcome::kNamed);
+  EXPECT_EQ(outcome(12, -1.0, 1.5, false), LookOutcome::kNamed);
+  EXPECT_EQ(outcome(12, -1.0, 3.0, true), LookOutcome::kNamed);
+  EXPECT_EQ(outcome(16, 1.0, 3.0, false), LookOutcome::kNamed);
 }
 
 TEST(LookAnswerTest, IsAShortlistBeyondFourFaults) {

@@ -17,7 +17,8 @@ namespace {
 
 // A command that is set anew every 5..25 s and jitters in between, as a level
 // controller moves it.
-std::vector<InputRow> BusyInputs(std::size_t count, std::uint64_t seed) {
+std::vector<InputRow> BusyInputs(std::size_t count, std::uint64_t seed,
+                                 double jitter_pct) {
   NormalSource noise(seed, 7);
   DisturbanceProcess p1({22.0, 0.85}, {seed, 8});
   DisturbanceProcess p2({13.0, 0.6}, {seed, 9});
@@ -30,7 +31,7 @@ std::vector<InputRow> BusyInputs(std::size_t count, std::uint64_t seed) {
       until = k + 5 +
               static_cast<std::size_t>(std::min(20.0, 8.0 * std::abs(noise())));
     }
-    rows.push_back({std::clamp(level + 0.8 * noise(), 44.0, 90.0),
+    rows.push_back({std::clamp(level + jitter_pct * noise(), 44.0, 90.0),
                     3555.0 + p1.Next(), 2615.0 + p2.Next(), 100.7});
   }
   return rows;
@@ -38,10 +39,11 @@ std::vector<InputRow> BusyInputs(std::size_t count, std::uint64_t seed) {
 
 // What the transmitters of such a valve record, noise on.
 HealthyRecord Recording(const ValveParameters& parameters, std::size_t count,
-                        std::uint64_t seed, bool interpolated = false) {
+                        std::uint64_t seed, bool interpolated = false,
+                        double jitter_pct = 0.8) {
   ValveSimulationConfig config;
   config.parameters = parameters;
-  config.excitation = RecordedExcitation{BusyInputs(count, seed)};
+  config.excitation = RecordedExcitation{BusyInputs(count, seed, jitter_pct)};
   config.continuous_inputs = interpolated;
   config.duration_s = static_cast<double>(count);
   config.seed = seed;
@@ -191,6 +193,47 @@ TEST(ValveIdentificationTest, FindsFrictionInsteadOfALaterCommand) {
   ExpectRecovered(fit, "actuator.coulomb_friction_n", 150.0, 0.1);
   EXPECT_LE(fit.fitted.x_rmse_pct,
             1.1 * FitToRecord(truth, record.rows, 60, 800).x_rmse_pct);
+}
+
+// A controller that moves the command by several per cent in every sample: the
+// rod is never where the command is.
+TEST(ValveIdentificationTest, RegressesTheTrimOnTheSimulatedRod) {
+  const ValveParameters nominal = ParameterSet("lublin-actuator-3-refit");
+  ValveParameters truth = nominal;
+  truth.trim.kv_m3_h *= 1.2;
+  truth.instruments.flow.high *= 2.0;
+  constexpr double kJitterPct = 8.0;
+  HealthyRecord record = Recording(truth, 200, 3, false, kJitterPct);
+  for (RecordRow& row : record.rows) {
+    row.x_pct = row.input.cv_pct;
+    row.x_measured = false;
+  }
+  const HealthyRecord with_rod =
+      WithSimulatedRod(record.rows, 0, record.rows.size(), nominal, {});
+  ASSERT_EQ(with_rod.rows.size(), record.rows.size());
+  const Trim on_command = RegressTrim({record}, nominal);
+  const Trim on_rod = RegressTrim({with_rod}, nominal);
+  EXPECT_LT(on_command.kv_m3_h, 0.7 * truth.trim.kv_m3_h);
+  EXPECT_NEAR(on_rod.kv_m3_h, truth.trim.kv_m3_h, 0.1 * truth.trim.kv_m3_h);
+  EXPECT_NEAR(on_rod.exponent, truth.trim.exponent, 0.05 * truth.trim.exponent);
+}
+
+// However wide its interval is: with the nominal value F would be further off.
+TEST(ValveIdentificationTest, KeepsWhatIsSurelyNotNominalWithoutAPosition) {
+  const ValveParameters nominal = ParameterSet("lublin-actuator-3-refit");
+  ValveParameters truth = nominal;
+  truth.trim.kv_m3_h *= 1.4;
+  truth.instruments.flow.high *= 2.0;
+  HealthyRecord record = Recording(truth, 180, 3);
+  for (RecordRow& row : record.rows) {
+    row.x_pct = row.input.cv_pct;
+    row.x_measured = false;
+  }
+  ValveFitOptions options;
+  options.identified_sd = 1e-6;  // No interval is as narrow as that.
+  const ValveFit fit = FitValve({record}, nominal, options);
+  ExpectRecovered(fit, "trim.kv_m3_h", truth.trim.kv_m3_h, 0.1);
+  EXPECT_FALSE(Named(fit, "positioner.filter_time_s").identified);
 }
 
 TEST(RecordFitTest, FilledInReadingsDoNotCount) {

@@ -17,9 +17,15 @@ out=$(mktemp -d)
 chmod 755 "$out"
 faketime=$(find /usr/lib -name libfaketimeMT.so.1 | head -1)
 pids=()
-finish() {
+end_all() {
+  # unshare blocks what would end it while its child runs.
+  for pid in "${pids[@]}"; do pkill -P "$pid" || true; done
   kill "${pids[@]}" 2>/dev/null || true
   wait "${pids[@]}" 2>/dev/null || true
+  pids=()
+}
+finish() {
+  end_all
   rm -rf "$out"
 }
 trap finish EXIT
@@ -33,11 +39,6 @@ start() {  # LOG COMMAND...
   shift
   "$@" >"$out/stdout" 2>"$log" &
   pids+=($!)
-}
-end_all() {
-  kill "${pids[@]}" 2>/dev/null || true
-  wait "${pids[@]}" 2>/dev/null || true
-  pids=()
 }
 await() {  # SECONDS CONDITION...
   local until=$(($(date +%s) + $1))

@@ -7,14 +7,14 @@ source "$(cd "$(dirname "$0")" && pwd)/programs.sh" "$1"
 
 "$bin/fdi-simulator" run --no-publish --duration 1500 --export valve.csv \
   >simulator.log 2>&1
-awk 'BEGIN {print "t_s,CV_pct,X_pct,F_t_h"
-  for (i = 0; i < 600000; ++i) print i ",40.5,41.25,22.125"}' >long.csv
+awk 'BEGIN {print "t_s,CV_pct,P1_kPa,P2_kPa,T1_degC,X_pct,F_t_h"
+  for (i = 0; i < 600000; ++i) print i ",40.5,3500,2600,100,41.25,22.125"}' >long.csv
 
 interrupt() {  # PROGRAM WORDS
   # What a script starts in the background would ignore the signal.
   env --default-signal=INT "$bin/$1" "${@:2}" >"$2.log" 2>&1 &
   local child=$! code=0
-  sleep 0.4
+  sleep 0.2
   kill -INT $child 2>/dev/null || fail "$* ended by itself"
   local begin=${EPOCHREALTIME/./}
   wait $child || code=$?

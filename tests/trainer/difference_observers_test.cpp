@@ -199,6 +199,44 @@ TEST(DifferenceObserversTest, ShortRecordsAreNotLeftOut) {
   EXPECT_GT(samples, 3000U);
 }
 
+// A set made for scoring has the structure of the first one, and limits and
+// models of the runs that are left. On the same runs it is the same.
+TEST(DifferenceObserversTest, ASetForScoringIsFittedToWhatIsLeft) {
+  const std::vector<FaultCondition> faults{{13, 0.2}, {19, 0.25}, {19, 0.5}};
+  const TrainingRun run = HealthyRun(1, 1200);
+  FaultyStretches simulated;
+  const ModelSet like = TrainDifferenceSet({run}, faults, WithFault, 100.0,
+                                           TwoChannels(), {}, &simulated);
+  ASSERT_EQ(simulated.faulty.size(), faults.size());
+  const ModelSet same =
+      RetrainDifferenceSet(like, {run}, faults, simulated, TwoChannels());
+  TrainingRun half = run;
+  half.samples.resize(600);
+  for (std::size_t i = 0; i <= faults.size(); ++i) {
+    Stretch& stretch =
+        i == 0 ? simulated.healthy.front() : simulated.faulty[i - 1].front();
+    stretch.samples.resize(580);  // 20 are dropped after a start
+  }
+  const ModelSet rest =
+      RetrainDifferenceSet(like, {half}, faults, simulated, TwoChannels());
+  ASSERT_EQ(rest.observers.size(), like.observers.size());
+  for (std::size_t o = 0; o < like.observers.size(); ++o) {
+    for (std::size_t c = 0; c < like.channels.size(); ++c) {
+      const ChannelObserver& all = like.observers[o].channels[c];
+      const ChannelObserver& again = same.observers[o].channels[c];
+      const ChannelObserver& left = rest.observers[o].channels[c];
+      EXPECT_EQ(again.residual_sd, all.residual_sd);
+      EXPECT_EQ(again.fit, all.fit);
+      EXPECT_EQ(left.difference, all.difference);
+      EXPECT_EQ(left.model.rules.size(), all.model.rules.size());
+      EXPECT_NE(left.residual_sd, all.residual_sd);
+    }
+  }
+  EXPECT_EQ(same.channels[1].upper_threshold, like.channels[1].upper_threshold);
+  EXPECT_NE(rest.channels[1].upper_threshold, like.channels[1].upper_threshold);
+  EXPECT_NEAR(rest.threshold_hours, like.threshold_hours / 2.0, 0.02);
+}
+
 TEST(DifferenceObserversTest, FaultsNeverSeenAreNamed) {
   ExpectNamed(std::make_shared<const ModelSet>(Trained()), HealthyRun);
 }

@@ -14,11 +14,13 @@
 
 #include "base/error.h"
 #include "diagnosis/fault_catalogue.h"
+#include "diagnosis/trained_signals.h"
 #include "import/csv.h"
 #include "import/sniff.h"
 #include "import/tag_map.h"
 #include "simulator/random.h"
 #include "tests/storage/temporary_directory.h"
+#include "trainer/onboarding/lost_command.h"
 #include "trainer/onboarding/record_checks.h"
 #include "trainer/onboarding/record_verdict.h"
 
@@ -144,6 +146,23 @@ TEST(FaultSynthesizerTest, StretchesThatBeginAtTheSameSampleMayDifferInLength) {
   const Stretch half{"x", {whole.samples.begin(), whole.samples.begin() + 30}};
   EXPECT_EQ(synthesize({13, 0.25}, half).size(), 30U);
   EXPECT_EQ(synthesize({13, 0.25}, whole).size(), whole.samples.size());
+}
+
+// Hot water pushes the rod aside; at the position that is read, only the flow
+// and T1 tell.
+TEST(FaultSynthesizerTest, AtThePositionTheRodIsWhereItIsRead) {
+  Stretch healthy = Strange(300.0);
+  for (Sample& sample : healthy.samples) {
+    sample = PositionAsCommand(sample);
+  }
+  const FaultCondition hot{7, 0.5};
+  const auto flow = [&](bool at_position) {
+    const std::vector<Sample> faulty =
+        FaultSynthesizer(Lublin(), at_position)(hot, healthy);
+    EXPECT_GT(faulty.back()[Signal::kT1], 150.0);
+    return faulty.back()[Signal::kF] / healthy.samples.back()[Signal::kF];
+  };
+  EXPECT_GT(flow(false), 1.3 * flow(true));
 }
 
 TEST(OnboardingFaultsTest, FaultsOfMissingTransmittersAreLeftOut) {
@@ -342,30 +361,53 @@ TEST(RecordChecksTest, SimulationHasToBeBetterThanNone) {
   }
 }
 
-// A command that moves within a second, read each ten.
-TEST(RecordChecksTest, APositionTellsTheFlowWhereASlowCommandDoesNot) {
-  TrainingRun run = RunOf({"r", SimulateHealthy(Lublin(), 900.0, 3)});
-  run.period_s = 10.0;
+// One sample in ten seconds of a command that moves each second.
+struct SlowRecord {
+  double period_s{10.0};
+  std::size_t samples{720};
+  double of_command{0.3};  // What X has of CV.
+  double of_position{4.0};
+  double swing{0.0};    // Of CV, slow; X comes a quarter of a period later.
+  double of_flow{0.5};  // F has of X.
+};
+
+std::vector<TrainingRun> RunsOf(const SlowRecord& record) {
   simulator::NormalSource position(5, 1);
   simulator::NormalSource command(5, 2);
-  for (LabelledSample& labelled : run.samples) {
-    const double x = 60.0 + 4.0 * position();
-    labelled.sample.Set(Signal::kX, x);
-    labelled.sample.Set(Signal::kCv, 60.0 + 0.3 * (x - 60.0) + 5.0 * command());
-    labelled.sample.Set(Signal::kF, 20.0 - 0.5 * (x - 60.0));
+  simulator::NormalSource flow(5, 3);
+  TrainingRun run;
+  run.period_s = record.period_s;
+  for (std::size_t k = 0; k < record.samples; ++k) {
+    const double angle = 0.1 * static_cast<double>(k);
+    const double cv = 5.0 * command() * (record.swing > 0.0 ? 0.1 : 1.0);
+    const double x = record.of_command * cv + record.of_position * position() -
+                     record.swing * std::cos(angle);
+    Sample& sample = run.samples.emplace_back().sample;
+    sample.stamp_ns =
+        std::llround(1e9 * record.period_s) * static_cast<std::int64_t>(k + 1);
+    sample.Set(Signal::kCv, 60.0 + cv + record.swing * std::sin(angle));
+    sample.Set(Signal::kX, 60.0 + x);
+    sample.Set(Signal::kF, 20.0 - record.of_flow * x + 0.5 * flow());
   }
-  const auto reason = [&] {
-    try {
-      CheckFit({run}, {5.0, 5.0, 0.0, 0.0}, {}, 40.0);
-    } catch (const DataError& error) {
-      return std::string(error.what());
-    }
-    return std::string();
-  };
-  EXPECT_THAT(reason(), testing::HasSubstr("map the column of the position as "
-                                           "[signal.CV]"));
-  run.period_s = 1.0;
-  EXPECT_THAT(reason(), testing::HasSubstr("unit or sense"));
+  return {run};
+}
+
+TEST(LostCommandTest, IsOneThatSaysNothingOfXWhileFFollowsX) {
+  EXPECT_TRUE(CommandIsLost(RunsOf({})));
+  EXPECT_TRUE(CommandIsLost(RunsOf({.period_s = 60.0})));
+  // The record shows how the rod moves.
+  EXPECT_FALSE(CommandIsLost(RunsOf({.period_s = 1.0})));
+  // X follows CV.
+  EXPECT_FALSE(CommandIsLost(RunsOf({.of_command = 1.0, .of_position = 1.0})));
+  // A command that is there, and a rod that does not follow it.
+  EXPECT_FALSE(CommandIsLost(
+      RunsOf({.of_command = 0.0, .of_position = 0.2, .swing = 8.0})));
+  // F does not follow X, or rises with it.
+  EXPECT_FALSE(CommandIsLost(RunsOf({.of_flow = 0.05})));
+  EXPECT_FALSE(CommandIsLost(RunsOf({.of_flow = -0.5})));
+  // Too few samples to say so.
+  EXPECT_FALSE(CommandIsLost(RunsOf({.samples = 30})));
+  EXPECT_FALSE(CommandIsLost({}));
 }
 
 TEST(RecordChecksTest, AFlowThatMovesWithoutTheCommandIsNotRefused) {
@@ -379,25 +421,122 @@ TEST(RecordChecksTest, AFlowThatMovesWithoutTheCommandIsNotRefused) {
   EXPECT_NO_THROW(CheckFit({run}, {0.3, 30.0, 0.0, 0.0}, {}, 40.0));
 }
 
-// Models of a few faults; what a table says of a fault that is as plain as
-// half the flow, and of one that has no effect on X.
-TEST(CoverageTest, SaysFromWhichStrengthOnAFaultIsSeen) {
-  const FaultSynthesizer synthesize(Lublin());
-  const Stretch healthy = Strange(4000.0);
-  const std::vector<FaultCondition> faults{
+// Models of a few faults.
+struct Few {
+  FaultSynthesizer synthesize{Lublin()};
+  Stretch record{Strange(4000.0)};
+  std::vector<FaultCondition> faults{
       {8, 0.5}, {8, 1.0}, {19, 0.005}, {19, 0.25}, {19, 0.5}};
-  TrainingOptions options = OnboardingPreset(kBasicSignals);
-  options.name = "few";
-  const auto models = std::make_shared<const ModelSet>(TrainDifferenceSet(
-      {RunOf(healthy)}, faults, std::ref(synthesize), 40.0, options));
-  const CoverageTable table =
-      AssessCoverage(models, faults, synthesize, healthy, 1);
+  std::shared_ptr<const ModelSet> models;
+
+  Few() {
+    TrainingOptions options = OnboardingPreset(kBasicSignals);
+    options.name = "few";
+    models = std::make_shared<const ModelSet>(TrainDifferenceSet(
+        {RunOf(record)}, faults, std::ref(synthesize), 40.0, options));
+  }
+
+  static const Few& Trained() {
+    static const Few few;
+    return few;
+  }
+};
+
+// What a table says of a fault that is as plain as half the flow, and of one
+// that has no effect on X.
+TEST(CoverageTest, SaysFromWhichStrengthOnAFaultIsSeen) {
+  const Few& few = Few::Trained();
+  const CoverageTable table = AssessCoverage(
+      few.models, few.faults, std::ref(few.synthesize), few.record, 1);
   ASSERT_EQ(table.faults.size(), 2U);
   EXPECT_EQ(table.seconds, 900.0);
   EXPECT_FALSE(table.faults[0].detectable.has_value());
   EXPECT_EQ(table.faults[1].detectable, 0.25);
   EXPECT_EQ(table.faults[1].isolable, 0.25);
   EXPECT_TRUE(table.faults[1].look_alikes.empty());
+}
+
+// The flow of a part rises by a fifth after 300 s, which its models do not
+// know: a fault counts that is detected before, and what the alarm found by
+// itself does not.
+TEST(CoverageTest, AnAlarmWithoutAFaultIsNoDetection) {
+  const Few& few = Few::Trained();
+  const auto part = [&](double rise) {
+    ScoredPart scored{few.models, CutOut(few.record, {0, 3000, 600}), {}};
+    for (std::size_t k = 300; k < 600; ++k) {
+      Sample& sample = scored.healthy.samples[k];
+      sample.Set(Signal::kF, rise * sample[Signal::kF]);
+    }
+    for (const FaultCondition& fault : few.faults) {
+      scored.faulty.push_back(few.synthesize(fault, scored.healthy));
+    }
+    return scored;
+  };
+  const CoverageTable quiet = ScoreCoverage(few.faults, {part(1.0)}, 1);
+  EXPECT_EQ(quiet.alarmed, 0);
+  EXPECT_GT(quiet.judged, 0.9);
+  const CoverageTable table =
+      ScoreCoverage(few.faults, {part(1.0), part(1.2)}, 1);
+  EXPECT_EQ(table.seconds, 480.0);
+  EXPECT_EQ(table.parts, 2);
+  EXPECT_EQ(table.alarmed, 1);
+  EXPECT_FALSE(table.faults[0].detectable.has_value());
+  EXPECT_EQ(table.faults[1].detectable, 0.25);
+}
+
+Stretch Counted(const std::string& id, std::size_t count, std::int64_t from) {
+  Stretch stretch{id, {}};
+  for (std::size_t k = 0; k < count; ++k) {
+    stretch.samples.emplace_back();
+    stretch.samples.back().stamp_ns =
+        1'000'000'000 * (from + static_cast<std::int64_t>(k));
+  }
+  return stretch;
+}
+
+TEST(CoverageTest, WhatIsLeftOutIsInNothingThatIsLeft) {
+  const std::vector<Stretch> stretches{
+      Counted("a", 500, 0), Counted("a", 1300, 1000), Counted("b", 40, 0)};
+  const std::vector<RecordPart> parts = PartsOf(stretches);
+  ASSERT_EQ(parts.size(), 2U);
+  EXPECT_EQ(parts[0].stretch, 1U);
+  EXPECT_EQ(parts[0].from, 0U);
+  EXPECT_EQ(parts[0].count, 600U);
+  EXPECT_EQ(parts[1].stretch, 1U);
+  EXPECT_EQ(parts[1].from, 700U);
+
+  // Of 900 samples in a row, halves.
+  EXPECT_EQ(PartsOf({Counted("a", 900, 0)})[1].from, 450U);
+  EXPECT_EQ(PartsOf({Counted("a", 900, 0)})[1].count, 450U);
+  // Of two stretches one each.
+  EXPECT_EQ(
+      PartsOf({stretches[0], Counted("a", 600, 600), Counted("b", 700, 0)})[1]
+          .stretch,
+      2U);
+
+  const FaultyStretches rest = Without({stretches, {stretches}}, {1, 300, 600});
+  ASSERT_EQ(rest.healthy.size(), 3U);  // the 40 of b tell nothing
+  EXPECT_EQ(rest.healthy[1].samples.size(), 300U);
+  EXPECT_EQ(rest.healthy[2].samples.size(), 400U);
+  EXPECT_EQ(rest.faulty[0][2].samples.front().stamp_ns, 1'900'000'000'000);
+
+  // Of a long record four blocks, spread over what is left.
+  const std::vector<Stretch> hour{Counted("a", 3600, 0)};
+  const FaultyStretches few = Without({hour, {hour}}, {0, 0, 600});
+  ASSERT_EQ(few.healthy.size(), 4U);
+  EXPECT_EQ(few.healthy[0].samples.size(), 300U);
+  EXPECT_EQ(few.healthy[0].samples.front().stamp_ns, 900'000'000'000);
+  EXPECT_EQ(few.faulty[0][3].samples.front().stamp_ns, 3'000'000'000'000);
+
+  TrainingRun run = RunOf(stretches[1]);
+  TrainingRun other = run;
+  other.id = "c";
+  const std::vector<TrainingRun> runs =
+      RunsWithout({run, other}, CutOut(stretches[1], {1, 300, 600}));
+  ASSERT_EQ(runs.size(), 2U);
+  EXPECT_EQ(runs[0].samples.size(), 700U);
+  EXPECT_EQ(runs[0].samples[300].sample.stamp_ns, 1'900'000'000'000);
+  EXPECT_EQ(runs[1].samples.size(), 1300U);
 }
 
 TEST(CoverageTest, GainIsWhatBecomesVisible) {
@@ -492,6 +631,30 @@ TEST(RecordVerdictTest, ThinSaysWhatIsStillNeeded) {
   EXPECT_NE(still.sentence.find("stays within 2.0 %, one more operating point"),
             std::string::npos)
       << still.sentence;
+
+  CoverageTable coverage;
+  coverage.faults = {{6, false, 0.1, 0.5, {}}, {8, false, {}, {}, {}}};
+  coverage.parts = 2;
+  const auto judged = [&] {
+    return JudgeRecord(record(3600, 20.0), 1.0, &coverage);
+  };
+  EXPECT_EQ(judged().word, "usable");
+  EXPECT_NE(judged().sentence.find("; 1 of 2 faults are detected in data"),
+            std::string::npos)
+      << judged().sentence;
+  coverage.alarmed = 1;
+  EXPECT_EQ(judged().word, "thin");
+  EXPECT_NE(judged().sentence.find("in 1 of 2 parts of the record"),
+            std::string::npos)
+      << judged().sentence;
+  EXPECT_NE(judged().sentence.find("(1.00 h more) is needed"),
+            std::string::npos);
+  coverage.alarmed = 0;
+  coverage.judged = 0.3;
+  EXPECT_EQ(judged().word, "thin");
+  EXPECT_NE(judged().sentence.find("only 30 % as their own operating points"),
+            std::string::npos)
+      << judged().sentence;
 }
 
 }  // namespace

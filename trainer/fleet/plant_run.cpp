@@ -110,7 +110,7 @@ class Kinds {
     try {
       kind.base = FindType(job.row.type, store, settings.folder);
       kind.text = TypeText(kind.base.type) + SignalsOf(job) +
-                  std::to_string(settings.false_alarms_per_hour);
+                  std::to_string(settings.onboarding.false_alarms_per_hour);
       kind.name = KindName(job.row.type, kind.text);
       if (kind.base.stored) {
         kind.known = kind.base;
@@ -196,6 +196,9 @@ std::string FindingOf(const Onboarding& onboarding, const std::string& made) {
     unseen += (unseen.empty() ? "; not seen at half their strengths: " : " ") +
               FaultName(fault);
   }
+  if (onboarding.models.position_as_command) {
+    unseen += "; too slow for its command: judged at the position, not the rod";
+  }
   return Hours(onboarding) + " of healthy data, " + made + unseen;
 }
 
@@ -243,8 +246,8 @@ class PlantRun {
   };
 
   int Threads() const {
-    return settings_.threads > 0
-               ? settings_.threads
+    return settings_.onboarding.threads > 0
+               ? settings_.onboarding.threads
                : std::max(
                      1, static_cast<int>(std::thread::hardware_concurrency()));
   }
@@ -430,7 +433,7 @@ class PlantRun {
 
   Onboarding OnboardWith(std::size_t row, const std::vector<TrainingRun>& runs,
                          const FoundType& type, const ModelSet* of_type) {
-    OnboardingOptions options;
+    OnboardingOptions options = settings_.onboarding;
     options.name = Storable(jobs_[row].row.name);
     options.type = type.type;
     options.fit = !type.stored;
@@ -438,11 +441,8 @@ class PlantRun {
       options.of_type = *of_type;
       options.only_of_type = true;
     }
-    options.false_alarms_per_hour = settings_.false_alarms_per_hour;
     options.threads = inner_threads_;
     options.assess = false;
-    options.software = settings_.software;
-    options.created_ns = settings_.created_ns;
     return Onboard(runs, options,
                    [this](double, std::string_view) { StopIfAsked(); });
   }
@@ -576,7 +576,8 @@ std::vector<PlantOutcome> CheckPlant(const std::vector<PlantJob>& jobs,
   Kinds kinds(jobs, store, settings);
   const std::vector<bool> mine = RowsOfShard(jobs.size(), kinds, settings);
   std::vector<PlantOutcome> outcomes(jobs.size());
-  ParallelFor(static_cast<int>(jobs.size()), settings.threads, [&](int k) {
+  const int threads = settings.onboarding.threads;
+  ParallelFor(static_cast<int>(jobs.size()), threads, [&](int k) {
     const auto i = static_cast<std::size_t>(k);
     PlantOutcome& outcome = outcomes[i];
     outcome.in_shard = mine[i];

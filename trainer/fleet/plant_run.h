@@ -8,6 +8,7 @@
 #include "storage/models/plant_loops.h"
 #include "trainer/fleet/plant_files.h"
 #include "trainer/fleet/plant_rows.h"
+#include "trainer/onboarding/onboarding.h"
 
 namespace fdi::trainer {
 
@@ -15,11 +16,8 @@ struct PlantSettings {
   std::filesystem::path folder;  ///< That files and types of rows start from.
   int shard{1};                  ///< 1..shards
   int shards{1};
-  int threads{0};  ///< 0: all of the machine.
-  double false_alarms_per_hour{1e-3};
-  bool utc{false};  ///< Times of rows without a zone are UTC.
-  std::string software;
-  std::int64_t created_ns{0};
+  bool utc{false};               ///< Times of rows without a zone are UTC.
+  OnboardingOptions onboarding;  ///< Of every row, but for name and type.
   std::function<bool()> stop{};  ///< Asked often; any thread.
 };
 

@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "base/error.h"
 #include "diagnosis/coverage.h"
 #include "diagnosis/observer_bank.h"
+#include "diagnosis/trained_signals.h"
 #include "trainer/campaign/run_input.h"
 #include "trainer/floor_fit.h"
 #include "trainer/scoring/rescore.h"
@@ -18,6 +20,7 @@ constexpr double kExcerptS = 900.0;
 // The normal observer alone: it needs no time for those of faults.
 std::shared_ptr<const ModelSet> NormalObserverOnly(const ModelSet& models) {
   ModelSet normal = models;
+  normal.position_as_command = false;  // AddResiduals() has exchanged them.
   normal.observers.resize(1);
   normal.faults.clear();
   normal.groups.clear();
@@ -127,8 +130,16 @@ std::vector<Sample> EndOf(const ResidualStretch& stretch,
 }  // namespace
 
 void AddResiduals(const std::shared_ptr<const ModelSet>& models,
-                  const storage::StoredRun& run, HealthyResiduals& data) {
-  RequireNoFault(run);
+                  const storage::StoredRun& measured, HealthyResiduals& data) {
+  RequireNoFault(measured);
+  std::optional<storage::StoredRun> at_position;
+  if (models->position_as_command) {
+    at_position = measured;
+    for (storage::StoredSample& stored : at_position->samples) {
+      stored.sample = PositionAsCommand(stored.sample);
+    }
+  }
+  const storage::StoredRun& run = at_position ? *at_position : measured;
   const std::shared_ptr<const ModelSet> normal = NormalObserverOnly(*models);
   std::size_t longest = 0;
   for (const ResidualStretch& stretch : data.stretches) {

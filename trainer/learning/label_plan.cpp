@@ -235,7 +235,8 @@ bool IsEvidenceOf(const storage::RunInfo& run, const LabelledEpisode& episode) {
 std::vector<Stretch> PiecesOf(const TrainingRun& run, const LabelPlan& plan) {
   const int needed = plan.parent->decision.settling_samples +
                      plan.training.dataset.dropped_after_step;
-  std::vector<Stretch> pieces = SplitAtGaps(run);
+  std::vector<Stretch> pieces =
+      SplitAtGaps(plan.parent->position_as_command ? AtPosition(run) : run);
   std::erase_if(pieces, [needed](const Stretch& piece) {
     return piece.samples.size() < static_cast<std::size_t>(needed);
   });

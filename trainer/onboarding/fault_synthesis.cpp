@@ -102,7 +102,8 @@ simulator::InputRow InputsOf(const Sample& sample,
           value(Signal::kT1, levels.t1_degc)};
 }
 
-FaultSynthesizer::FaultSynthesizer(ValveType type) : type_(std::move(type)) {
+FaultSynthesizer::FaultSynthesizer(ValveType type, bool at_position)
+    : type_(std::move(type)), at_position_(at_position) {
   Validate(type_.parameters);
 }
 
@@ -172,15 +173,18 @@ std::vector<Sample> FaultSynthesizer::BehindRod(
                                          InputsOf(sample, type_.levels),
                                          sample[Signal::kX]));
     }
-    const auto step = [&](Signal signal, const Transmitter& transmitter,
-                          double share) {
-      sample.Set(signal,
-                 Held(transmitter, sample[signal] + share * (transmitter.high -
-                                                             transmitter.low)));
+    const auto read = [&](Signal signal, const Transmitter& transmitter,
+                          double value, double share) {
+      sample.Set(signal, Held(transmitter, value + share * (transmitter.high -
+                                                            transmitter.low)));
     };
-    step(Signal::kP1, i.pressure, effects.inlet_reading_step);
-    step(Signal::kP2, i.pressure, effects.outlet_reading_step);
-    step(Signal::kT1, i.temperature, effects.temperature_reading_step);
+    read(Signal::kP1, i.pressure, sample[Signal::kP1] * effects.inlet_factor,
+         effects.inlet_reading_step);
+    read(Signal::kP2, i.pressure, sample[Signal::kP2] * effects.outlet_factor,
+         effects.outlet_reading_step);
+    read(Signal::kT1, i.temperature,
+         TemperatureWith(effects, sample[Signal::kT1]),
+         effects.temperature_reading_step);
   }
   return samples;
 }
@@ -189,11 +193,13 @@ std::vector<Sample> FaultSynthesizer::operator()(const FaultCondition& fault,
                                                  const Stretch& healthy) const {
   const std::vector<Sample> without = Healthy(healthy);
   // A fault that leaves the rod needs no simulation of its own: X is that of
-  // the healthy valve, and the rest is algebra.
-  const std::vector<Sample> with = fault.fault == 0 ? without
-                                   : simulator::LeavesRod(fault.fault)
-                                       ? BehindRod(fault, without)
-                                       : Simulate(fault, healthy.samples);
+  // the healthy valve, and the rest is algebra. So is any at a position that is
+  // read, wherever the fault has taken the rod.
+  const std::vector<Sample> with =
+      fault.fault == 0 ? without
+      : at_position_ || simulator::LeavesRod(fault.fault)
+          ? BehindRod(fault, without)
+          : Simulate(fault, healthy.samples);
   std::vector<Sample> samples = healthy.samples;
   const simulator::Instrumentation& instruments = type_.parameters.instruments;
   for (std::size_t k = 0; k < samples.size(); ++k) {

@@ -54,8 +54,10 @@ simulator::InputRow InputsOf(const Sample& sample,
 /// samples have are given back. Thread safe.
 class FaultSynthesizer {
  public:
+  /// @param at_position The command of the samples is the position that is read
+  ///   (PositionAsCommand): the rod is there, whatever the fault does to it.
   /// @throws ConfigError if the parameters are not valid.
-  explicit FaultSynthesizer(ValveType type);
+  explicit FaultSynthesizer(ValveType type, bool at_position = false);
 
   /// @param healthy One period apart, in the flow unit of the type.
   /// @throws CvodeError if a simulation fails.
@@ -65,7 +67,7 @@ class FaultSynthesizer {
   const ValveType& type() const { return type_; }
 
  private:
-  // What a fault that leaves the rod makes of a simulation without it.
+  // What a fault that leaves the rod where it is makes of a simulation without.
   std::vector<Sample> BehindRod(const FaultCondition& fault,
                                 std::vector<Sample> samples) const;
   std::vector<Sample> Simulate(const FaultCondition& fault,
@@ -73,6 +75,7 @@ class FaultSynthesizer {
   std::vector<Sample> Healthy(const Stretch& stretch) const;
 
   ValveType type_;
+  bool at_position_;
   mutable Mutex mutex_;
   // By run, first stamp and length.
   mutable std::map<std::tuple<std::string, std::int64_t, std::size_t>,

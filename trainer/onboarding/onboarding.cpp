@@ -3,172 +3,24 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
+#include <iterator>
 #include <memory>
 #include <thread>
 #include <utility>
 
 #include "base/error.h"
 #include "diagnosis/fault_catalogue.h"
+#include "simulator/fault_effects.h"
 #include "simulator/record_fit.h"
 #include "simulator/second_look/valve_physics.h"
 #include "simulator/valve_equations.h"
-#include "trainer/evaluation.h"
+#include "trainer/onboarding/lost_command.h"
 #include "trainer/onboarding/record_checks.h"
 #include "trainer/parallel_for.h"
 #include "trainer/statistics.h"
 
 namespace fdi::trainer {
-namespace {
-
-constexpr std::size_t kLeadIn = 120;  // healthy samples before a fault
-constexpr std::size_t kMaxShownSamples =
-    900;  // samples that it is given to show
-constexpr std::size_t kIsolableSize = 2;
-
-// The last part of the stretch.
-Stretch Shortened(const Stretch& stretch) {
-  const std::size_t count =
-      std::min(stretch.samples.size(), kLeadIn + kMaxShownSamples);
-  return {stretch.run_id,
-          {stretch.samples.end() - static_cast<std::ptrdiff_t>(count),
-           stretch.samples.end()}};
-}
-
-// `healthy`, then `faulty` from the lead-in on.
-TrainingRun FaultyRun(const Stretch& healthy, const std::vector<Sample>& faulty,
-                      const FaultCondition& fault, const ModelSet& models) {
-  TrainingRun run;
-  run.id = healthy.run_id;
-  run.period_s = models.sample_period_s;
-  run.flow_unit = models.flow_unit;
-  for (std::size_t k = 0; k < faulty.size(); ++k) {
-    if (k < kLeadIn) {
-      run.samples.push_back({healthy.samples[k], FaultTruth{}});
-    } else {
-      run.samples.push_back(
-          {faulty[k], FaultTruth{fault.fault, fault.strength}});
-    }
-  }
-  return run;
-}
-
-bool Isolated(const RunIndices& indices) {
-  const std::vector<int>& set = indices.final_set;
-  return indices.detected && set.size() <= kIsolableSize &&
-         Contains(set, indices.fault);
-}
-
-// `runs` ascend by |strength|. The walk begins at the strongest and ends at the
-// first that fails: what holds below a strength that fails does not count.
-template <typename Predicate>
-std::optional<double> Smallest(const std::vector<RunIndices>& runs,
-                               Predicate holds) {
-  std::optional<double> smallest;
-  for (auto run = runs.rbegin(); run != runs.rend() && holds(*run); ++run) {
-    smallest = std::abs(run->strength);
-  }
-  return smallest;
-}
-
-FaultCoverage Summarise(std::vector<RunIndices> runs) {
-  std::sort(runs.begin(), runs.end(), [](const auto& a, const auto& b) {
-    return std::abs(a.strength) < std::abs(b.strength);
-  });
-  FaultCoverage coverage;
-  coverage.fault = runs.front().fault;
-  coverage.negative = runs.front().strength < 0.0;
-  coverage.detectable =
-      Smallest(runs, [](const RunIndices& r) { return r.detected; });
-  coverage.isolable = Smallest(runs, Isolated);
-  for (const RunIndices& run : runs) {
-    for (const int fault : run.final_set) {
-      auto& others = coverage.look_alikes;
-      if (run.detected && fault != run.fault &&
-          std::find(others.begin(), others.end(), fault) == others.end()) {
-        others.push_back(fault);
-      }
-    }
-  }
-  std::sort(coverage.look_alikes.begin(), coverage.look_alikes.end());
-  return coverage;
-}
-
-// Faults with a value in `more` and none in `less`. Both directions of a fault
-// stand one after the other in a table, so that a look at the last one found
-// avoids duplicates.
-template <typename Member>
-std::vector<int> Gained(const CoverageTable& less, const CoverageTable& more,
-                        Member member) {
-  const auto has = [&](const CoverageTable& table, int fault) {
-    return std::any_of(table.faults.begin(), table.faults.end(),
-                       [&](const FaultCoverage& c) {
-                         return c.fault == fault && (c.*member).has_value();
-                       });
-  };
-  std::vector<int> gained;
-  for (const FaultCoverage& coverage : more.faults) {
-    if (has(more, coverage.fault) && !has(less, coverage.fault) &&
-        (gained.empty() || gained.back() != coverage.fault)) {
-      gained.push_back(coverage.fault);
-    }
-  }
-  return gained;
-}
-
-}  // namespace
-
-CoverageTable AssessCoverage(std::shared_ptr<const ModelSet> models,
-                             const std::vector<FaultCondition>& faults,
-                             const FaultSynthesizer& synthesize,
-                             const Stretch& healthy, int threads) {
-  const Stretch stretch = Shortened(healthy);
-  std::vector<RunIndices> runs(faults.size());
-  ParallelFor(static_cast<int>(faults.size()), threads, [&](int i) {
-    const FaultCondition& fault = faults[static_cast<std::size_t>(i)];
-    const TrainingRun run =
-        FaultyRun(stretch, synthesize(fault, stretch), fault, *models);
-    runs[static_cast<std::size_t>(i)] = ComputeIndices(ScoreRun(models, run));
-  });
-  CoverageTable table;
-  table.signals = healthy.samples.front().present;
-  table.seconds = models->sample_period_s *
-                  static_cast<double>(stretch.samples.size() - kLeadIn);
-  // Every turn takes out the runs of one fault in one direction. The order of
-  // `faults` is kept, on which Gained() relies.
-  while (!runs.empty()) {
-    const auto others = std::stable_partition(
-        runs.begin(), runs.end(), [first = runs.front()](const RunIndices& r) {
-          return r.fault == first.fault &&
-                 (r.strength < 0.0) == (first.strength < 0.0);
-        });
-    table.faults.push_back(Summarise({runs.begin(), others}));
-    runs.erase(runs.begin(), others);
-  }
-  return table;
-}
-
-std::vector<CoverageChange> ChangesOf(const CoverageTable& before,
-                                      const CoverageTable& after) {
-  std::vector<CoverageChange> changes;
-  for (const FaultCoverage& now : after.faults) {
-    const auto then =
-        std::ranges::find_if(before.faults, [&](const FaultCoverage& fault) {
-          return fault.fault == now.fault && fault.negative == now.negative;
-        });
-    if (then != before.faults.end() && then->detectable != now.detectable) {
-      changes.push_back(
-          {now.fault, now.negative, then->detectable, now.detectable});
-    }
-  }
-  return changes;
-}
-
-TransmitterGain GainOf(Signal signal, const CoverageTable& less,
-                       const CoverageTable& more) {
-  return {signal, Gained(less, more, &FaultCoverage::detectable),
-          Gained(less, more, &FaultCoverage::isolable)};
-}
-
 namespace {
 
 constexpr std::uint64_t kSeed = 1;
@@ -325,7 +177,6 @@ Progress Part(const Progress& progress, double from, double share) {
   };
 }
 
-// For the coverage table, too.
 Stretch LongestStretch(const std::vector<TrainingRun>& runs) {
   Stretch longest;
   for (const TrainingRun& run : runs) {
@@ -658,12 +509,21 @@ TrainingOptions TrainingOf(const OnboardingOptions& options,
   return training;
 }
 
+// Of the simulated record of a type: for the models, and to score them.
+constexpr std::size_t kTypeSamples = 1800;
+constexpr std::size_t kTypeUnseen = 1020;
+
 // std::function copies what it is given, and the synthesizer has a mutex: hence
 // std::ref().
 CoverageTable AssessSubset(const ValveType& type, const TrainingRun& full,
                            SignalMask signals, const OnboardingOptions& options,
                            const Progress& progress) {
-  const TrainingRun run = WithSignals(full, signals);
+  TrainingRun run = WithSignals(full, signals);
+  Stretch unseen{run.id, {}};
+  for (std::size_t k = kTypeSamples; k < run.samples.size(); ++k) {
+    unseen.samples.push_back(run.samples[k].sample);
+  }
+  run.samples.resize(kTypeSamples);
   const FaultSynthesizer synthesize(type);
   const std::vector<FaultCondition> faults =
       OnboardingFaults(signals, type.parameters);
@@ -671,13 +531,9 @@ CoverageTable AssessSubset(const ValveType& type, const TrainingRun& full,
       TrainDifferenceSet({run}, faults, std::ref(synthesize),
                          type.parameters.instruments.flow.high,
                          TrainingOf(options, signals), progress));
-  return AssessCoverage(models, faults, synthesize, LongestStretch({run}),
+  return AssessCoverage(models, faults, std::ref(synthesize), unseen,
                         options.threads);
 }
-
-}  // namespace
-
-namespace {
 
 // The type as it is against the longest stretch.
 simulator::RecordFit Compare(const std::vector<TrainingRun>& runs,
@@ -728,6 +584,104 @@ double Hours(const std::vector<TrainingRun>& runs) {
   return hours;
 }
 
+SignalMask SignalsOf(const std::vector<TrainingRun>& runs) {
+  return runs.front().samples.front().sample.present & kBasicSignals;
+}
+
+std::vector<FaultCondition> FaultsOf(SignalMask signals,
+                                     const simulator::ValveParameters& valve,
+                                     bool at_position) {
+  std::vector<FaultCondition> faults = OnboardingFaults(signals, valve);
+  if (at_position) {
+    std::erase_if(faults, [](const FaultCondition& fault) {
+      return simulator::ShowsInRodAlone(fault.fault);
+    });
+  }
+  return faults;
+}
+
+// What coverage needs of an onboarding.
+struct Scoring {
+  const std::vector<TrainingRun>& runs;
+  const std::vector<FaultCondition>& faults;
+  const FaultSynthesizer& synthesize;
+  const FaultyStretches& simulated;  // Empty where the type's set serves.
+  const TrainingOptions& training;
+  const OnboardingOptions& options;
+};
+
+// A part of the record, with a set made as `models` was, from all but it.
+ScoredPart LeaveOut(const Scoring& scoring, const ModelSet& models,
+                    const std::vector<Stretch>& stretches,
+                    const RecordPart& part, bool transferred) {
+  ScoredPart scored;
+  scored.healthy = CutOut(stretches[part.stretch], part);
+  scored.faulty.resize(scoring.faults.size());
+  const std::vector<TrainingRun> rest =
+      RunsWithout(scoring.runs, scored.healthy);
+  if (!transferred) {
+    for (std::size_t f = 0; f < scored.faulty.size(); ++f) {
+      scored.faulty[f] =
+          CutOut(scoring.simulated.faulty[f][part.stretch], part).samples;
+    }
+    scored.models = std::make_shared<const ModelSet>(RetrainDifferenceSet(
+        models, rest, scoring.faults, Without(scoring.simulated, part),
+        scoring.training));
+    return scored;
+  }
+  ParallelFor(static_cast<int>(scored.faulty.size()), scoring.options.threads,
+              [&](int i) {
+                const auto f = static_cast<std::size_t>(i);
+                scored.faulty[f] =
+                    scoring.synthesize(scoring.faults[f], scored.healthy);
+              });
+  scored.models = std::make_shared<const ModelSet>(
+      TransferDifferenceSet(*scoring.options.of_type, rest, scoring.training));
+  return scored;
+}
+
+// Every part of the record is judged by models that did not see it.
+void ScoreUnseen(const Scoring& scoring, Onboarding& onboarding) {
+  std::vector<Stretch> stretches = scoring.simulated.healthy;
+  if (onboarding.transferred) {
+    for (const TrainingRun& run : scoring.runs) {
+      std::ranges::move(SplitAtGaps(run), std::back_inserter(stretches));
+    }
+  }
+  try {
+    std::vector<ScoredPart> parts;
+    for (const RecordPart& part : PartsOf(stretches)) {
+      parts.push_back(LeaveOut(scoring, onboarding.models, stretches, part,
+                               onboarding.transferred));
+    }
+    onboarding.coverage =
+        ScoreCoverage(scoring.faults, parts, scoring.options.threads);
+  } catch (const DataError& error) {
+    onboarding.unscored = error.what();
+  }
+}
+
+// Both sets are asked for what both have seen, so that they are comparable.
+std::vector<CoverageChange> CompareWithFormer(
+    const std::vector<TrainingRun>& all, const Scoring& scoring,
+    const ModelSet& models) {
+  Stretch stretch =
+      LongestStretch(FormerRuns(all, scoring.options.former_runs));
+  // The engine reads the position as the command, the synthesizer the command.
+  for (Sample& sample : stretch.samples) {
+    if (models.position_as_command && sample.Has(Signal::kX)) {
+      sample.Set(Signal::kCv, sample[Signal::kX]);
+    }
+  }
+  const auto assess = [&](std::shared_ptr<const ModelSet> set) {
+    return AssessCoverage(std::move(set), scoring.faults,
+                          std::ref(scoring.synthesize), stretch,
+                          scoring.options.threads);
+  };
+  return ChangesOf(assess(scoring.options.extends),
+                   assess(std::make_shared<const ModelSet>(models)));
+}
+
 // Faults act in proportion to the size of a valve, so that a set serves valves
 // of its own size only.
 void RequireOfType(const std::vector<TrainingRun>& runs,
@@ -748,6 +702,18 @@ void RequireOfType(const std::vector<TrainingRun>& runs,
   }
 }
 
+// The ranges of the type become those of the record.
+void TakeRangesOf(const std::vector<TrainingRun>& runs, bool resize,
+                  Onboarding& result) {
+  WidenRanges(runs, result.type.parameters.instruments);
+  if (result.type.of_any_size) {
+    NarrowPressures(runs, result.type.parameters.instruments);
+    if (resize) {
+      Resize(runs, result);
+    }
+  }
+}
+
 }  // namespace
 
 // What is refused is refused before the work that it would spoil:
@@ -756,7 +722,8 @@ void RequireOfType(const std::vector<TrainingRun>& runs,
 //                    which may have cut its longest stretch short
 //   RequireAlike     runs that differ in period, flow unit or signals
 //   CheckRecords     units and sense, before anything is fitted to them
-//   InUnit, LevelsOf, WidenRanges, NarrowPressures, Resize
+//   CommandIsLost    not refused: from there on the position is the command
+//   InUnit, LevelsOf, TakeRangesOf
 //                    the ranges of the type in the unit and of the size of the
 //                    record, before simulated and measured readings are
 //                    compared
@@ -766,28 +733,28 @@ void RequireOfType(const std::vector<TrainingRun>& runs,
 Onboarding Onboard(const std::vector<TrainingRun>& all,
                    const OnboardingOptions& options, const Progress& progress) {
   RequireHealthy(all);
-  const std::vector<TrainingRun> runs = WithoutStops(all);
+  std::vector<TrainingRun> runs = WithoutStops(all);
   RequireHealthy(runs);
   RequireAlike(runs);
-  const SignalMask signals =
-      runs.front().samples.front().sample.present & kBasicSignals;
+  Onboarding result;
+  SignalMask signals = result.signals = SignalsOf(runs);
   TrainingOptions training = TrainingOf(options, signals);
   CheckRecords(runs, options.type.parameters.medium);
-  Onboarding result;
+  const bool at_position = options.extends
+                               ? options.extends->position_as_command
+                               : CommandIsLost(runs);
+  if (at_position) {
+    std::ranges::transform(runs, runs.begin(), AtPosition);
+    signals = SignalsOf(runs);
+    training = TrainingOf(options, signals);
+  }
   result.unread = DropUnreadChannels(runs, training.channels);
   result.type = (signals & MaskOf(Signal::kF)) != 0
                     ? InUnit(options.type, runs.front().flow_unit)
                     : options.type;
-  result.signals = signals;
   result.type.levels = LevelsOf(runs, result.type);
-  WidenRanges(runs, result.type.parameters.instruments);
-  if (result.type.of_any_size) {
-    NarrowPressures(runs, result.type.parameters.instruments);
-  }
-  if (options.fit && result.type.of_any_size &&
-      (signals & MaskOf(Signal::kF)) != 0) {
-    Resize(runs, result);
-  }
+  TakeRangesOf(runs, options.fit && (signals & MaskOf(Signal::kF)) != 0,
+               result);
   const double meter_end = result.type.parameters.instruments.flow.high;
   if (options.fit) {
     Part(progress, 0.0, kFitShare)(0.0, "fitting the physical parameters");
@@ -796,35 +763,35 @@ Onboarding Onboard(const std::vector<TrainingRun>& all,
     CheckFit(runs, Compare(runs, result.type), {}, meter_end);
   }
   training.flow_shape = FlowShape(result.type.parameters.trim);
-  const FaultSynthesizer synthesize(result.type);
+  const FaultSynthesizer synthesize(result.type, at_position);
   const std::vector<FaultCondition> faults =
-      OnboardingFaults(signals, result.type.parameters);
+      FaultsOf(signals, result.type.parameters, at_position);
   const Progress part = Part(progress, kFitShare, kTrainShare);
-  result.transferred =
-      options.of_type && IsTransferable(*options.of_type, runs, training);
+  result.transferred = options.of_type &&
+                       options.of_type->position_as_command == at_position &&
+                       IsTransferable(*options.of_type, runs, training);
   if (options.only_of_type) {
     RequireOfType(runs, result);
   }
+  FaultyStretches simulated;
   result.models =
       result.transferred
           ? TransferDifferenceSet(*options.of_type, runs, training, part)
           : TrainDifferenceSet(runs, faults, std::ref(synthesize), meter_end,
-                               training, part);
+                               training, part,
+                               options.assess ? &simulated : nullptr);
   result.models.physics = Physics(result.type, runs);
+  result.models.position_as_command = at_position;
   result.channels = FitsOf(result.models, runs);
   result.hours = Hours(all);
   result.left_out_s = 3600.0 * (result.hours - Hours(runs));
   if (options.assess) {
     Part(progress, kFitShare + kTrainShare, 0.0)(0.0, "scoring every fault");
-    const Stretch stretch = LongestStretch(
-        options.extends ? FormerRuns(all, options.former_runs) : runs);
-    const auto assess = [&](std::shared_ptr<const ModelSet> models) {
-      return AssessCoverage(std::move(models), faults, synthesize, stretch,
-                            options.threads);
-    };
-    result.coverage = assess(std::make_shared<const ModelSet>(result.models));
+    const Scoring scoring{runs,      faults,   synthesize,
+                          simulated, training, options};
+    ScoreUnseen(scoring, result);
     if (options.extends) {
-      result.coverage_before = assess(options.extends);
+      result.changes = CompareWithFormer(all, scoring, result.models);
     }
   }
   Part(progress, 1.0, 0.0)(0.0, "done");
@@ -834,8 +801,8 @@ Onboarding Onboard(const std::vector<TrainingRun>& all,
 CoverageTable AssessType(const ValveType& type, SignalMask signals,
                          bool with_gains, const OnboardingOptions& options,
                          const Progress& progress) {
-  constexpr double kSeconds = 1800.0;
-  const TrainingRun full = SimulateHealthyRun(type, kSeconds);
+  const TrainingRun full =
+      SimulateHealthyRun(type, static_cast<double>(kTypeSamples + kTypeUnseen));
   // All tables rest on one simulated run and differ by the signals alone. Each
   // gain is that of a single transmitter; what two of them together would show
   // is not asked.

@@ -8,65 +8,11 @@
 #include "base/error.h"
 #include "diagnosis/model_set.h"
 #include "simulator/valve_identification.h"
+#include "trainer/onboarding/coverage.h"
 #include "trainer/onboarding/fault_synthesis.h"
 #include "trainer/training.h"
 
 namespace fdi::trainer {
-
-/// What a model set makes of one fault in one direction.
-struct FaultCoverage {
-  int fault{0};
-  bool negative{false};
-  /// Smallest |strength| that is detected, as are all greater ones tried.
-  std::optional<double> detectable{};
-  /// Smallest |strength| from which on the fault stands in a final set of at
-  /// most two.
-  std::optional<double> isolable{};
-  std::vector<int> look_alikes{};  ///< Beside it in some final set, or instead.
-};
-
-/// What becomes visible with one more transmitter.
-struct TransmitterGain {
-  Signal signal{Signal::kF};
-  std::vector<int> detectable{};  ///< Faults that were not.
-  std::vector<int> isolable{};    ///< Faults that were not.
-};
-
-struct CoverageTable {
-  SignalMask signals{0};
-  double seconds{0.0};  ///< That a fault was given to show.
-  std::vector<FaultCoverage> faults;
-  std::vector<TransmitterGain> gains{};
-};
-
-/// Scores every condition: `healthy` as it is for 120 s, then with the fault.
-/// The engine decides as in service. The strengths are those of the observers:
-/// between them and beyond it is interpolation.
-///
-/// @param healthy Of the valve; what is too long for 15 minutes is cut.
-CoverageTable AssessCoverage(std::shared_ptr<const ModelSet> models,
-                             const std::vector<FaultCondition>& faults,
-                             const FaultSynthesizer& synthesize,
-                             const Stretch& healthy, int threads);
-
-/// The gain of `more` over `less`: faults that are detectable or isolable at
-/// some strength in one and not in the other.
-TransmitterGain GainOf(Signal signal, const CoverageTable& less,
-                       const CoverageTable& more);
-
-/// The smallest strength of a fault that is detected, by two sets.
-struct CoverageChange {
-  int fault{0};
-  bool negative{false};
-  std::optional<double> before{};
-  std::optional<double> after{};
-
-  bool lost() const { return before && !after; }
-};
-
-/// Faults whose smallest strength differs.
-std::vector<CoverageChange> ChangesOf(const CoverageTable& before,
-                                      const CoverageTable& after);
 
 /// The run as a valve gives it that measures `signals` alone.
 TrainingRun WithSignals(TrainingRun run, SignalMask signals);
@@ -96,9 +42,9 @@ struct OnboardingOptions {
   std::string name;  ///< Of the model set.
   ValveType type;    ///< Where the fit starts, or what is taken as it is.
   bool fit{true};    ///< Fit the physical parameters to the valve.
-  double false_alarms_per_hour{1e-3};  ///< Over all channels together.
-  int threads{0};                      ///< 0: all of the machine.
-  bool assess{true};                   ///< Score every fault for the table.
+  double false_alarms_per_hour{kFalseAlarmsPerHour};
+  int threads{0};     ///< 0: all of the machine.
+  bool assess{true};  ///< Score every fault for the table.
   /// Set of another valve of the type, which serves this one where it can
   /// (TransferDifferenceSet); none: every fault is simulated.
   std::optional<ModelSet> of_type{};
@@ -133,9 +79,12 @@ struct Onboarding {
   std::optional<simulator::ValveFit> fit;
   std::vector<ChannelFit> channels;
   std::vector<std::string> unread;  ///< Channels of DropUnreadChannels().
+  /// Scored on parts of the record by models that did not see them.
   std::optional<CoverageTable> coverage;
-  std::optional<CoverageTable>
-      coverage_before;     ///< Of OnboardingOptions::extends
+  std::string unscored;  ///< Why that was not possible; else empty.
+  /// From OnboardingOptions::extends to this set, on the former runs, which
+  /// both have seen.
+  std::optional<std::vector<CoverageChange>> changes;
   SignalMask signals{0};   ///< That the valve measures.
   double hours{0.0};       ///< Of healthy data.
   double left_out_s{0.0};  ///< Of them at a stop, or just after (WithoutStops).

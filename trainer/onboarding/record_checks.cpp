@@ -262,31 +262,6 @@ std::string SlowRecord(const std::vector<TrainingRun>& runs) {
                    "every second, or unfiltered values";
 }
 
-// The command of a slow record says nothing of the position, but the position
-// does of the flow.
-void RefuseTooSlow(double period_s, const Readings& cv, const Readings& x,
-                   const Readings& f) {
-  constexpr double kFollows = 0.7;
-  constexpr double kDetermines = 0.8;
-  if (period_s < kSlowS || x.values.size() != cv.values.size() ||
-      x.values.size() != f.values.size()) {
-    return;
-  }
-  const double follows = Correlation(cv, x);
-  const double flow = Correlation(x, f);
-  if (follows < kFollows && flow < -kDetermines) {
-    throw DataError(
-        "one sample in " + Text(period_s) +
-        " s is too slow for this command: X does not follow CV from sample to "
-        "sample (correlation " +
-        Text(follows) + "), while F follows X (" + Text(flow) +
-        "). Export every second; or map the column of the position as "
-        "[signal.CV] and none as [signal.X], here and in what is monitored. "
-        "The flow is then judged at the position, and how the rod follows the "
-        "command is not");
-  }
-}
-
 // What explains a flow that is not simulated: the flow meter of the type ends
 // before the readings do. Else empty.
 std::string BeyondMeter(const std::vector<TrainingRun>& runs, const Readings& f,
@@ -329,7 +304,6 @@ void CheckFit(const std::vector<TrainingRun>& runs,
   const Readings x = ReadingsOf(runs, Signal::kX);
   const auto refuse = [&](const char* what, double error, double naive,
                           const char* model, const char* unit) {
-    RefuseTooSlow(runs.front().period_s, cv, x, f);
     const std::string beyond = BeyondMeter(runs, f, meter_end);
     throw DataError(
         (beyond.empty() ? std::string("the unit or sense of a column is wrong, "

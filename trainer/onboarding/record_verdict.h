@@ -3,21 +3,25 @@
 #include <string>
 #include <vector>
 
+#include "trainer/onboarding/coverage.h"
 #include "trainer/training.h"
 
 namespace fdi::trainer {
 
-/// What a model set is worth that was made from a healthy record, as far as the
-/// record decides it.
+/// What a model set is worth that was made from a healthy record.
 struct RecordVerdict {
   std::string word;      ///< "usable" or "thin"; what is neither is refused.
   std::string sentence;  ///< Begins with the word; says what is still needed.
 };
 
-/// Thin is a record of less than 25 minutes, or one in which the command stays
-/// within 5 %, outliers aside: the set would alarm where the valve works in
-/// another way.
+/// Thin is a record of less than 25 minutes, one in which the command stays
+/// within 5 %, outliers aside, and one whose parts the models of the rest do
+/// not know: they alarm there, or judge less than half of it. The set would
+/// alarm where the valve works in another way.
+///
 /// @param hours of healthy data in `runs`
-RecordVerdict JudgeRecord(const std::vector<TrainingRun>& runs, double hours);
+/// @param coverage of parts that the models did not see; null: not scored.
+RecordVerdict JudgeRecord(const std::vector<TrainingRun>& runs, double hours,
+                          const CoverageTable* coverage = nullptr);
 
 }  // namespace fdi::trainer
