@@ -58,9 +58,10 @@ double FlowReading(const ValveParameters& parameters,
                    double x_pct) {
   const Instrumentation& i = parameters.instruments;
   const double factor = effects.position_reading_factor;
-  const double rod = factor == 1.0
-                         ? 0.01 * x_pct
-                         : std::clamp(0.01 * x_pct / factor, 0.0, 1.0);
+  const double rod = factor == 1.0 ? 0.01 * x_pct
+                     : factor > 0.0
+                         ? std::clamp(0.01 * x_pct / factor, 0.0, 1.0)
+                         : 0.0;
   const double flow =
       FlowOf(parameters, effects,
              {0.01 * input.cv_pct, 1e3 * input.p1_kpa * effects.inlet_factor,

@@ -32,6 +32,7 @@
 #include "trainer/learning/extension.h"
 #include "trainer/learning/labelled_episodes.h"
 #include "trainer/onboarding/onboarding.h"
+#include "trainer/onboarding/record_checks.h"
 #include "trainer/onboarding/record_verdict.h"
 #include "trainer/rule_text.h"
 #include "trainer/scoring/evaluated_run.h"
@@ -256,7 +257,6 @@ std::vector<int> FaultsOfRodAlone() {
 
 // What signals and period of the record keep from being seen.
 std::vector<std::string> LimitsOfRecord(const Onboarding& onboarding) {
-  constexpr double kSlowS = 5.0;
   std::vector<std::string> lines;
   const bool at_position = onboarding.models.position_as_command;
   const double period_s = onboarding.models.sample_period_s;

@@ -513,6 +513,8 @@ TEST(CoverageTest, WhatIsLeftOutIsInNothingThatIsLeft) {
       PartsOf({stretches[0], Counted("a", 600, 600), Counted("b", 700, 0)})[1]
           .stretch,
       2U);
+  // In less than two minutes no fault would begin.
+  EXPECT_THROW(PartsOf({Counted("a", 240, 0)}), DataError);
 
   const FaultyStretches rest = Without({stretches, {stretches}}, {1, 300, 600});
   ASSERT_EQ(rest.healthy.size(), 3U);  // the 40 of b tell nothing

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
 #include <utility>
 
+#include "base/error.h"
 #include "diagnosis/fault_catalogue.h"
 #include "trainer/evaluation.h"
 #include "trainer/parallel_for.h"
@@ -227,6 +229,11 @@ std::vector<RecordPart> PartsOf(const std::vector<Stretch>& stretches) {
     last = wide.back();
   } else {
     count = std::min(kPart, stretches[longest].samples.size() / 2);
+  }
+  if (count <= kLeadIn) {
+    throw DataError("a part has " + std::to_string(count) +
+                    " samples, scoring takes more than " +
+                    std::to_string(kLeadIn));
   }
   return {{first, 0, count},
           {last, stretches[last].samples.size() - count, count}};

@@ -74,6 +74,7 @@ struct RecordPart {
 
 /// The two parts of a record that are left out in turn: its first and its last
 /// 600 samples; of a shorter record its halves.
+/// @throws DataError where a half is too short for a fault to show.
 std::vector<RecordPart> PartsOf(const std::vector<Stretch>& stretches);
 
 /// The runs without the samples of `part`.

@@ -5,12 +5,12 @@
 #include <cstddef>
 #include <numbers>
 
+#include "trainer/onboarding/record_checks.h"
 #include "trainer/statistics.h"
 
 namespace fdi::trainer {
 namespace {
 
-constexpr double kLeastPeriodS = 5.0;
 constexpr double kErrors = 3.0;  // standard errors
 constexpr std::size_t kParts = 20;
 // Of the delays -1, 0, 1 and 2 that identification tries.
@@ -91,7 +91,7 @@ bool Larger(const std::vector<double>& errors,
 }  // namespace
 
 bool CommandIsLost(const std::vector<TrainingRun>& runs) {
-  if (runs.empty() || runs.front().period_s < kLeastPeriodS) {
+  if (runs.empty() || runs.front().period_s < kSlowS) {
     return false;
   }
   Record record = Collect(runs);

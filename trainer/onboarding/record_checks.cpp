@@ -249,8 +249,6 @@ void CheckKind(const std::vector<TrainingRun>& runs, const Readings& cv,
   }
 }
 
-constexpr double kSlowS = 5.0;
-
 // A cause beside the others, where the command moves much in a sample: what it
 // was meanwhile is not in the record.
 std::string SlowRecord(const std::vector<TrainingRun>& runs) {

@@ -7,6 +7,9 @@
 
 namespace fdi::trainer {
 
+/// From this period on a record does not show how the rod moves [s].
+inline constexpr double kSlowS = 5.0;
+
 /// Refuses records whose numbers cannot be those of a valve in the units and
 /// the sense that the project uses (diagnosis/sample.h): CV and X in shares of
 /// one, P1 in bar, T1 in K, P1 below P2, X or F that move against the command;

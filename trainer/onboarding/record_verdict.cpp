@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <iterator>
 
+#include "base/text.h"
 #include "trainer/statistics.h"
 
 namespace fdi::trainer {
@@ -86,11 +87,7 @@ RecordVerdict JudgeRecord(const std::vector<TrainingRun>& runs, double hours,
     detected = "; " + DetectedOf(*coverage);
   }
   if (!lacks.empty()) {
-    std::string sentence = "thin: ";
-    for (const std::string& lack : lacks) {
-      sentence += (&lack == &lacks.front() ? "" : "; ") + lack;
-    }
-    return {"thin", sentence +
+    return {"thin", "thin: " + JoinText(lacks, "; ") +
                         ". Until then expect false alarms where the valve "
                         "works in another way than here" +
                         detected};
