@@ -95,7 +95,7 @@ await 5 said "interface_missing address=10.77.0.1" ||
   fail "nothing was said of the interface that is gone"
 plug
 up_ms=$(now_ms)
-# Samples of before may still be on their way into the store.
+# Earlier samples may still be on their way into the store.
 await 15 said "interface_renewed address=10.77.0.1" ||
   fail "interface_renewed is missing"
 before=$(received)

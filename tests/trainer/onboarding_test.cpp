@@ -649,12 +649,12 @@ TEST(RecordVerdictTest, ThinSaysWhatIsStillNeeded) {
   EXPECT_NE(judged().sentence.find("in 1 of 2 parts of the record"),
             std::string::npos)
       << judged().sentence;
-  EXPECT_NE(judged().sentence.find("(1.00 h more) is needed"),
+  EXPECT_NE(judged().sentence.find("another 1.00 h of record is needed"),
             std::string::npos);
   coverage.alarmed = 0;
   coverage.judged = 0.3;
   EXPECT_EQ(judged().word, "thin");
-  EXPECT_NE(judged().sentence.find("only 30 % as their own operating points"),
+  EXPECT_NE(judged().sentence.find("know only 30 % of a part of it"),
             std::string::npos)
       << judged().sentence;
 }

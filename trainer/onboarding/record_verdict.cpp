@@ -40,17 +40,17 @@ double CommandSpan(const std::vector<TrainingRun>& runs) {
 std::vector<std::string> LacksOf(const CoverageTable& coverage, double hours) {
   std::vector<std::string> lacks;
   if (coverage.judged < kLeastJudged) {
-    lacks.push_back("of a part of the record, models of the rest know only " +
+    lacks.push_back("models of the rest of the record know only " +
                     Fixed(100.0 * coverage.judged, 0) +
-                    " % as their own operating points: each is needed at least "
-                    "twice");
+                    " % of a part of it: every operating point is needed at "
+                    "least twice");
   }
   if (coverage.alarmed > 0) {
     lacks.push_back("in " + std::to_string(coverage.alarmed) + " of " +
                     std::to_string(coverage.parts) +
                     " parts of the record, models of the rest alarm although "
-                    "the valve is healthy, as long a record again (" +
-                    Fixed(hours, 2) + " h more) is needed");
+                    "the valve is healthy: another " +
+                    Fixed(hours, 2) + " h of record is needed");
   }
   return lacks;
 }
