@@ -6,21 +6,21 @@
 ///     MACRO(correlation)
 ///
 /// The preprocessor does not expand a macro within itself. FDI_FOR_EACH_STEP
-/// therefore leaves the name of its next step unexpanded, and FDI_EXPAND
+/// therefore leaves the name of its next step unexpanded, and FDI_RESCAN
 /// rescans the result 64 times, which limits the number of fields.
 #define FDI_FOR_EACH(MACRO, ...) \
-  __VA_OPT__(FDI_EXPAND(FDI_FOR_EACH_STEP(MACRO, __VA_ARGS__)))
+  __VA_OPT__(FDI_RESCAN(FDI_FOR_EACH_STEP(MACRO, __VA_ARGS__)))
 #define FDI_FOR_EACH_STEP(MACRO, FIRST, ...) \
   MACRO(FIRST)                               \
   __VA_OPT__(FDI_FOR_EACH_NEXT FDI_NO_ARGUMENTS(MACRO, __VA_ARGS__))
 #define FDI_FOR_EACH_NEXT() FDI_FOR_EACH_STEP
 #define FDI_NO_ARGUMENTS ()
-#define FDI_EXPAND(...) FDI_EXPAND_16(FDI_EXPAND_16(__VA_ARGS__))
-#define FDI_EXPAND_16(...) \
-  FDI_EXPAND_4(FDI_EXPAND_4(FDI_EXPAND_4(FDI_EXPAND_4(__VA_ARGS__))))
-#define FDI_EXPAND_4(...) \
-  FDI_EXPAND_1(FDI_EXPAND_1(FDI_EXPAND_1(FDI_EXPAND_1(__VA_ARGS__))))
-#define FDI_EXPAND_1(...) __VA_ARGS__
+#define FDI_RESCAN(...) FDI_RESCAN_16(FDI_RESCAN_16(__VA_ARGS__))
+#define FDI_RESCAN_16(...) \
+  FDI_RESCAN_4(FDI_RESCAN_4(FDI_RESCAN_4(FDI_RESCAN_4(__VA_ARGS__))))
+#define FDI_RESCAN_4(...) \
+  FDI_RESCAN_1(FDI_RESCAN_1(FDI_RESCAN_1(FDI_RESCAN_1(__VA_ARGS__))))
+#define FDI_RESCAN_1(...) __VA_ARGS__
 
 /// FDI_VISITABLE(Scatter, sd, slow_sd) defines VisitFields(scatter, visit),
 /// which calls visit("sd", scatter.sd) and so on, in this order.

@@ -12,7 +12,7 @@
 #
 # With `onboarded`, the set is one of a valve in its level loop, onboarded on two
 # healthy hours of its own and reduced to the same five faults; it has no second
-# look, which knows all faults.
+# look, which knows all faults. The answers go to FDI_RUNS, if that is set.
 #
 #     bench/untrained.sh build/release/bin [CAMPAIGN.toml|onboarded [SEED]]
 set -euo pipefail
@@ -142,6 +142,7 @@ awk -F, '
 "$bin/fdi-trainer" evaluate --model-set "$set_name" "${files[@]}" --csv \
   2>"$work/log" | tail -n +2 |
   sed -E ':again; s/("[^",]*),([^"]*")/\1|\2/; t again; s/"//g' >"$work/answers"
+cat "$work/answers" >>"${FDI_RUNS:-/dev/null}"
 awk -F, '
   NR == FNR { nearest[$1] = $2; distance[$1] = $3; next }
   { run = $1; sub(/.*\//, "", run); sub(/\.csv.*/, "", run)

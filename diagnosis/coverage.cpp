@@ -17,6 +17,17 @@ std::optional<int> ChannelOf(const ModelSet& models, Signal output) {
   return std::nullopt;
 }
 
+// Samples that a command is read for.
+int ReadFor(const ModelSet& models) {
+  int longest = 0;
+  for (const Observer& observer : models.observers) {
+    for (const ChannelObserver& channel : observer.channels) {
+      longest = std::max(longest, MaxLag(channel.model));
+    }
+  }
+  return longest + 1;
+}
+
 CoverageReasons If(bool holds, CoverageReason reason) {
   return holds ? BitOf(reason) : CoverageReasons{0};
 }
@@ -25,6 +36,7 @@ CoverageReasons If(bool holds, CoverageReason reason) {
 
 Coverage::Coverage(const ModelSet& models)
     : models_(&models),
+      read_for_(ReadFor(models)),
       inputs_{{{Signal::kT1, CoverageReason::kT1, models.validity.t1,
                 ChannelOf(models, Signal::kT1)},
                {Signal::kP1, CoverageReason::kP1, models.validity.p1,
@@ -37,6 +49,7 @@ Coverage::Coverage(const ModelSet& models)
 void Coverage::Restart() {
   armed_ = false;
   inside_ = 0;
+  passing_ = 0;
   needed_ = std::max(models_->decision.settling_samples, kMaxLag);
   settling_ = needed_;
   at_end_ = 0;
@@ -86,10 +99,13 @@ CoverageReasons Coverage::Operation(const Sample& sample) {
   averaged_ = last_cv_ ? std::min(averaged_ + 1, kCvMeanSettling) : 0;
   mean_cv_ = last_cv_ ? mean_cv_ + kCvMeanGain * (cv - mean_cv_) : cv;
   last_cv_ = cv;
-  const bool within =
-      region.cv.Contains(cv) &&
-      (averaged_ < kCvMeanSettling || region.cv_mean.Contains(mean_cv_));
-  reasons |= If(!within, CoverageReason::kCv);
+  const bool settled = averaged_ == kCvMeanSettling;
+  const bool beyond = !region.cv.Contains(cv);
+  const bool passes = models_->command_may_pass && beyond && settled &&
+                      region.cv.Contains(mean_cv_);
+  passing_ = passes ? read_for_ : std::max(passing_ - 1, 0);
+  const bool mean_within = !settled || region.cv_mean.Contains(mean_cv_);
+  reasons |= If((beyond && !passes) || !mean_within, CoverageReason::kCv);
   reasons |= If(steps, CoverageReason::kCvStep);
   reasons |= If(IsParked(sample), CoverageReason::kParked);
   return reasons;
@@ -125,6 +141,7 @@ Quality Coverage::Judge(const Sample& sample, const ObserverBank& bank,
   const bool abnormal = models_->floor && (episode_open || found);
   if (abnormal || (models_->floor && pending && armed_)) {
     operation &= BitOf(CoverageReason::kMode);
+    passing_ = 0;
     armed_now_ = !armed_ && settled_ && operation == 0;
     armed_ = armed_ || armed_now_;
   }
@@ -138,6 +155,11 @@ Quality Coverage::Judge(const Sample& sample, const ObserverBank& bank,
 
 Quality Coverage::JudgeArmed(CoverageReasons inputs, bool episode_open) {
   excused_ = episode_open ? inputs : CoverageReasons{0};
+  if (passing_ > 0) {
+    reasons_ = BitOf(passing_ == read_for_ ? CoverageReason::kCv
+                                           : CoverageReason::kWaiting);
+    return Quality::kUncovered;
+  }
   reasons_ = If(settling_ > 0, CoverageReason::kWaiting);
   return settling_ > 0 ? Quality::kSettling : Quality::kLive;
 }
@@ -145,6 +167,8 @@ Quality Coverage::JudgeArmed(CoverageReasons inputs, bool episode_open) {
 Quality Coverage::JudgeDisarmed(CoverageReasons operation,
                                 CoverageReasons inputs) {
   excused_ &= inputs;
+  operation |= If(passing_ == read_for_, CoverageReason::kCv);
+  passing_ = 0;
   reasons_ = operation | (inputs & static_cast<CoverageReasons>(~excused_));
   if (reasons_ != 0) {
     armed_ = false;

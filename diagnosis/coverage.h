@@ -17,15 +17,17 @@ inline constexpr std::int64_t kMaxInterruptionNs = 600'000'000'000;
 /// Decides whether a valve operates where its model set was trained. It is
 /// either ARMED, and judged, or not.
 ///
-/// The process disarms it: by a mode other than AUTO, by a command outside the
-/// trained range, by a constant or stepping command as never seen in training,
-/// or by parking it, i.e. an end of travel without flow. It is armed again
-/// after `rearm_samples` in a row without any of these and with dP, T1, P1 and
-/// P2 as in normal operation: cold feedwater and rising pressure at a start-up
-/// do not mean a broken transmitter. A new stream only needs the settling
-/// samples. Once the valve is armed, dP, T1, P1 and P2 never disarm it, because
-/// they are judged themselves. Deviations of these during an open episode do
-/// not prevent re-arming.
+/// The process disarms it: by a mode other than AUTO, by a command that stays
+/// outside the trained range or steps as never in training, or by parking it,
+/// i.e. an end of travel without flow. A command that is outside for moments,
+/// its running mean inside, does not (ModelSet::command_may_pass): the valve is
+/// only not judged until no observer reads that command any more. It is armed
+/// again after `rearm_samples` in a row without any of these and with dP, T1,
+/// P1 and P2 as in normal operation: cold feedwater and rising pressure at a
+/// start-up do not mean a broken transmitter. A new stream only needs the
+/// settling samples. Once the valve is armed, dP, T1, P1 and P2 never disarm
+/// it, because they are judged themselves. Deviations of these during an open
+/// episode do not prevent re-arming.
 ///
 /// Disarming only works before a deviation: with a floor in the model set, an
 /// abnormal valve stays armed whatever its command does, because the fault
@@ -76,6 +78,7 @@ class Coverage {
   Quality JudgeDisarmed(CoverageReasons operation, CoverageReasons inputs);
 
   const ModelSet* models_;
+  int read_for_;  // samples that some observer reads a command for
   std::array<Input, 3> inputs_;
   bool armed_{false};
   bool armed_now_{false};
@@ -83,7 +86,9 @@ class Coverage {
   int settling_{0};  // samples until the observers have settled
   int inside_{0};    // consecutive samples inside
   int needed_{0};    // required value of inside_
-  int at_end_{0};    // consecutive samples at an end of travel, no flow
+  int passing_{0};  // samples until none reads a command that was outside for a
+                    // moment; read_for_ while it is
+  int at_end_{0};   // consecutive samples at an end of travel, no flow
   std::optional<double> last_cv_;
   double mean_cv_{0.0};
   int averaged_{0};  // samples in mean_cv_, up to kCvMeanSettling

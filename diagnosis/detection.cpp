@@ -23,7 +23,8 @@ void Detection::Restart() {
   runs_.fill({});
 }
 
-bool Detection::Push(const ObserverBank& bank, const Sample& sample) {
+bool Detection::Push(const ObserverBank& bank, const Sample& sample,
+                     std::span<const double> margins) {
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   const std::int64_t stamp_ns = sample.stamp_ns;
   const std::size_t channels = models_->channels.size();
@@ -31,9 +32,10 @@ bool Detection::Push(const ObserverBank& bank, const Sample& sample) {
   for (std::size_t c = 0; c < channels; ++c) {
     const int channel = static_cast<int>(c);
     certain[c] = bank.active(channel)
-                     ? SoftThreshold(
-                           bank.residual(0, channel),
-                           kExtrapolationError * bank.extrapolation(0, channel))
+                     ? SoftThreshold(bank.residual(0, channel),
+                                     kExtrapolationError *
+                                             bank.extrapolation(0, channel) +
+                                         (margins.empty() ? 0.0 : margins[c]))
                      : kNan;
   }
   windows_.Push({certain.data(), channels},

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <optional>
+#include <span>
 
 #include "diagnosis/observer_bank.h"
 #include "diagnosis/residual_windows.h"
@@ -29,7 +30,9 @@ class Detection {
 
   /// Takes one sample and its residuals. Returns whether a single residual is
   /// beyond its threshold.
-  bool Push(const ObserverBank& bank, const Sample& sample);
+  /// @param margins that residuals of each channel may have anyway; empty: 0.
+  bool Push(const ObserverBank& bank, const Sample& sample,
+            std::span<const double> margins = {});
 
   void Save(SnapshotWriter& writer) const;
   /// @returns false, leaving it undefined, if there is nothing to be read.

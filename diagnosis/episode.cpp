@@ -262,14 +262,17 @@ void Episode::Step(const Sample& sample, const ObserverBank& bank,
   clearing_.Push({verdict.residuals.data(), models_->channels.size()},
                  verdict.normal_factor, findings.abnormal);
   if (clearing_.Cleared()) {
-    // Both transitions carry the name of the episode, which is reset below.
-    Emit(TransitionKind::kCleared, verdict.stamp_ns, verdict);
-    Emit(TransitionKind::kClosed, verdict.stamp_ns, verdict,
-         EndReason::kCleared);
-    verdict.state = State::kNormal;
-    verdict.isolated = 0;
-    verdict.unknown = Unknown::kNone;
+    End(verdict);
   }
+}
+
+// Both transitions carry the name of the episode, which is reset then.
+void Episode::End(Verdict& verdict) const {
+  Emit(TransitionKind::kCleared, verdict.stamp_ns, verdict);
+  Emit(TransitionKind::kClosed, verdict.stamp_ns, verdict, EndReason::kCleared);
+  verdict.state = State::kNormal;
+  verdict.isolated = 0;
+  verdict.unknown = Unknown::kNone;
 }
 
 void Episode::Hold(Verdict& verdict) const {
@@ -292,6 +295,7 @@ Transition Episode::Close(EndReason reason, std::int64_t stamp_ns,
       Make(TransitionKind::kClosed, stamp_ns, reason, verdict);
   verdict.state = State::kNormal;
   verdict.isolated = 0;
+  verdict.second = {};
   verdict.unknown = Unknown::kNone;
   verdict.detected = false;
   return closed;
@@ -563,6 +567,17 @@ void Episode::NameEarly(const Sample& sample, FaultSet beginning,
   }
 }
 
+// What the name does not explain comes on top of it, or may.
+void Episode::KeepName() {
+  contender_run_ = 0;
+  proven_run_ = 0;
+  if (hold_ == NameHold::kExplained) {
+    refuted_ = 0;
+    misfits_ = 0;
+    std::ranges::fill(misfit_counts_, 0);
+  }
+}
+
 void Episode::Isolate(const Sample& sample, const Findings& findings,
                       Verdict& verdict) {
   const double threshold = models_->decision.isolation_threshold;
@@ -572,6 +587,10 @@ void Episode::Isolate(const Sample& sample, const Findings& findings,
   Recognise();
   // A stuck transmitter is certain, whatever its observers say.
   CountMisfits(findings.stuck != 0 ? 0 : faults_.misfits(), verdict);
+  if (hold_ != NameHold::kNone) {
+    KeepName();
+    return;
+  }
   Withdraw(verdict);
   FaultSet supported = isolation_.Supported();
   if (IsAllOf(supported, misfits_)) {

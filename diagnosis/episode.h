@@ -137,8 +137,27 @@ class Episode {
   /// A sample that is not judged: an open episode keeps its evidence.
   void Hold(Verdict& verdict) const;
 
+  /// Ends an open episode as cleared.
+  void End(Verdict& verdict) const;
+
   /// Ends an open episode from outside. @returns its kClosed transition.
   Transition Close(EndReason reason, std::int64_t stamp_ns, Verdict& verdict);
+
+  /// What SecondFaultWatch makes of the next sample of a named episode.
+  enum class NameHold : std::uint8_t {
+    kNone,
+    kName,       ///< Its name does not change.
+    kExplained,  ///< Nor does what a second fault causes count against it.
+  };
+  void HoldName(NameHold hold) { hold_ = hold; }
+
+  /// See FaultBank.
+  FaultBank::Leader LeaderOf(FaultSet faults) const {
+    return faults_.LeaderOf(faults);
+  }
+  FaultSet misfits() const { return misfits_; }
+  void RaiseTo(double least) { faults_.RaiseTo(least); }
+  void Excuse(SignalMask inputs) { faults_.Excuse(inputs); }
 
   /// While held, no fault is isolated.
   void HoldIsolation(bool hold) { isolation_held_ = hold; }
@@ -152,6 +171,7 @@ class Episode {
   FaultSet LossBeside(FaultSet set, FaultSet floor, const Sample& sample,
                       const Verdict& verdict) const;
   void CountMisfits(FaultSet misfits, const Verdict& verdict);
+  void KeepName();
   void Withdraw(Verdict& verdict);
   bool ExplainsLoss(FaultSet set, const Verdict& verdict) const;
   bool IsAllOf(FaultSet faults, FaultSet misfits) const;
@@ -181,6 +201,7 @@ class Episode {
   FaultSet recognised_{0};
   ClearingWindow clearing_;
   bool isolation_held_{false};
+  NameHold hold_{NameHold::kNone};
   std::int64_t detection_stamp_ns_{0};
   FaultSet floor_{0};                      // findings that the episode shows
   std::array<int, Floor::kTests> over_{};  // samples since each was there

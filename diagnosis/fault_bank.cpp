@@ -65,6 +65,18 @@ double FaultBank::BestEvidence() const {
   return best;
 }
 
+FaultBank::Leader FaultBank::LeaderOf(FaultSet faults) const {
+  Leader leader;
+  for (const StrengthTracker& tracker : trackers_) {
+    const double evidence = tracker.evidence(trained_);
+    if (Has(faults, tracker.path().fault_index) && evidence > leader.evidence) {
+      leader = {&tracker.path(), std::abs(tracker.strength(trained_)),
+                evidence};
+    }
+  }
+  return leader;
+}
+
 void FaultBank::UpdateEffect(const ObserverBank& bank) {
   const std::vector<ChannelObserver>& normal =
       plan_->models().observers.front().channels;
@@ -116,6 +128,10 @@ void FaultBank::Update(const ObserverBank& bank) {
   const double least =
       BestEvidence() - std::max(kMemoryOfContradiction * support,
                                 allowance_ + kBeyondAllowance * support);
+  RaiseTo(least);
+}
+
+void FaultBank::RaiseTo(double least) {
   trained_.RaiseTo(least);
   for (StrengthTracker& tracker : trackers_) {
     tracker.RaiseEvidence(least);
@@ -149,8 +165,8 @@ void FaultBank::PushInputs(const Sample& sample) {
 // acts on it, and a fault that always moved one has moved it.
 bool FaultBank::SuitsInputs(const StrengthTracker& tracker) const {
   const StrengthPath& path = tracker.path();
-  return !plan_->judges_fit() ||
-         ((odd_ & ~path.inputs) == 0 && (usual_ & path.moved) == 0);
+  return !plan_->judges_fit() || ((odd_ & ~(path.inputs | excused_)) == 0 &&
+                                  (usual_ & path.moved) == 0);
 }
 
 bool FaultBank::Fits(const StrengthTracker& tracker) const {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <limits>
 #include <memory>
 #include <vector>
 
@@ -68,6 +69,21 @@ class FaultBank {
   FaultSet misfits() const { return misfits_; }
   bool judges_fit() const { return plan_->judges_fit(); }
 
+  /// The explanation of `faults` with the most evidence, tracked or trained.
+  struct Leader {
+    const StrengthPath* path{nullptr};  ///< Null: there is none.
+    double strength{0.0};               ///< |s|
+    double evidence{-std::numeric_limits<double>::infinity()};
+  };
+  Leader LeaderOf(FaultSet faults) const;
+  double normal_evidence() const { return trained_.total(0); }
+
+  /// Raises the evidence of every explanation to at least `least`.
+  void RaiseTo(double least);
+
+  /// P1, P2 and T1 may be unusual by what stands beside the faults.
+  void Excuse(SignalMask inputs) { excused_ = inputs; }
+
  private:
   double BestEvidence() const;
   void UpdateEffect(const ObserverBank& bank);
@@ -84,6 +100,7 @@ class FaultBank {
   FitWindow inputs_;                            // 0 as usual, 5 elsewhere
   SignalMask odd_{0};  // not as usual in most of the last t_k samples
   SignalMask usual_{0};
+  SignalMask excused_{0};
   FaultSet misfits_{0};
 };
 

@@ -215,6 +215,9 @@ struct ModelSet {
   /// What its models read as CV is the position X, and they have no X: see
   /// PositionAsCommand().
   bool position_as_command{false};
+  /// A command beyond `validity` for moments leaves the valve armed: see
+  /// Coverage. False in sets whose region ends at the extremes.
+  bool command_may_pass{false};
 };
 
 /// A set of faults as bits: bit i stands for ModelSet::faults[i].

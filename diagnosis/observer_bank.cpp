@@ -88,6 +88,31 @@ void ObserverBank::Step(const Sample& sample) {
   kernels_->predict(*plan_, state_);
 }
 
+void ObserverBank::TakeReadings(const ObserverBank& bank) {
+  state_.active = bank.state_.active;
+  state_.outputs->readings = bank.state_.outputs->readings;
+  state_.outputs->saturated = bank.state_.outputs->saturated;
+  active_count_ = bank.active_count_;
+  measured_count_ = bank.measured_count_;
+}
+
+void ObserverBank::SetPrediction(int observer, int channel, double prediction,
+                                 double extrapolation) {
+  const auto c = static_cast<std::size_t>(channel);
+  const std::size_t slot = plan_->slot(static_cast<std::size_t>(observer), c);
+  const auto set = [slot](std::vector<Quad>& quads, double value) {
+    quads[slot / kLanes].lane[slot % kLanes] = value;
+  };
+  set(state_.outputs->predictions, prediction);
+  set(state_.outputs->extrapolations, extrapolation);
+  set(state_.outputs->residuals,
+      Residual(plan_->models()
+                   .observers[static_cast<std::size_t>(observer)]
+                   .channels[c]
+                   .model,
+               reading(channel), prediction));
+}
+
 void ObserverBank::Score(std::span<double> factors) const {
   std::array<double, kMaxObservers * kLanes> memberships;  // of one channel
   std::fill(factors.begin(), factors.end(), kAbstains);

@@ -42,6 +42,12 @@ class ObserverBank {
   /// Initialise(); the signals of active channels must be present.
   void Step(const Sample& sample);
 
+  /// Takes over what `bank`, of the same plan, has read of the last sample, and
+  /// which channels are active. SetPrediction() then says what is predicted.
+  void TakeReadings(const ObserverBank& bank);
+  void SetPrediction(int observer, int channel, double prediction,
+                     double extrapolation);
+
   /// The smallest membership of each observer's residuals over the voting
   /// channels, after subtracting possible extrapolation errors; 0 if none
   /// votes.

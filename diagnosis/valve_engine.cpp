@@ -14,6 +14,7 @@
 #include "diagnosis/model_set.h"
 #include "diagnosis/observer_bank.h"
 #include "diagnosis/sample.h"
+#include "diagnosis/second_fault.h"
 #include "diagnosis/snapshot.h"
 #include "diagnosis/trained_signals.h"
 #include "diagnosis/verdict.h"
@@ -112,6 +113,7 @@ struct Diagnosis {
         stuck(plan->models()),
         floor(plan->models()),
         episode(plan->faults()),
+        second(plan, parts.instructions),
         sees_no_fault(SeesNoFault(plan->models())) {}
 
   std::shared_ptr<const EnginePlan> plan;
@@ -122,6 +124,7 @@ struct Diagnosis {
   StuckReadings stuck;
   Floor floor;
   Episode episode;
+  SecondFaultWatch second;
   bool sees_no_fault;
 };
 
@@ -138,6 +141,7 @@ class ValveEngine::Impl {
   std::optional<Transition> Adopt(EngineParts parts);
   void HoldIsolation(bool hold);
   void Suspect(bool suspected) { suspected_ = suspected; }
+  void TakeName(const NameBeside& name) { beside_ = name; }
   std::vector<std::byte> Save() const;
   bool Restore(std::span<const std::byte> bytes);
 
@@ -153,12 +157,14 @@ class ValveEngine::Impl {
   void ReadResiduals();
   Quality Judge(const Sample& sample);
   void Decide(const Sample& sample);
+  void StepEpisode(const Sample& sample, const Findings& findings);
 
   std::unique_ptr<Diagnosis> diagnosis_;
   SourceOrder order_;
   Verdict verdict_;
   bool isolation_held_{false};
   bool suspected_{false};
+  NameBeside beside_;
   bool has_source_{false};
   bool needs_initialisation_{true};
   std::int64_t stamp_ns_{0};  // of the last sample in order
@@ -263,8 +269,10 @@ void ValveEngine::Impl::Initialise(const Sample& sample) {
   // Windows outlast a short interruption; runs of consecutive samples do not.
   if (diagnosis_->coverage.StartSettling(sample.stamp_ns)) {
     diagnosis_->detection.Interrupt();
+    diagnosis_->second.Interrupt();
   } else {
     diagnosis_->detection.Restart();
+    diagnosis_->second.Restart();
   }
   diagnosis_->floor.Restart();
   verdict_.initialised = true;
@@ -332,7 +340,8 @@ void ValveEngine::Impl::Decide(const Sample& sample) {
     }
   }
   const bool was_open = episode_open();
-  diagnosis_->episode.Step(sample, diagnosis_->bank, findings, verdict_);
+  beside_ = was_open ? beside_ : NameBeside{};
+  StepEpisode(sample, findings);
   // After an episode the windows still contain its fault, which would open the
   // next one at once.
   if (was_open && !episode_open()) {
@@ -340,9 +349,37 @@ void ValveEngine::Impl::Decide(const Sample& sample) {
   }
 }
 
+// What comes on top of a fault is told apart before the episode takes the
+// sample, because its name then stays.
+void ValveEngine::Impl::StepEpisode(const Sample& sample,
+                                    const Findings& findings) {
+  Episode& episode = diagnosis_->episode;
+  SecondFaultWatch& second = diagnosis_->second;
+  const bool watched =
+      episode_open() && findings.settled && findings.stuck == 0;
+  if (watched) {
+    second.Judge(sample, diagnosis_->bank);
+  } else {
+    second.Restart();
+  }
+  episode.HoldName(second.hold());
+  episode.Step(sample, diagnosis_->bank, findings, verdict_);
+  if (episode_open() && second.outlived()) {
+    // What is left opens an episode of its own.
+    episode.End(verdict_);
+  }
+  if (watched && episode_open()) {
+    second.Follow(episode, beside_, verdict_);
+  } else {
+    second.Restart();
+    verdict_.second = {};
+  }
+}
+
 std::optional<Transition> ValveEngine::Impl::EndEpisode(EndReason reason) {
   needs_initialisation_ = true;
   suspected_ = false;
+  beside_ = {};
   if (!episode_open()) {
     return std::nullopt;
   }
@@ -421,6 +458,10 @@ std::optional<Transition> ValveEngine::Adopt(EngineParts parts) {
 
 void ValveEngine::HoldIsolation(bool hold) {
   impl_->HoldIsolation(hold);
+}
+
+void ValveEngine::TakeName(const NameBeside& name) {
+  impl_->TakeName(name);
 }
 
 void ValveEngine::Suspect(bool suspected) {

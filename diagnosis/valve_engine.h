@@ -9,13 +9,15 @@
 #include "diagnosis/engine_plan.h"
 #include "diagnosis/model_set.h"
 #include "diagnosis/sample.h"
+#include "diagnosis/second_fault.h"
 #include "diagnosis/verdict.h"
 
 namespace fdi {
 
 /// Diagnoses one valve. Pure: what Step() returns depends on the samples given
-/// so far alone; no clock, no I/O, no allocation after construction. The
-/// monitor and `fdi-trainer evaluate` run this very class.
+/// so far alone; no clock, no I/O, and no allocation after construction but
+/// for what a settled fault needs (SecondFaultWatch). The monitor and
+/// `fdi-trainer evaluate` run this very class.
 ///
 /// Not thread safe: one thread at a time per engine, and for all engines that
 /// share EngineParts. Model sets are shared.
@@ -54,6 +56,10 @@ class ValveEngine {
   /// any more: while it is, a valve that is judged has an episode, which does
   /// not clear. Ends with EndEpisode() and Adopt().
   void Suspect(bool suspected);
+
+  /// What the open episode is called where that is not the engine's name: a
+  /// second fault is on top of it (SecondFaultWatch).
+  void TakeName(const NameBeside& name);
 
   /// The slow accumulators, for Restore() after a restart of the program:
   /// windows of detection and whether the valve is armed (Coverage), with the

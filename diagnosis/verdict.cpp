@@ -64,9 +64,9 @@ std::string CoverageReasonsName(CoverageReasons reasons) {
 }
 
 std::string_view TransitionName(TransitionKind kind) {
-  return NameOf(kind, std::array<std::string_view, 6>{"DETECTED", "ISOLATED",
-                                                      "REISOLATED", "CLEARED",
-                                                      "CLOSED", "CHANGED"});
+  return NameOf(kind, std::array<std::string_view, 7>{
+                          "DETECTED", "ISOLATED", "REISOLATED", "CLEARED",
+                          "CLOSED", "CHANGED", "SECOND"});
 }
 
 std::string_view EndReasonName(EndReason reason) {

@@ -83,6 +83,7 @@ enum class TransitionKind : std::uint8_t {
   kCleared,
   kClosed,
   kChanged,  ///< The priority rose. On the bus: kReisolated, the same faults.
+  kSecond,   ///< What is on top of the name has changed. On the bus likewise.
 };
 
 /// Gives an episode a name.
@@ -108,6 +109,18 @@ enum class Layer : std::uint8_t {
   kAudit,      ///< The audit of the loop, without a model.
 };
 
+/// What comes on top of the fault that an episode is named after
+/// (SecondFaultWatch).
+struct SecondFault {
+  bool open{false};      ///< There is something.
+  bool doubt{false};     ///< There may be: the name is to stay meanwhile.
+  FaultSet standing{0};  ///< What it is on top of.
+  std::int64_t detection_stamp_ns{0};
+  FaultSet faults{0};    ///< Its name; empty: what it is cannot be told.
+  double strength{0.0};  ///< Of the likeliest of them.
+  double factor{0.0};    ///< The largest of theirs.
+};
+
 /// A transition of an episode.
 struct Transition {
   TransitionKind kind{TransitionKind::kDetected};
@@ -124,6 +137,7 @@ struct Transition {
   EndReason reason{EndReason::kNone};  ///< Of kClosed.
   Unknown unknown{Unknown::kNone};     ///< As in the verdict at that time.
   Layer layer{Layer::kObservers};      ///< What named `faults`.
+  SecondFault second{};                ///< What came on top of them.
 };
 
 /// The engine's result for one sample.
@@ -146,6 +160,7 @@ struct Verdict {
   std::array<double, kMaxFaults> strengths{};            ///< By fault index.
   std::array<double, kMaxObservers> observer_factors{};  ///< By observer.
   FaultSet isolated{0};
+  SecondFault second{};  ///< Beside `isolated`.
   std::array<Transition, 4> transitions{};
   int transition_count{0};
 

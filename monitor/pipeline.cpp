@@ -533,6 +533,8 @@ void Pipeline::Poll(TimePoint now) {
 }
 
 void Pipeline::CheckSilentValves(TimePoint now) {
+  const std::chrono::milliseconds stale_timeout(
+      static_cast<std::int64_t>(options_.stale_timeout_s * 1e3));
   idle_.clear();
   for (const std::unique_ptr<Valve>& valve : valves_) {
     ValveMonitor& monitor = valve->monitor;
@@ -550,7 +552,7 @@ void Pipeline::CheckSilentValves(TimePoint now) {
       });
     }
     counters_.Add(Quality::kStale, monitor.CountStale(now));
-    monitor.CheckTimeout(now, options_.stale_timeout, journal_);
+    monitor.CheckTimeout(now, stale_timeout, journal_);
   }
   if (recovery_deadline_ && now >= *recovery_deadline_) {
     recovery_deadline_.reset();

@@ -33,7 +33,7 @@ struct PipelineOptions {
   std::chrono::milliseconds place_timeout{60'000};
   std::string valve_glob{"*"};
   TraceOptions trace;
-  std::chrono::milliseconds stale_timeout{3'600'000};  ///< Ends an episode.
+  double stale_timeout_s{3600.0};  ///< Ends an episode.
   /// An episode left open by the last session is closed if its valve stays
   /// silent for this long after the start.
   std::chrono::milliseconds recovery_window{60'000};

@@ -137,6 +137,7 @@ ValveOutcome ValveMonitor::Step(const Sample& sample, std::uint64_t writer,
   const Verdict& verdict = names_->Step(sample, engine, isolation_held_);
   // From the next sample on; the verdict on this one stands.
   engine_->Suspect(names_->suspects());
+  engine_->TakeName(names_->beside());
   answer_ = &verdict;
   if (CountsAsTime(verdict)) {
     RecordPosition(sample);

@@ -5,36 +5,17 @@
 #include <limits>
 #include <vector>
 
+#include "base/median.h"
 #include "diagnosis/student.h"
 
 namespace fdi::planner {
 namespace {
 
 constexpr double kHuber = 1.345;
-constexpr double kNormalMad = 0.674489750196082;  // MAD of a unit normal
 constexpr double kMaxCorrelation = 0.9;
 constexpr int kIterations = 50;
 constexpr double kNinety = 0.95;        // quantile of a 90 % interval
 constexpr double kFivePercent = 0.975;  // quantile of a two-sided 5 % test
-
-double Median(std::vector<double> values) {
-  const auto middle =
-      values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  if (values.size() % 2 != 0) {
-    return *middle;
-  }
-  return 0.5 * (*middle + *std::max_element(values.begin(), middle));
-}
-
-// Robust scale of residuals about 0.
-double Scale(const std::vector<double>& residuals) {
-  std::vector<double> sizes;
-  for (const double r : residuals) {
-    sizes.push_back(std::abs(r));
-  }
-  return Median(std::move(sizes)) / kNormalMad;
-}
 
 // Weighted least squares for a line, or for a level if not `with_slope`.
 void Solve(std::span<const DailyValue> values,
@@ -130,7 +111,7 @@ std::optional<TrendLine> Fit(std::span<const DailyValue> values,
     const TrendLine before = line;
     Solve(values, weights, with_slope, line);
     const std::vector<double> residuals = Residuals(values, line);
-    scale = Scale(residuals);
+    scale = RobustSd(residuals);
     for (std::size_t k = 0; k < weights.size(); ++k) {
       const double size = std::abs(residuals[k]);
       weights[k] = size > kHuber * scale ? kHuber * scale / size : 1.0;

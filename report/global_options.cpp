@@ -1,7 +1,6 @@
 #include "report/global_options.h"
 
 #include <algorithm>
-#include <charconv>
 #include <map>
 #include <memory>
 #include <sstream>
@@ -10,6 +9,7 @@
 #include <CLI/CLI.hpp>
 #include <toml++/toml.h>
 
+#include "base/csv_cells.h"
 #include "base/error.h"
 #include "base/suggestion.h"
 #include "base/toml_limits.h"
@@ -36,9 +36,7 @@ std::string TextOf(const toml::node& node, const std::string& key) {
     return std::to_string(*integer);
   }
   if (const auto number = node.value_exact<double>()) {
-    char text[64];
-    const auto end = std::to_chars(text, text + sizeof text, *number);
-    return {text, end.ptr};
+    return NumberText(*number);
   }
   Refuse(node, key + ": expected text, a number, true or false");
 }

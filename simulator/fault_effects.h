@@ -1,11 +1,17 @@
 #pragma once
 
+#include <cmath>
+#include <cstdint>
+#include <iterator>
+
+#include "diagnosis/fault_catalogue.h"
 #include "simulator/valve_parameters.h"
 
 namespace fdi::simulator {
 
 /// Everything that a fault can change in the valve: the interface between fault
-/// numbers and physics. The defaults are the healthy valve.
+/// numbers and physics. The defaults are the healthy valve. Each field has a
+/// line in kEffectFields.
 struct FaultEffects {
   double upper_stop_factor{1.0};   ///< Upper travel stop / stroke.
   double plug_offset{0.0};         ///< Plug relative to rod, share of stroke.
@@ -35,17 +41,130 @@ struct FaultEffects {
   friend bool operator==(const FaultEffects&, const FaultEffects&) = default;
 };
 
+/// Where a change of a field is seen in a record.
+enum class SeenIn : std::uint8_t {
+  kRod,     ///< In how X answers CV; the flow at that X is as usual.
+  kBehind,  ///< In the flow at the same X, or in other readings.
+  kBoth,
+  kNone,
+};
+
+struct EffectField {
+  double FaultEffects::*field;
+  SeenIn seen_in;
+  const char* text;  ///< For the list of faults; the value follows.
+};
+
+inline constexpr EffectField kEffectFields[] = {
+    {&FaultEffects::upper_stop_factor, SeenIn::kRod, "upper travel stop x"},
+    {&FaultEffects::plug_offset, SeenIn::kBoth, "plug against rod +"},
+    {&FaultEffects::kv_factor, SeenIn::kBehind, "Kv x"},
+    {&FaultEffects::opening_offset, SeenIn::kBehind, "opening +"},
+    {&FaultEffects::play_offset, SeenIn::kRod, "play +"},
+    {&FaultEffects::play_slope, SeenIn::kRod, "play growing with opening +"},
+    {&FaultEffects::external_loss, SeenIn::kBehind,
+     "share of flow lost outside +"},
+    {&FaultEffects::temperature_rise_c, SeenIn::kBoth, "temperature [degC] +"},
+    {&FaultEffects::air_leak, SeenIn::kRod, "air leak [kg/(s sqrt(Pa))] +"},
+    {&FaultEffects::area_factor, SeenIn::kRod, "diaphragm area x"},
+    {&FaultEffects::spring_factor, SeenIn::kRod, "spring force x"},
+    {&FaultEffects::transducer_factor, SeenIn::kRod, "transducer output x"},
+    {&FaultEffects::position_reading_factor, SeenIn::kBoth,
+     "position reading x"},
+    {&FaultEffects::chamber_reading_factor, SeenIn::kNone,
+     "chamber pressure reading x"},
+    {&FaultEffects::feedback_play, SeenIn::kRod, "play in the feedback +"},
+    {&FaultEffects::supply_factor, SeenIn::kRod, "supply pressure x"},
+    {&FaultEffects::inlet_factor, SeenIn::kBoth, "P1 x"},
+    {&FaultEffects::outlet_factor, SeenIn::kBoth, "P2 x"},
+    {&FaultEffects::bypass_opening, SeenIn::kBehind, "bypass opening +"},
+    {&FaultEffects::flow_reading_factor, SeenIn::kBehind, "flow reading x"},
+    {&FaultEffects::temperature_reading_step, SeenIn::kBehind,
+     "T1 reading, share of span, +"},
+    {&FaultEffects::inlet_reading_step, SeenIn::kBehind,
+     "P1 reading, share of span, +"},
+    {&FaultEffects::outlet_reading_step, SeenIn::kBehind,
+     "P2 reading, share of span, +"},
+};
+static_assert(sizeof(FaultEffects) == std::size(kEffectFields) * sizeof(double),
+              "a field of FaultEffects has no line in kEffectFields");
+
+/// Adds what a fault of strength `s` does to `e`.
+using Effect = void (*)(double s, FaultEffects& e);
+
+inline constexpr Effect kLeakOfAir = [](double s, FaultEffects& e) {
+  e.air_leak += 0.1 * s * 2e-6;
+};
+
+/// At the position of the fault in kFaultCatalogue. Sizes follow the DAMADICS
+/// benchmark's definition of its faults; a transmitter fault shifts the reading
+/// by strength x span.
+inline constexpr Effect kEffects[] = {
+    /* f1 */ [](double s, FaultEffects& e) { e.upper_stop_factor *= 1.0 - s; },
+    /* f2 */
+    [](double s, FaultEffects& e) {
+      e.upper_stop_factor *= 1.0 - 0.2 * s;
+      e.plug_offset += 0.2 * s;
+      e.kv_factor *= 1.0 - 0.2 * s;
+    },
+    /* f3 */
+    [](double s, FaultEffects& e) {
+      e.upper_stop_factor *= 1.0 + 0.1 * s;
+      e.plug_offset -= 0.1 * s;
+      e.kv_factor *= 1.0 + 0.1 * s;
+    },
+    /* f4 */ [](double s, FaultEffects& e) { e.play_offset += s; },
+    /* f5 */ [](double s, FaultEffects& e) { e.external_loss += 0.05 * s; },
+    /* f6 */ [](double s, FaultEffects& e) { e.opening_offset += 0.10 * s; },
+    /* f7 */
+    [](double s, FaultEffects& e) {
+      e.temperature_rise_c += 200.0 + 100.0 * s;
+    },
+    /* f8 */ [](double s, FaultEffects& e) { e.play_slope += 0.5 * s; },
+    /* f9 */ kLeakOfAir,
+    /* f10 */
+    [](double s, FaultEffects& e) {
+      kLeakOfAir(s, e);
+      e.area_factor *= 1.0 - s;
+    },
+    /* f11 */ [](double s, FaultEffects& e) { e.spring_factor *= 1.0 - s; },
+    /* f12 */ [](double s, FaultEffects& e) { e.transducer_factor *= 1.0 - s; },
+    /* f13 */
+    [](double s, FaultEffects& e) {
+      e.position_reading_factor *= 1.0 + 1.25 * s;
+    },
+    /* f14 */
+    [](double s, FaultEffects& e) { e.chamber_reading_factor *= 1.0 - s; },
+    /* f15 */ [](double s, FaultEffects& e) { e.feedback_play += s; },
+    /* f16 */ [](double s, FaultEffects& e) { e.supply_factor *= 1.0 - s; },
+    /* f17 */
+    [](double s, FaultEffects& e) {
+      (s > 0.0 ? e.outlet_factor : e.inlet_factor) *= 1.0 - std::abs(s);
+    },
+    /* f18 */ [](double s, FaultEffects& e) { e.bypass_opening += s; },
+    /* f19 */
+    [](double s, FaultEffects& e) { e.flow_reading_factor *= 1.0 - s; },
+    /* t1 */
+    [](double s, FaultEffects& e) { e.temperature_reading_step += s; },
+    /* p1 */ [](double s, FaultEffects& e) { e.inlet_reading_step += s; },
+    /* p2 */ [](double s, FaultEffects& e) { e.outlet_reading_step += s; },
+};
+static_assert(std::size(kEffects) == kLastFault,
+              "each fault of the catalogue has one effect");
+
 /// Upper limit of the water temperature [degC].
 inline constexpr double kMaxTemperatureC = 300.0;
 
 /// Applies `fault` of the catalogue at `strength` to `effects`. Several faults
 /// may be combined; strength 0 has no effect.
-///
-/// Sizes follow the DAMADICS benchmark's definition of its faults; a
-/// transmitter fault shifts the reading by strength x span.
 /// @throws std::invalid_argument if `fault` is not in the catalogue or
 ///   `strength` is outside [0, 1] ([-1, 1] for signed faults).
 void ApplyFault(int fault, double strength, FaultEffects& effects);
+
+/// What the transmitter of F shows at `flow`, before noise and range.
+constexpr double FlowReadingWith(const FaultEffects& effects, double flow) {
+  return flow * effects.flow_reading_factor;
+}
 
 /// What the medium has where `temperature_c` flows in without the fault.
 double TemperatureWith(const FaultEffects& effects, double temperature_c);

@@ -68,8 +68,7 @@ double FlowReading(const ValveParameters& parameters,
               1e3 * input.p2_kpa * effects.outlet_factor,
               TemperatureWith(effects, input.t1_degc)},
              rod, 0.0);
-  return std::clamp(flow * effects.flow_reading_factor, i.flow.low,
-                    i.flow.high);
+  return std::clamp(FlowReadingWith(effects, flow), i.flow.low, i.flow.high);
 }
 
 RecordFit FitToRecord(const ValveParameters& parameters,

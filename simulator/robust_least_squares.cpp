@@ -16,17 +16,15 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-// Standard deviation of a normal distribution with the same median absolute
-// deviation, which is 1 / 1.4826 of it. Residuals of 0 are skipped: they mark
-// rows that do not count.
+// Residuals of 0 are skipped: they mark rows that do not count.
 double RobustScale(const VectorXd& residuals) {
-  std::vector<double> sizes;
+  std::vector<double> counted;
   for (const double r : residuals) {
     if (r != 0.0) {
-      sizes.push_back(std::abs(r));
+      counted.push_back(r);
     }
   }
-  return sizes.empty() ? 0.0 : 1.4826 * Median(std::move(sizes));
+  return counted.empty() ? 0.0 : RobustSd(std::move(counted));
 }
 
 // Share of independent rows in a series whose correlation at lag k is q^k:

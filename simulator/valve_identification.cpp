@@ -551,6 +551,8 @@ class Identification {
  private:
   std::vector<ValveUnknown> Unknowns(const ValveParameters& base,
                                      bool stated) const;
+  Trim StartTrim(const ValveParameters& variant,
+                 const RecordDrive& drive) const;
   Hypothesis Start(const ValveParameters& variant, const RecordDrive& drive,
                    bool friction) const;
   Hypothesis BestStart() const;
@@ -587,18 +589,26 @@ std::vector<ValveUnknown> Identification::Unknowns(const ValveParameters& base,
   return unknowns;
 }
 
+// Without a position, over where the rod would be. In rows in which it comes to
+// rest, that is where the command is, and all of the record tells.
+Trim Identification::StartTrim(const ValveParameters& variant,
+                               const RecordDrive& drive) const {
+  const bool rests = SimulatedPeriod(options_.period_s) < options_.period_s;
+  if (HasPosition(records_) || rests) {
+    return RegressTrim(records_, nominal_);
+  }
+  const RecordSegment& liveliest = segments_.front();
+  return RegressTrim({WithSimulatedRod(*liveliest.rows, liveliest.first,
+                                       liveliest.last, variant, drive)},
+                     nominal_);
+}
+
 Hypothesis Identification::Start(const ValveParameters& variant,
                                  const RecordDrive& drive,
                                  bool friction) const {
   ValveParameters start = variant;
   if (options_.has_flow) {
-    const RecordSegment& liveliest = segments_.front();
-    start.trim =
-        HasPosition(records_)
-            ? RegressTrim(records_, nominal_)
-            : RegressTrim({WithSimulatedRod(*liveliest.rows, liveliest.first,
-                                            liveliest.last, variant, drive)},
-                          nominal_);
+    start.trim = StartTrim(variant, drive);
   }
   Hypothesis h{
       {variant, drive}, Unknowns(variant, /*stated=*/false), {}, {}, {}};

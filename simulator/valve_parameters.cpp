@@ -7,7 +7,6 @@
 #include "base/csv_cells.h"
 #include "base/error.h"
 #include "base/text.h"
-#include "simulator/parameter_fields.h"
 #include "simulator/require_range.h"
 
 namespace fdi::simulator {

@@ -445,7 +445,7 @@ Sample ValveSimulation::Impl::ReadAll(std::uint64_t k) {
                                effects.temperature_reading_step));
   sample.Set(Signal::kX, Read(i.position, 100.0 * valve_.state().rod *
                                               effects.position_reading_factor));
-  sample.Set(Signal::kF, Read(i.flow, flow * effects.flow_reading_factor));
+  sample.Set(Signal::kF, Read(i.flow, FlowReadingWith(effects, flow)));
   HoldFlatlines(TimeOf(k), sample);
   return sample;
 }

@@ -336,19 +336,18 @@ constexpr double kMaxSlowShare = 0.05;
 constexpr double kCoreQuantile = 0.05;
 constexpr double kSupportMargin = 1.0;  // standard deviations
 
-// min of n_d consecutive values: what a detection needs to be beyond.
-std::vector<double> Sustained(const std::vector<double>& series, double sign,
-                              int samples) {
-  std::vector<double> sustained;
-  const auto n = static_cast<std::size_t>(samples);
-  for (std::size_t k = n - 1; k < series.size(); ++k) {
-    double lowest = sign * series[k];
-    for (std::size_t j = 1; j < n; ++j) {
-      lowest = std::min(lowest, sign * series[k - j]);
+// What a detection needs to be beyond: the least of n_d values in a row.
+std::vector<double> SustainedOf(const std::vector<double>& series, double sign,
+                                int samples) {
+  Sustained last(samples);
+  std::vector<double> least;
+  for (std::size_t k = 0; k < series.size(); ++k) {
+    const double value = last.Push(sign * series[k]);
+    if (k + 1 >= static_cast<std::size_t>(samples)) {
+      least.push_back(value);
     }
-    sustained.push_back(lowest);
   }
-  return sustained;
+  return least;
 }
 
 bool IsInput(Signal signal) {
@@ -473,7 +472,7 @@ void FitThresholds(const std::vector<ResidualSeries>& residuals,
     const int separation = static_cast<int>(std::ceil(CorrelationTime(joined)));
     const auto level = [&](double sign) {
       const std::vector<double> series =
-          Sustained(joined, sign, models.decision.detection_samples);
+          SustainedOf(joined, sign, models.decision.detection_samples);
       if (series.size() < kMinValues) {
         throw DataError(
             "channel " + channel.name + ": normal operation has " +

@@ -166,6 +166,8 @@ Indication IndicationOf(const ModelSet& models, const Verdict& verdict,
   now.detected = verdict.detected;
   now.isolated = FaultsIn(models, verdict.isolated);
   now.withdrawn = IsWithdrawn(models, verdict);
+  now.second = verdict.second.open;
+  now.second_set = FaultsIn(models, verdict.second.faults);
   const bool stays = before != nullptr && !now.isolated.empty() &&
                      now.isolated == before->isolated;
   now.wording =

@@ -22,11 +22,13 @@ struct Wording {
 struct Indication {
   double time_s{0.0};  ///< From the start of the run.
   FaultTruth truth;
-  bool settled{false};        ///< Diagnosis was LIVE at or before it.
-  bool detected{false};       ///< DD: an episode is open.
-  std::vector<int> isolated;  ///< Faults indicated.
-  bool withdrawn{false};      ///< An earlier name was taken back: unknown.
-  Wording wording;            ///< Of `isolated`.
+  bool settled{false};            ///< Diagnosis was LIVE at or before it.
+  bool detected{false};           ///< DD: an episode is open.
+  std::vector<int> isolated;      ///< Faults indicated.
+  bool withdrawn{false};          ///< An earlier name was taken back: unknown.
+  Wording wording;                ///< Of `isolated`.
+  bool second{false};             ///< Something came on top of `isolated`.
+  std::vector<int> second_set{};  ///< Its faults; empty: it has no name.
 };
 
 /// The indices of the DAMADICS benchmark for one run, times in s from the start

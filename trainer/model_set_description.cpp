@@ -26,6 +26,11 @@ constexpr double kMinTemperature = 10.0;
 constexpr int kStuckFactor = 10;
 constexpr int kStuckMargin = 60;  // samples
 constexpr double kNoFlow = 0.02;  // of the largest flow
+// As many as the observers take to settle, and as the shortest window has: of a
+// command that was seen less often no mean of residuals was, and a model has
+// it from the side. Of short data no more than what counts as rare elsewhere.
+constexpr std::size_t kFewSamples = 30;
+constexpr double kFewShare = 0.02;
 
 SignalRange Joined(SignalRange a, SignalRange b) {
   return {std::min(a.minimum, b.minimum), std::max(a.maximum, b.maximum)};
@@ -34,23 +39,44 @@ SignalRange Joined(SignalRange a, SignalRange b) {
 constexpr SignalRange kEmpty{std::numeric_limits<double>::infinity(),
                              -std::numeric_limits<double>::infinity()};
 
-// Of `value(sample)` over all stretches; empty without samples.
-template <typename Value>
-SignalRange RangeOf(const std::vector<Stretch>& stretches, Value value) {
-  SignalRange range = kEmpty;
+template <typename Visit>
+void ForEach(const std::vector<Stretch>& stretches, Visit visit) {
   for (const Stretch& stretch : stretches) {
-    for (const Sample& sample : stretch.samples) {
+    std::ranges::for_each(stretch.samples, visit);
+  }
+}
+
+// Of `value(sample)` over all samples; empty without any.
+template <typename Value>
+SignalRange RangeOf(const Condition& condition, Value value) {
+  SignalRange range = kEmpty;
+  for (const auto* stretches : {&condition.training, &condition.validation}) {
+    ForEach(*stretches, [&](const Sample& sample) {
       const double v = value(sample);
       range = Joined(range, {v, v});
-    }
+    });
   }
   return range;
 }
 
-template <typename Value>
-SignalRange RangeOf(const Condition& condition, Value value) {
-  return Joined(RangeOf(condition.training, value),
-                RangeOf(condition.validation, value));
+// Where the values are, but for the outermost at each end.
+SignalRange Inhabited(std::vector<double> values) {
+  if (values.empty()) {
+    return kEmpty;
+  }
+  const auto few = std::min(
+      kFewSamples,
+      static_cast<std::size_t>(kFewShare * static_cast<double>(values.size())));
+  std::ranges::sort(values);
+  return {values[few], values[values.size() - 1 - few]};
+}
+
+SignalRange Commands(const Condition& condition) {
+  std::vector<double> commands;
+  ForEach(condition.training, [&](const Sample& sample) {
+    commands.push_back(sample[Signal::kCv]);
+  });
+  return Inhabited(std::move(commands));
 }
 
 double LargestStep(const std::vector<Stretch>& stretches) {
@@ -65,20 +91,22 @@ double LargestStep(const std::vector<Stretch>& stretches) {
   return largest;
 }
 
-// Of the running mean of CV, once it has settled.
-SignalRange MeanCommands(const std::vector<Stretch>& stretches) {
-  SignalRange range = kEmpty;
-  for (const Stretch& stretch : stretches) {
-    double mean =
-        stretch.samples.empty() ? 0.0 : stretch.samples[0][Signal::kCv];
-    for (std::size_t k = 1; k < stretch.samples.size(); ++k) {
-      mean += kCvMeanGain * (stretch.samples[k][Signal::kCv] - mean);
-      if (k >= static_cast<std::size_t>(kCvMeanSettling)) {
-        range = Joined(range, {mean, mean});
+// The running mean of CV, once it has settled.
+SignalRange MeanCommands(const Condition& condition) {
+  std::vector<double> means;
+  for (const auto* stretches : {&condition.training, &condition.validation}) {
+    for (const Stretch& stretch : *stretches) {
+      double mean =
+          stretch.samples.empty() ? 0.0 : stretch.samples[0][Signal::kCv];
+      for (std::size_t k = 1; k < stretch.samples.size(); ++k) {
+        mean += kCvMeanGain * (stretch.samples[k][Signal::kCv] - mean);
+        if (k >= static_cast<std::size_t>(kCvMeanSettling)) {
+          means.push_back(mean);
+        }
       }
     }
   }
-  return range;
+  return Inhabited(std::move(means));
 }
 
 SignalRange Widened(SignalRange range, double least) {
@@ -132,9 +160,8 @@ ValidityRegion TrainedRegion(const std::vector<Condition>& conditions) {
     SignalRange mean = kEmpty;
     double step = 0.0;
     for (const Condition& condition : conditions) {
-      cv = Joined(cv, RangeOf(condition.training, of(Signal::kCv)));
-      mean = Joined(mean, MeanCommands(condition.training));
-      mean = Joined(mean, MeanCommands(condition.validation));
+      cv = Joined(cv, Commands(condition));
+      mean = Joined(mean, MeanCommands(condition));
       step = std::max(step, LargestStep(condition.training));
     }
     if (mean.minimum <= mean.maximum) {
@@ -193,6 +220,7 @@ ModelSet DescribeModelSet(const std::vector<TrainingRun>& runs,
   models.sample_period_s = runs.front().period_s;
   models.flow_unit = runs.front().flow_unit;
   models.validity = TrainedRegion(conditions);
+  models.command_may_pass = true;
   models.stuck = FitStuckLimits(conditions.front());
   models.floor =
       FitFloor(conditions.front(), models.sample_period_s, options.flow_shape);

@@ -8,16 +8,18 @@
 
 namespace fdi::trainer {
 
-/// Where a model set of these conditions is at home. Commands from all of
-/// them, since the loop answers to a fault; dP, T1, P1 and P2 from normal
-/// operation, the first condition. Signals that the runs lack have no bounds.
+/// Where a model set of these conditions is at home: where samples are, that is
+/// but for the outermost 30 of a condition on each side, or 2 % if these are
+/// fewer. Commands from all of them, since the loop answers to a fault; dP, T1,
+/// P1 and P2 from normal operation, the first condition. Signals that the runs
+/// lack have no bounds.
 ///
 /// Margins: a command outside is a valve that is not judged, so a tenth of the
 /// range at least, a quarter of it for its running mean; twice the largest step
-/// of CV. dP, T1, P1 and P2 vary more
-/// from day to day than within the hours of a training: half the range on each
-/// side, at least 5 % of the largest pressure and 10 °C; still far from
-/// equal pressures and cold water. Less than 2 % of the largest flow is none.
+/// of CV. dP, T1, P1 and P2 vary more from day to day than within the hours of
+/// a training: half of their whole range on each side, at least 5 % of the
+/// largest pressure and 10 °C; still far from equal pressures and cold water.
+/// Less than 2 % of the largest flow is none.
 ValidityRegion TrainedRegion(const std::vector<Condition>& conditions);
 
 /// Ten times the longest run of one reading in normal operation, and a minute:

@@ -56,10 +56,12 @@ struct FaultEvent {
   FIELD(episode_id)                   \
   FIELD(model_set) FIELD(model_version) FIELD(model_hash) FIELD(persisted)
 
-/// The kind as it is on the bus, whose types cannot grow: a rise of priority is
-/// an isolation of the same faults.
+/// The kind as it is on the bus, whose types cannot grow: a rise of priority,
+/// or a second fault, is an isolation of the same faults.
 constexpr TransitionKind OnTheBus(TransitionKind kind) {
-  return kind == TransitionKind::kChanged ? TransitionKind::kReisolated : kind;
+  return kind == TransitionKind::kChanged || kind == TransitionKind::kSecond
+             ? TransitionKind::kReisolated
+             : kind;
 }
 
 /// How bad the episode is by `event`: as its transition says, or else as the

@@ -74,14 +74,42 @@ const Verdict& EpisodeName::Step(const Inputs& inputs) {
     const Choice choice = Choose(inputs);
     now_.unknown = choice.unknown;
     now_.source = choice.source;
+    FollowLook(inputs);
     if (choice.faults != now_.faults || choice.faults != told_) {
       Rename(choice, inputs);
     }
+    FollowSecond(inputs.engine);
   }
   if (open_) {
     WriteVerdict();
   }
   return verdict_;
+}
+
+// As the last look has it; while something may be on top, none speaks.
+void EpisodeName::FollowLook(const Inputs& inputs) {
+  const SecondFault& second = inputs.engine.second;
+  if (second.open || second.doubt) {
+    return;
+  }
+  if (now_.source != NameSource::kLook) {
+    beside_ = {};
+  } else if (inputs.look && !inputs.look->faults.empty()) {
+    const NamedFault& first = inputs.look->faults.front();
+    beside_ = {SetOf(inputs.look->faults), first.bit, first.estimate.strength};
+  }
+}
+
+// Of a name that is not the engine's, the engine knows nothing on top.
+void EpisodeName::FollowSecond(const Verdict& engine) {
+  if ((now_.faults & engine.second.standing) == 0) {
+    verdict_.second = {};
+  }
+  const SecondFault& second = verdict_.second;
+  if (second.open != second_.open || second.faults != second_.faults) {
+    Announce(TransitionKind::kSecond);
+  }
+  second_ = second;
 }
 
 void EpisodeName::Begin() {
@@ -92,7 +120,12 @@ void EpisodeName::Begin() {
   named_ = inherited_ && inherited_->isolated;
 }
 
+// What came on top is on top of the name, whatever a look at both of them says.
 EpisodeName::Choice EpisodeName::Choose(const Inputs& inputs) {
+  const SecondFault& second = inputs.engine.second;
+  if ((now_.faults & second.standing) != 0) {
+    return {now_.faults, Unknown::kNone, now_.source, now_.layer};
+  }
   if (inputs.look) {
     inherited_.reset();
     const FaultSet faults = SetOf(inputs.look->faults);
@@ -253,6 +286,7 @@ void EpisodeName::WriteName(Transition& transition) const {
   transition.unknown = now_.faults != 0 ? Unknown::kNone : transition.unknown;
   transition.layer = now_.layer;
   transition.severity = now_.severity;
+  transition.second = verdict_.second;
   transition.factor = 0.0;
   for (std::size_t i = 0; i < models_->faults.size(); ++i) {
     if (now_.faults == 0 || Has(now_.faults, i)) {
@@ -288,6 +322,8 @@ void EpisodeName::Reset() {
   open_ = false;
   named_ = false;
   told_ = 0;
+  second_ = {};
+  beside_ = {};
   now_ = {};
   now_.severity = announced_ = SeverityAt(BandsOf(0), 0.0);
 }

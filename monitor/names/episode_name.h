@@ -9,6 +9,7 @@
 
 #include "diagnosis/records/fault_event.h"
 #include "diagnosis/records/strength_point.h"
+#include "diagnosis/second_fault.h"
 #include "diagnosis/severity.h"
 #include "diagnosis/verdict.h"
 
@@ -104,6 +105,8 @@ class EpisodeName {
   /// As the last Step() returned it, with what Follow() has added.
   const Verdict& verdict() const { return *current_; }
   const EpisodeNow& now() const { return now_; }
+  /// The name for ValveEngine::TakeName(): by a look.
+  const NameBeside& beside() const { return beside_; }
 
  private:
   struct Choice {
@@ -117,6 +120,8 @@ class EpisodeName {
   Choice Choose(const Inputs& inputs);
   Choice OfObservers(const Inputs& inputs) const;
   bool InheritedStands(const Inputs& inputs) const;
+  void FollowLook(const Inputs& inputs);
+  void FollowSecond(const Verdict& engine);
   void Rename(const Choice& choice, const Inputs& inputs);
   void Estimates(const Inputs& inputs);
   const SeverityBands& BandsOf(int fault) const;
@@ -132,7 +137,9 @@ class EpisodeName {
   std::int64_t detection_ns_{0};
   bool open_{false};
   bool named_{false};  // The episode has had a name.
-  FaultSet told_{0};   // As it was announced last.
+  NameBeside beside_;
+  SecondFault second_;  // As it was announced last.
+  FaultSet told_{0};    // As it was announced last.
   Severity announced_{Severity::kMedium};
   EpisodeNow now_;
   Verdict verdict_;  // With the name.

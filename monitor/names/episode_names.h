@@ -54,6 +54,9 @@ class EpisodeNames {
   /// What the open episode is called as of the last Step().
   const EpisodeNow& now() const { return name_.now(); }
 
+  /// See EpisodeName::beside().
+  NameBeside beside() const { return name_.beside(); }
+
   /// Whether the engine should have an episode: ValveEngine::Suspect().
   bool suspects() const { return suspects_; }
 

@@ -140,7 +140,8 @@ bool HistoryStore::Record(const FaultEvent& event) {
     open_.erase(event.episode_id);
   } else if (stored) {
     std::vector<FaultEvent>& events = open_[event.episode_id];
-    if (kind != TransitionKind::kChanged && kind != TransitionKind::kCleared) {
+    if (kind != TransitionKind::kChanged && kind != TransitionKind::kSecond &&
+        kind != TransitionKind::kCleared) {
       events.clear();
     } else if (events.size() > 1) {
       events.pop_back();

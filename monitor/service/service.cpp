@@ -81,18 +81,6 @@ storage::DataDirectory Prepared(const std::filesystem::path& path,
   return data;
 }
 
-PipelineOptions PipelineOptionsOf(const ServiceOptions& options) {
-  PipelineOptions pipeline;
-  pipeline.max_valves = options.max_valves;
-  pipeline.valve_glob = options.valves;
-  pipeline.stale_timeout = Milliseconds(options.stale_timeout_s);
-  pipeline.trace.before_s = options.trace_before_s;
-  pipeline.second_look = options.second_look;
-  pipeline.loop_audit = options.loop_audit;
-  pipeline.audit_all_loops = options.audit_all_loops;
-  return pipeline;
-}
-
 std::vector<Heartbeat::Member> Members(const Pipeline& pipeline,
                                        const Recorder* recorder,
                                        const Pulse& service) {
@@ -159,10 +147,11 @@ Service::Service(const ServiceOptions& options, const report::Context& context)
                                       Milliseconds(options.on_event_timeout_s)),
                     EventHookOptions{.per_minute = options.on_event_per_minute},
                     context.log)),
-      participant_(DdsOptionsOf(context.options, options.max_valves),
+      participant_(DdsOptionsOf(context.options, options.pipeline.max_valves),
                    context.log, "fdi-monitor"),
       intake_participant_(
-          DdsOptionsOf(context.options, IntakeValves(options.max_valves)),
+          DdsOptionsOf(context.options,
+                       IntakeValves(options.pipeline.max_valves)),
           context.log, "fdi-monitor intake"),
       models_topic_(participant_),
       changes_(data_.models()),
@@ -197,7 +186,7 @@ Service::Service(const ServiceOptions& options, const report::Context& context)
                               : nullptr),
       shares_(participant_,
               {MonitorName(), options.pair ? options.pair->name : "",
-               options.valves, context.options.partition},
+               options.pipeline.valve_glob, context.options.partition},
               log_),
       shadow_(options.shadow ? std::make_unique<ShadowBank>(
                                    ShadowOptions{LoadCandidate(data_.models(),
@@ -214,7 +203,7 @@ Service::Service(const ServiceOptions& options, const report::Context& context)
                               pipeline_.ReportGap(std::move(gap));
                             })
                       : nullptr),
-      pipeline_(WithDelivery(PipelineOptionsOf(options)),
+      pipeline_(WithDelivery(options.pipeline),
                 {pair_ ? static_cast<DecisionSink&>(*pair_) : decisions_,
                  after_commit_, history_},
                 assignment_, {counters_, log_, NowNs}),
@@ -392,7 +381,7 @@ void Service::ExpectSeenValves() {
   }
   for (const Accumulator& valve : seen) {
     if (valve.stamp_ns >= newest_ns - kMonthNs &&
-        GlobMatches(options_.valves, valve.valve_id)) {
+        GlobMatches(options_.pipeline.valve_glob, valve.valve_id)) {
       console_->live().Expect(valve.valve_id, valve.stamp_ns);
     }
   }
@@ -404,7 +393,7 @@ void Service::ExpectAlarmedValves() {
   constexpr std::int64_t kAll = std::numeric_limits<std::int64_t>::max();
   for (const storage::Alarm& alarm : reader.AlarmList(NowNs(), kAll)) {
     const storage::Episode& episode = alarm.episode;
-    if (GlobMatches(options_.valves, episode.valve_id)) {
+    if (GlobMatches(options_.pipeline.valve_glob, episode.valve_id)) {
       console_->live().Expect(episode.valve_id, episode.unconfirmed_ns.value_or(
                                                     episode.detected_ns));
     }
@@ -419,7 +408,7 @@ void Service::ExpectAssignedValves() {
     valves.push_back(std::move(loop.name));
   }
   for (const std::string& valve_id : valves) {
-    if (GlobMatches(options_.valves, valve_id)) {
+    if (GlobMatches(options_.pipeline.valve_glob, valve_id)) {
       console_->live().Expect(valve_id, 0);
     }
   }
@@ -503,8 +492,8 @@ void Service::Serve(report::StopSignals& signals) {
   const std::string ready =
       "monitor_ready model_set=" + assignment_->DefaultName() +
       " assigned=" + std::to_string(assignment_->assigned()) +
-      " valves=" + options_.valves +
-      " max_valves=" + std::to_string(options_.max_valves) +
+      " valves=" + options_.pipeline.valve_glob +
+      " max_valves=" + std::to_string(options_.pipeline.max_valves) +
       " domain=" + std::to_string(context_.options.domain) + "\n";
   report::WriteToStderr(ready);
   Notify("READY=1");

@@ -40,17 +40,11 @@ enum class Recording : std::uint8_t { kOff, kOn, kLossless };
 
 /// Settings of `fdi-monitor run`.
 struct ServiceOptions {
+  PipelineOptions pipeline;
   std::optional<storage::ModelReference> model_set;
   Recording recording{Recording::kOff};
-  std::string valves{"*"};
-  int max_valves{2000};
   bool lossless_decisions{false};
-  bool best_effort{false};      ///< ValveSample without retransmission.
-  bool second_look{true};       ///< Of onboarded valves, by physics.
-  bool loop_audit{true};        ///< Of valves without a model set.
-  bool audit_all_loops{false};  ///< And of those with one.
-  double stale_timeout_s{3600.0};
-  double trace_before_s{1800.0};
+  bool best_effort{false};          ///< ValveSample without retransmission.
   double status_period_s{60.0};     ///< Of the status line in the log.
   std::optional<PairOptions> pair;  ///< This monitor has a standby.
   /// Runs beside the active sets; without a version the newest one.

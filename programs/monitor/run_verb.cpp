@@ -169,14 +169,14 @@ int Run(const RunArguments& arguments, const report::Context& context) {
 }
 
 // Who judges beside the observers.
-void AddJudgeOptions(CLI::App& run, ServiceOptions& service) {
-  run.add_flag("!--no-second-look", service.second_look,
+void AddJudgeOptions(CLI::App& run, PipelineOptions& pipeline) {
+  run.add_flag("!--no-second-look", pipeline.second_look,
                "Name faults as the observers do, without the second look by "
                "the physics of an onboarded valve");
-  run.add_flag("!--no-loop-audit", service.loop_audit,
+  run.add_flag("!--no-loop-audit", pipeline.loop_audit,
                "Leave valves without a model set unjudged, without the audit "
                "of their loops");
-  run.add_flag("--audit-all-loops", service.audit_all_loops,
+  run.add_flag("--audit-all-loops", pipeline.audit_all_loops,
                "Audit also the loops of valves with a model set, while that "
                "finds nothing");
 }
@@ -205,9 +205,11 @@ void AddRunVerb(report::Program& program) {
       ->transform(ParseRecord)
       ->type_name("[=on|lossless|off]");
   ServiceOptions& service = arguments.service;
-  run.add_option("--valves", service.valves, "Serve only ids that match GLOB")
+  PipelineOptions& pipeline = service.pipeline;
+  run.add_option("--valves", pipeline.valve_glob,
+                 "Serve only ids that match GLOB")
       ->capture_default_str();
-  run.add_option("--max-valves", service.max_valves,
+  run.add_option("--max-valves", pipeline.max_valves,
                  "Serve at most N valves, count the others")
       ->check(CLI::Range(1, 100000))
       ->capture_default_str();
@@ -216,12 +218,12 @@ void AddRunVerb(report::Program& program) {
                "slow subscriber of it holds the monitor up");
   run.add_flag("--best-effort", service.best_effort,
                "Take samples without retransmission");
-  AddJudgeOptions(run, service);
-  run.add_option("--stale-timeout", service.stale_timeout_s,
+  AddJudgeOptions(run, pipeline);
+  run.add_option("--stale-timeout", pipeline.stale_timeout_s,
                  "Close an episode when its valve was silent for this time [s]")
       ->check(CLI::Range(1.0, 1e7))
       ->capture_default_str();
-  run.add_option("--trace-before", service.trace_before_s,
+  run.add_option("--trace-before", pipeline.trace.before_s,
                  "Evidence kept from before a detection [s], at most 1800 "
                  "samples")
       ->check(CLI::Range(0.0, 1800.0))

@@ -9,46 +9,13 @@
 namespace fdi::simulator {
 namespace {
 
-struct EffectField {
-  const char* text;
-  double FaultEffects::*field;
-};
-
-constexpr EffectField kFields[] = {
-    {"upper travel stop x", &FaultEffects::upper_stop_factor},
-    {"plug against rod +", &FaultEffects::plug_offset},
-    {"Kv x", &FaultEffects::kv_factor},
-    {"opening +", &FaultEffects::opening_offset},
-    {"play +", &FaultEffects::play_offset},
-    {"play growing with opening +", &FaultEffects::play_slope},
-    {"share of flow lost outside +", &FaultEffects::external_loss},
-    {"temperature [degC] +", &FaultEffects::temperature_rise_c},
-    {"air leak [kg/(s sqrt(Pa))] +", &FaultEffects::air_leak},
-    {"diaphragm area x", &FaultEffects::area_factor},
-    {"spring force x", &FaultEffects::spring_factor},
-    {"transducer output x", &FaultEffects::transducer_factor},
-    {"position reading x", &FaultEffects::position_reading_factor},
-    {"chamber pressure reading x", &FaultEffects::chamber_reading_factor},
-    {"play in the feedback +", &FaultEffects::feedback_play},
-    {"supply pressure x", &FaultEffects::supply_factor},
-    {"P1 x", &FaultEffects::inlet_factor},
-    {"P2 x", &FaultEffects::outlet_factor},
-    {"bypass opening +", &FaultEffects::bypass_opening},
-    {"flow reading x", &FaultEffects::flow_reading_factor},
-    {"T1 reading, share of span, +", &FaultEffects::temperature_reading_step},
-    {"P1 reading, share of span, +", &FaultEffects::inlet_reading_step},
-    {"P2 reading, share of span, +", &FaultEffects::outlet_reading_step},
-};
-// An effect without a text would be missing from the list of faults.
-static_assert(sizeof(FaultEffects) == std::size(kFields) * sizeof(double));
-
 // Differences from the healthy valve: "Kv x 0.8, opening + 0.1".
 std::string EffectText(int fault, double strength) {
   const FaultEffects healthy;
   FaultEffects faulty;
   ApplyFault(fault, strength, faulty);
   std::string text;
-  for (const EffectField& f : kFields) {
+  for (const EffectField& f : kEffectFields) {
     if (faulty.*f.field != healthy.*f.field) {
       char number[32];
       std::snprintf(number, sizeof number, "%.4g", faulty.*f.field);

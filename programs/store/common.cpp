@@ -180,6 +180,7 @@ Json EpisodeJson(const Alarm& alarm) {
       {"detected_utc", episode.detected_utc},
       {"isolated_utc", TextJson(episode.isolated_utc)},
       {"cleared_utc", TextJson(episode.cleared_utc)},
+      {"ended_utc", TimeJson(episode.ended_ns)},
       {"fault", TextJson(episode.fault)},
       {"certainty", CertaintyName(CertaintyOf(episode))},
       {"look_alikes", LookAlikesOf(episode)},

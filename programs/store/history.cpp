@@ -1,7 +1,6 @@
 // fdi-store history: list, show, export, plot. The other verbs of the group are
 // in figures.cpp and alarms.cpp.
 #include <algorithm>
-#include <map>
 
 #include "base/csv_cells.h"
 #include "programs/store/verbs.h"
@@ -41,9 +40,15 @@ Tone ToneOf(const Json& row) {
 constexpr std::size_t kWidest = 100;
 constexpr std::size_t kLeastName = 15;
 
-// "20 s", or "-" if it has not happened yet.
-std::string After(std::int64_t from_ns, std::optional<std::int64_t> to_ns) {
-  return to_ns ? FormatDuration(*to_ns - from_ns) : "-";
+// "20 s" from the detection to the time under `key`, or "-" if that has not
+// come yet.
+std::string After(const Json& row, const char* key) {
+  const auto stamp = [&row](const char* of) {
+    return ParseTime(row[of].get<std::string>(), true);
+  };
+  return row[key].is_null()
+             ? "-"
+             : FormatDuration(stamp(key) - stamp("detected_utc"));
 }
 
 // Rows of the plant history also have host and monitor.
@@ -56,37 +61,13 @@ Json ListedJson(const Alarm& alarm) {
   return row;
 }
 
-// Both monitors of a pair have a row of an episode.
-std::string RowKey(const Json& row) {
-  return row["episode_id"].get<std::string>() + ' ' + row.value("host", "") +
-         ' ' + row.value("monitor", "");
-}
-
-// What the text output shows beside the columns of fault_history.
-struct EpisodeText {
-  std::string detected;  // "2026-11-20 14:56", by the clock on the wall.
-  std::string isolated_after;
-  std::string lasted;
-};
-using EpisodeTexts = std::map<std::string, EpisodeText>;  // By RowKey().
-
-std::string WallClock(std::int64_t stamp_ns, const Context& context) {
-  const bool utc = context.options.utc;
+// "2026-11-20 14:56", by the clock on the wall.
+std::string WallClock(const Json& time, bool utc) {
+  const std::int64_t stamp_ns = ParseTime(time.get<std::string>(), true);
   std::string text = FormatTime(stamp_ns / 1'000'000'000 * 1'000'000'000, utc);
   text.resize(std::min(text.size(), std::size_t{16}));
   std::replace(text.begin(), text.end(), 'T', ' ');
   return text + (utc ? "Z" : "");
-}
-
-EpisodeTexts TextsOf(const std::vector<Alarm>& alarms, const Context& context) {
-  EpisodeTexts texts;
-  for (const Alarm& alarm : alarms) {
-    const Episode& e = alarm.episode;
-    texts[RowKey(ListedJson(alarm))] = {WallClock(e.detected_ns, context),
-                                        After(e.detected_ns, e.isolated_ns),
-                                        After(e.detected_ns, e.ended_ns)};
-  }
-  return texts;
 }
 
 Report ListEpisodes(const HistoryOptions& options, const Context& context) {
@@ -102,11 +83,6 @@ Report ListEpisodes(const HistoryOptions& options, const Context& context) {
     keys.insert(keys.end(), {"host", "monitor"});
   }
   report.Csv("episodes", keys);
-  const auto texts =
-      std::make_shared<const EpisodeTexts>(TextsOf(alarms, context));
-  const auto of = [texts](const Json& row) -> const EpisodeText& {
-    return texts->at(RowKey(row));
-  };
   Column alarm = TextColumn("alarm", AlarmText);
   alarm.tone = ToneOf;
   const auto end = [](const Json& row) {
@@ -117,7 +93,9 @@ Report ListEpisodes(const HistoryOptions& options, const Context& context) {
       {"episode", "episode_id"},
       {"valve", "valve_id"},
       TextColumn("detected",
-                 [of](const Json& row) { return of(row).detected; }),
+                 [utc = context.options.utc](const Json& row) {
+                   return WallClock(row["detected_utc"], utc);
+                 }),
       alarm,
       {"severity", "severity", Format::kPlain, 0, 1},
       {"fault", "fault", Format::kPlain, 0, 4},
@@ -127,10 +105,10 @@ Report ListEpisodes(const HistoryOptions& options, const Context& context) {
       {"worst", "worst_strength", Format::kPercent, 0, 5},
       TextColumn(
           "isolated after",
-          [of](const Json& row) { return of(row).isolated_after; }, 6,
+          [](const Json& row) { return After(row, "isolated_utc"); }, 6,
           Align::kRight),
       TextColumn(
-          "lasted", [of](const Json& row) { return of(row).lasted; }, 5,
+          "lasted", [](const Json& row) { return After(row, "ended_utc"); }, 5,
           Align::kRight),
       TextColumn("end", end, 5),
       {"label", "label", Format::kPlain, 0, 6},
@@ -167,12 +145,22 @@ bool ByPhysics(const std::string& layer) {
   return layer == LayerName(Layer::kPhysics);
 }
 
+// Of SECOND, what came on top of the faults of the episode.
+std::string SecondText(const std::string& value) {
+  return value == "none"      ? "alone again"
+         : value == "unknown" ? "more than one fault, among them these"
+                              : "and " + value;
+}
+
 std::string NoteText(const HistoryEntry& event) {
   if (event.who.empty()) {
     if (const auto severity = event.priority && event.kind == "CHANGED"
                                   ? SeverityOf(*event.priority)
                                   : std::nullopt) {
       return "now " + std::string(SeverityName(*severity));
+    }
+    if (event.kind == "SECOND") {
+      return SecondText(event.value);
     }
     return ByPhysics(event.layer) ? kByPhysics : event.reason;
   }
@@ -342,7 +330,6 @@ Report ShowEpisode(const ShowOptions& options, const Context& context) {
        {"highest", e.highest ? NumberJson(*e.highest) : Json()},
        {"unknown_kind", TextJson(e.unknown_kind)},
        {"layer", TextJson(e.layer)},
-       {"ended_utc", TimeJson(e.ended_ns)},
        {"shelf", alarm.shelf ? ShelfJson(*alarm.shelf) : Json()},
        {"trace_instants", history->Trace(e.id).size()}});
   if (!e.monitor.empty()) {

@@ -273,6 +273,17 @@ std::vector<Column> EpisodeFields(const Alarm& alarm,
            }}};
 }
 
+// What came on top of the fault that the episode is named after.
+std::string SecondSentence(const HistoryEntry& event,
+                           const report::FaultTexts& texts) {
+  const std::string name = NameAndFault(event.faults, texts);
+  return event.value == "none" ? name + " is alone again."
+         : event.value == "unknown"
+             ? "More than one fault, among them " + name + "."
+             : "A second fault on top of " + name + ": " +
+                   NameAndFault(event.value, texts) + ".";
+}
+
 std::string EventSentence(const HistoryEntry& event,
                           const report::FaultTexts& texts) {
   if (!event.who.empty()) {
@@ -289,6 +300,9 @@ std::string EventSentence(const HistoryEntry& event,
   }
   if (event.kind == "RESUMED") {
     return "The monitor was started again and went on with the episode.";
+  }
+  if (event.kind == "SECOND") {
+    return SecondSentence(event, texts);
   }
   std::string text = event.kind == "ISOLATED"     ? "Named "
                      : event.kind == "REISOLATED" ? "The name became "

@@ -15,7 +15,6 @@
 #include "base/time_text.h"
 #include "import/csv.h"
 #include "simulator/level_loop.h"
-#include "simulator/parameter_fields.h"
 
 // A scenario as TOML. The keys of a table are the member names of its struct,
 // listed once for reader and writer; the unit of a field is the suffix of its

@@ -300,6 +300,12 @@ Trajectory Looker::FlowOnly(int fault, double strength, Course course) const {
   return answers;
 }
 
+// In rows. Readings that are all correlated still say as much as one.
+double CorrelationTime(const Scatter& scatter, std::size_t measured) {
+  return std::min(scatter.correlation_time,
+                  static_cast<double>(std::max<std::size_t>(measured, 1)));
+}
+
 // With e and b in units of sd, a channel's share of Q is
 //
 //   1/tau [ sum_k (nu ln(1 + (e_k - b)^2 / (nu w_k)) + ln w_k) + p b^2 ]
@@ -331,8 +337,9 @@ ChannelFit Looker::FitChannel(const Trajectory& answers, bool flow,
     const double away = kEffectError * effect / scatter.sd;
     widths.push_back(1.0 + away * away);
   }
+  const double correlation_time = CorrelationTime(scatter, errors.size());
   const double prior =
-      scatter.correlation_time * scatter.sd * scatter.sd / (slow_sd * slow_sd);
+      correlation_time * scatter.sd * scatter.sd / (slow_sd * slow_sd);
   double shift = 0.0;  // b / sd
   for (int iteration = 0; iteration < 4; ++iteration) {
     double sum = 0.0;
@@ -352,9 +359,8 @@ ChannelFit Looker::FitChannel(const Trajectory& answers, bool flow,
     fit.errors += kFreedom * std::log1p(e * e / (widths[k] * kFreedom));
     fit.cost += std::log(widths[k]);
   }
-  fit.cost = (fit.errors + fit.cost + prior * shift * shift) /
-             scatter.correlation_time;
-  fit.errors /= scatter.correlation_time;
+  fit.cost = (fit.errors + fit.cost + prior * shift * shift) / correlation_time;
+  fit.errors /= correlation_time;
   return fit;
 }
 
@@ -369,16 +375,17 @@ double Looker::ErrorsOf(const Trajectory& answers) const {
 
 // Of X and F, as many as count as independent.
 double Looker::Readings() const {
-  const bool has_flow = Measures(Signal::kF);
-  double readings = 0.0;
+  std::size_t positions = 0;
+  std::size_t flows = 0;
   for (int k = Settling(); k < rows_; ++k) {
     const RecordRow& row = window_.rows[static_cast<std::size_t>(k)];
-    readings += row.x_measured ? 1.0 / physics_.x.correlation_time : 0.0;
-    readings += has_flow && row.flow_measured
-                    ? 1.0 / physics_.flow.correlation_time
-                    : 0.0;
+    positions += row.x_measured ? 1 : 0;
+    flows += Measures(Signal::kF) && row.flow_measured ? 1 : 0;
   }
-  return readings;
+  const auto independent = [](const Scatter& scatter, std::size_t count) {
+    return static_cast<double>(count) / CorrelationTime(scatter, count);
+  };
+  return independent(physics_.x, positions) + independent(physics_.flow, flows);
 }
 
 // How unusual the inputs are, behind the detection, if the fault is there.

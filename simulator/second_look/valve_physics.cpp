@@ -12,7 +12,6 @@
 #include "base/error.h"
 #include "base/field_list.h"
 #include "base/median.h"
-#include "simulator/parameter_fields.h"
 
 namespace fdi::simulator {
 namespace {
@@ -33,12 +32,10 @@ double Mean(const std::vector<double>& values) {
 // About the median, what is beyond five robust deviations drawn in.
 std::vector<double> Bounded(std::vector<double> errors) {
   const double middle = Median(errors);
-  std::vector<double> sizes;
   for (double& error : errors) {
     error -= middle;
-    sizes.push_back(std::abs(error));
   }
-  const double reach = 5.0 * std::max(1e-9, 1.4826 * Median(std::move(sizes)));
+  const double reach = 5.0 * std::max(1e-9, RobustSd(errors));
   for (double& error : errors) {
     error = std::clamp(error, -reach, reach);
   }

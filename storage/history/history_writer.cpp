@@ -20,7 +20,7 @@ namespace fdi::storage {
 template <>
 struct EnumText<TransitionKind> {
   static constexpr auto name = TransitionName;
-  static constexpr auto last = TransitionKind::kChanged;
+  static constexpr auto last = TransitionKind::kSecond;
 };
 
 namespace sql = history_sql;
@@ -61,14 +61,25 @@ struct Entry {
   std::int64_t recorded_ns{0};
   std::vector<std::string> names;  ///< Of the faults, by bit.
 
-  std::string IsolatedNames() const {
-    std::vector<std::string> isolated;
+  std::string NamesOf(FaultSet faults) const {
+    std::vector<std::string> named;
     for (std::size_t bit = 0; bit < names.size(); ++bit) {
-      if (Has(transition.faults, bit)) {
-        isolated.push_back(names[bit]);
+      if (Has(faults, bit)) {
+        named.push_back(names[bit]);
       }
     }
-    return JoinText(isolated, "|");
+    return JoinText(named, "|");
+  }
+
+  std::string IsolatedNames() const { return NamesOf(transition.faults); }
+
+  // Of SECOND: the faults on top of those, "unknown", or that there are none.
+  std::string Value() const {
+    const SecondFault& second = transition.second;
+    return transition.kind != TransitionKind::kSecond ? ""
+           : !second.open                             ? "none"
+           : second.faults == 0                       ? "unknown"
+                                                      : NamesOf(second.faults);
   }
 };
 
@@ -142,7 +153,7 @@ bool StoreEvent(Database& database, const Entry& entry) {
             t.faults, t.factor, t.strength,
             closed ? EndReasonName(t.reason) : std::string_view(),
             IsIsolation(t.kind) ? LayerName(t.layer) : std::string_view(),
-            PriorityOf(t.severity), entry.id)
+            PriorityOf(t.severity), entry.Value(), entry.id)
       .Run();
   // Nothing else is changed unless the event is new, so that repeating it after
   // an error does no harm. Triggers insert into `change` meanwhile; SQLite
@@ -161,7 +172,13 @@ bool StoreEvent(Database& database, const Entry& entry) {
   if (IsIsolation(t.kind)) {
     StoreIsolation(database, entry);
   }
-  if (IsIsolation(t.kind) || t.kind == TransitionKind::kChanged) {
+  // A second fault wants an answer, whatever its priority; its end does not.
+  const bool second = t.kind == TransitionKind::kSecond && t.second.open;
+  if (second) {
+    database.Cached(sql::raise_alarm)
+        .Bind(entry.id, true, std::nullopt, entry.recorded_ns, t.stamp_ns)
+        .Run();
+  } else if (IsIsolation(t.kind) || t.kind == TransitionKind::kChanged) {
     // Before the new priority replaces the one that was acknowledged.
     database.Cached(sql::raise_alarm)
         .Bind(entry.id, t.kind == TransitionKind::kChanged,

@@ -172,9 +172,9 @@ WHERE ended_ns IS NOT NULL GROUP BY valve_id
 -- Nothing is inserted if the event is there already, or its episode has ended.
 -- name: insert_event
 INSERT INTO episode_event (episode_id, kind, stamp_ns, recorded_ns, faults,
-  fault_bits, factor, strength, reason, layer, priority)
+  fault_bits, factor, strength, reason, layer, priority, value)
 SELECT episode_id, ?, ?, ?, nullif(?, ''), ?, ?, ?, nullif(?, ''),
-  nullif(?, ''), ?
+  nullif(?, ''), ?, nullif(?, '')
 FROM episode WHERE episode_id = ? AND ended_ns IS NULL
 ON CONFLICT (episode_id, kind, stamp_ns) DO NOTHING
 -- name: has_event

@@ -25,7 +25,8 @@ namespace fdi::storage {
 //             + 8 with an interpolation allowance, + 16 with names before t_k,
 //             + 32 with the trim of a floor, + 64 with a share of the flow that
 //             is too little, + 128 with limits of a fit, + 256 if the command
-//             is the position, which has no bytes
+//             is the position, + 512 if it may pass the end of its range; both
+//             have no bytes
 //   payload = the fields of ModelSet in the order of Fields() below, the floor
 //             last; then [physics: list] [drift: of each channel] [allowance]
 //             [early_error] [flow shape of the floor: list]
@@ -51,10 +52,11 @@ constexpr std::uint32_t kWithFlowShape = 32;
 constexpr std::uint32_t kWithFlowShare = 64;
 constexpr std::uint32_t kWithFit = 128;
 constexpr std::uint32_t kWithPosition = 256;
-constexpr std::uint32_t kLastFormat = kFormat + kWithPhysics + kWithFloor +
-                                      kWithDrift + kWithAllowance +
-                                      kWithEarlyNames + kWithFlowShape +
-                                      kWithFlowShare + kWithFit + kWithPosition;
+constexpr std::uint32_t kWithPassing = 512;
+constexpr std::uint32_t kLastFormat =
+    kFormat + kWithPhysics + kWithFloor + kWithDrift + kWithAllowance +
+    kWithEarlyNames + kWithFlowShape + kWithFlowShare + kWithFit +
+    kWithPosition + kWithPassing;
 constexpr std::uint32_t kMaxPhysics = 256;
 constexpr std::size_t kFrame =
     2 * sizeof(std::uint32_t) + sizeof(std::uint64_t) + sizeof(std::uint32_t);
@@ -215,8 +217,8 @@ void Fields(A& a, T& models) {
   auto& [name, version, content_hash, created_ns, software, preset,
          sample_period_s, flow_unit, validity, stuck, floor, decision, channels,
          observers, faults, groups, undetectable, training_runs,
-         threshold_hours, false_alarms_per_hour, physics, position_as_command] =
-      models;
+         threshold_hours, false_alarms_per_hour, physics, position_as_command,
+         command_may_pass] = models;
   a(name, created_ns, software, preset, sample_period_s, flow_unit, validity,
     stuck, decision, Limited{channels, kMaxChannels},
     Limited{observers, kMaxObservers}, Limited{faults, kMaxFaults},
@@ -396,7 +398,8 @@ std::vector<std::byte> EncodeModelSet(const ModelSet& models) {
              (early_error > 0.0 ? kWithEarlyNames : 0U) +
              (shaped ? kWithFlowShape : 0U) + (low_flow ? kWithFlowShare : 0U) +
              (fits ? kWithFit : 0U) +
-             (models.position_as_command ? kWithPosition : 0U));
+             (models.position_as_command ? kWithPosition : 0U) +
+             (models.command_may_pass ? kWithPassing : 0U));
   writer.Put(static_cast<std::uint64_t>(payload.writer.size()));
   writer.Append(payload.writer.view().data(), payload.writer.size());
   writer.Put(Checksum(writer.view()));
@@ -465,6 +468,7 @@ ModelSet DecodeModelSet(std::span<const std::byte> bytes,
     }
   }
   models.position_as_command = ((format - kFormat) & kWithPosition) != 0;
+  models.command_may_pass = ((format - kFormat) & kWithPassing) != 0;
   payload.ExpectEnd();
   models.content_hash = ContentHash(models);  // Of what is stored.
   RenumberFindings(models);

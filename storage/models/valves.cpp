@@ -1,9 +1,9 @@
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <utility>
 
+#include "base/csv_cells.h"
 #include "base/error.h"
 #include "base/text.h"
 #include "storage/database/record.h"
@@ -71,15 +71,7 @@ std::string JsonText(std::string_view text) {
 
 // JSON has no infinities; `null` reads back as NaN.
 std::string JsonNumber(double value) {
-  if (!std::isfinite(value)) {
-    return "null";
-  }
-  // to_chars gives the shortest digits that read back as the same double,
-  // whatever the locale.
-  std::array<char, 32> digits{};
-  const auto end =
-      std::to_chars(digits.data(), digits.data() + digits.size(), value).ptr;
-  return {digits.data(), end};
+  return std::isfinite(value) ? NumberText(value) : "null";
 }
 
 std::string JsonOf(

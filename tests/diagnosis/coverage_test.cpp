@@ -331,6 +331,40 @@ TEST(CoverageTest, WindowsBeginAnewOnceArmedAndOutlastLostSamples) {
   }
 }
 
+// A controller that moves the command by much passes the end of the range now
+// and then. The valve is not judged while an observer may read that command,
+// and is what it was before.
+TEST(CoverageTest, CommandThatPassesTheEndOfTheRangeDoesNotDisarm) {
+  ModelSet models = OperatedPlant();
+  models.validity.cv_step = 50.0;
+  models.command_may_pass = true;
+  constexpr int kLag = 5;
+  models.observers[1].channels[0].model.regressors[0].lag = kLag;
+  const auto passing = [](int samples) {
+    return [=](int k) {
+      Process process;
+      process.cv = k < 300 + samples && k >= 300 ? 90.0 : 60.0;
+      return process;
+    };
+  };
+  ValveEngine engine = Engine(models);
+  Follow(engine, 0, 300, passing(2));
+  const Outcome passed = Follow(engine, 300, 302 + kLag, passing(2));
+  EXPECT_EQ(passed.live, 0);
+  EXPECT_EQ(passed.reasons, (std::set<std::string>{"cv", "waiting"}));
+  EXPECT_EQ(Follow(engine, 302 + kLag, 400, passing(2)).live, 98 - kLag);
+  // It stays, until its mean is beyond, too.
+  ValveEngine staying = Engine(models);
+  Follow(staying, 0, 300, passing(30));
+  Follow(staying, 300, 330, passing(30));
+  EXPECT_EQ(Follow(staying, 330, 330 + kRearm, passing(30)).live, 0);
+  // Sets from before are disarmed by it.
+  models.command_may_pass = false;
+  ValveEngine older = Engine(models);
+  Follow(older, 0, 300, passing(2));
+  EXPECT_EQ(Follow(older, 300, 302 + kRearm, passing(2)).live, 0);
+}
+
 TEST(CoverageTest, ArmedStateIsPartOfTheSnapshot) {
   Process broken;
   broken.t1 = 150.0;

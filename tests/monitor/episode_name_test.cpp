@@ -252,6 +252,34 @@ TEST_F(EpisodeNameTest, AFaultThatGetsMoreSevereIsAnnouncedOnce) {
   EXPECT_EQ(name_.now().severity, Severity::kCritical);
 }
 
+TEST_F(EpisodeNameTest, ASecondFaultIsAnnouncedAndNoLookAtBothRenames) {
+  Step(0, {Kind::kDetected});
+  Step(kF1, {Kind::kIsolated});
+  kinds_.clear();
+  engine_.second.doubt = true;
+  engine_.second.standing = kF1;
+  look_ = EpisodeName::Look{{{1, {0.3, 0.2, 0.4}}}, false};
+  EXPECT_EQ(Step(kF1).isolated, kF1) << "it may be a look at both";
+  EXPECT_THAT(kinds_, IsEmpty());
+  engine_.second.doubt = false;
+  engine_.second.open = true;
+  engine_.second.faults = kF7;
+  EXPECT_EQ(Step(kF1).isolated, kF1);
+  EXPECT_THAT(kinds_, ElementsAre(Kind::kSecond));
+  EXPECT_EQ(last_.faults, kF1);
+  EXPECT_EQ(last_.second.faults, kF7);
+  kinds_.clear();
+  Step(kF1);
+  EXPECT_THAT(kinds_, IsEmpty());
+
+  engine_.second = {};
+  EXPECT_EQ(Step(kF1).isolated, kF7) << "looks are heard again";
+  EXPECT_THAT(kinds_, ElementsAre(Kind::kReisolated, Kind::kSecond));
+  EXPECT_FALSE(last_.second.open);
+  EXPECT_EQ(name_.beside().faults, kF7);
+  EXPECT_EQ(name_.beside().strength, 0.3);
+}
+
 TEST_F(EpisodeNameTest, TheGravestOfASetCountsAtItsOwnStrength) {
   engine_.fault_factors[0] = 0.9;
   engine_.fault_factors[1] = 0.8;

@@ -98,7 +98,7 @@ TEST_F(ServiceTest, AStatusThatFailsStopsNothingAndTheSessionEndsInOrder) {
 // The next start would take its session for one that died.
 TEST_F(ServiceTest, AnErrorInTheOptionsLeavesNoTraceInTheHistory) {
   ServiceOptions options;
-  options.valves = std::string(300, 'V');
+  options.pipeline.valve_glob = std::string(300, 'V');
 
   EXPECT_THROW(Service(options, Context()), ConfigError);
 
@@ -110,7 +110,7 @@ TEST_F(ServiceTest, AnErrorInTheOptionsLeavesNoTraceInTheHistory) {
 TEST_F(ServiceTest, AFolderThatHadToBeMadeIsSaidOnce) {
   global_.data_dir = directory_.path() / "mistyped";
   ServiceOptions options;
-  options.valves = std::string(300, 'V');
+  options.pipeline.valve_glob = std::string(300, 'V');
 
   EXPECT_THROW(Service(options, Context()), ConfigError);
   EXPECT_EQ(Count("data_folder_made path=" + global_.data_dir.string()), 1U);

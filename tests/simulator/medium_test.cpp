@@ -403,15 +403,21 @@ TEST(TrimTest, TablesRiseBetweenTheirPointsWithoutOvershoot) {
   }
 }
 
-TEST(TrimTest, ShutTrimLeaksItsClass) {
-  for (const auto characteristic :
-       {FlowCharacteristic::kExponential, FlowCharacteristic::kLinear,
-        FlowCharacteristic::kQuickOpening}) {
+TEST(TrimTest, EveryCharacteristicRisesFromItsLeakToOne) {
+  for (std::size_t i = 0; i < kEnumNames<FlowCharacteristic>.size(); ++i) {
+    SCOPED_TRACE(kEnumNames<FlowCharacteristic>[i]);
     Trim trim;
-    trim.characteristic = characteristic;
+    trim.characteristic = static_cast<FlowCharacteristic>(i);
     trim.leakage = 1e-3;  // class III
+    if (trim.characteristic == FlowCharacteristic::kTable) {
+      trim.table_h = {0.5, 1.0};
+      trim.table_f = {0.3, 1.0};
+    }
     EXPECT_NEAR(Opening(trim, 1.0), 1e-3, 1e-15);
-    EXPECT_EQ(Opening(trim, 0.0), 1.0);
+    EXPECT_NEAR(Opening(trim, 0.0), 1.0, 1e-15);
+    for (int h = 1; h <= 100; ++h) {
+      EXPECT_GT(Opening(trim, 1.0 - 0.01 * h), Opening(trim, 1.01 - 0.01 * h));
+    }
   }
 }
 

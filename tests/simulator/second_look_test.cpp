@@ -253,6 +253,25 @@ TEST(SecondLookTest, ManagesWithoutAPosition) {
   EXPECT_NEAR(f19->strength, 0.4, 0.05);
 }
 
+// What a flow wanders by in slow data lasts for longer than a look: all of its
+// rows are one reading, not a part of one.
+TEST(SecondLookTest, AWindowWithinTheCorrelationIsOneReading) {
+  ValvePhysics physics = Physics();
+  physics.flow.correlation_time = 1000.0;
+  LookWindow window = Window({Abrupt(19, 0.4)});
+  const auto first = window.rows.begin() + kLeadIn;
+  window.rows = {first, first + 40};
+  window.detection = 0;
+  window.signals = MaskOf(Signal::kCv) | MaskOf(Signal::kF);
+  for (RecordRow& row : window.rows) {
+    row.x_measured = false;
+  }
+  const SecondLook look = RunSecondLook(physics, window);
+  EXPECT_NEAR(look.readings, 1.0, 1e-9);
+  EXPECT_NE(look.ranked.front().fault, 0);
+  EXPECT_LT(look.misfit, 1.5);
+}
+
 // A row of a minute ends within three quarters of a per cent of where one of
 // ten seconds does: the rest is what has not settled by then.
 TEST(RecordFitTest, LongRowsAreSimulatedForAsLongAsAValveSettles) {

@@ -417,6 +417,33 @@ TEST_F(GrowingAlarmTest, ItsStrengthIsThatOfNowAndItsWorstIsKept) {
             "0.1 0.2 medium 3");
 }
 
+TEST_F(GrowingAlarmTest, ASecondFaultHasToBeAcknowledgedAndItsEndHasNot) {
+  ASSERT_EQ(Shown().acked_by, "anna");
+  FaultEvent event = At(Kind::kSecond, 7000, 0.2, Severity::kMedium);
+  event.transition.second.open = true;
+  event.transition.second.faults = event.transition.faults;
+  EXPECT_TRUE(writer_.Record(event, kDetected + 7200 * kSecond));
+  EXPECT_EQ(Shown().acked_by, std::nullopt);
+  EXPECT_EQ(Shown().fault, "f19");
+  const auto latest = [this] {
+    const auto events = HistoryReader(path_).Events(Id());
+    return events.back().kind + " " + events.back().value;
+  };
+  EXPECT_EQ(latest(), "SECOND f19");
+  event.transition.stamp_ns += kSecond;
+  event.transition.second.faults = 0;
+  EXPECT_TRUE(writer_.Record(event, kDetected + 7201 * kSecond));
+  EXPECT_EQ(latest(), "SECOND unknown");
+  EXPECT_EQ(writer_.UnsentEvents().back().transition.kind, Kind::kSecond);
+  EXPECT_EQ(OnTheBus(Kind::kSecond), Kind::kReisolated);
+  editor_.Acknowledge("last", By("anna", kDetected + 7201 * kSecond));
+  event.transition.stamp_ns += kSecond;
+  event.transition.second.open = false;
+  EXPECT_TRUE(writer_.Record(event, kDetected + 7202 * kSecond));
+  EXPECT_EQ(latest(), "SECOND none");
+  EXPECT_EQ(Shown().acked_by, "anna");
+}
+
 TEST_F(GrowingAlarmTest, AHigherPriorityHasToBeAcknowledgedAgain) {
   const std::int64_t rose = kDetected + 7200 * kSecond;
   EXPECT_TRUE(

@@ -92,20 +92,24 @@ TEST(ModelCodecTest, FitLimitsAndTooLittleFlowReadBackInTheirOwnFormat) {
   EXPECT_EQ(back.faults.back(), kLowFlow);
 }
 
-// One bit of the format and no byte of the payload.
-TEST(ModelCodecTest, ThePositionAsCommandReadsBackInItsOwnFormat) {
-  ModelSet models = RandomModelSet("valve", 5);
-  const auto without = EncodeModelSet(models);
-  EXPECT_FALSE(DecodeModelSet(without, "test").position_as_command);
-  models.position_as_command = true;
-  const auto bytes = EncodeModelSet(models);
-  EXPECT_EQ(bytes.size(), without.size());
-  EXPECT_EQ(bytes[4], std::byte{3});
-  EXPECT_EQ(bytes[5], std::byte{1});
-  const ModelSet back = DecodeModelSet(bytes, "test");
-  EXPECT_TRUE(back.position_as_command);
-  EXPECT_EQ(EncodeModelSet(back), bytes);
-  EXPECT_NE(back.content_hash, ContentHash(RandomModelSet("valve", 5)));
+// One bit of the format each, and no byte of the payload.
+TEST(ModelCodecTest, WhatASetDoesWithItsCommandReadsBackInItsOwnFormat) {
+  for (const auto& [member, byte] :
+       {std::pair(&ModelSet::position_as_command, std::byte{1}),
+        {&ModelSet::command_may_pass, std::byte{2}}}) {
+    ModelSet models = RandomModelSet("valve", 5);
+    const auto without = EncodeModelSet(models);
+    EXPECT_FALSE(DecodeModelSet(without, "test").*member);
+    models.*member = true;
+    const auto bytes = EncodeModelSet(models);
+    EXPECT_EQ(bytes.size(), without.size());
+    EXPECT_EQ(bytes[4], std::byte{3});
+    EXPECT_EQ(bytes[5], byte);
+    const ModelSet back = DecodeModelSet(bytes, "test");
+    EXPECT_TRUE(back.*member);
+    EXPECT_EQ(EncodeModelSet(back), bytes);
+    EXPECT_NE(back.content_hash, ContentHash(RandomModelSet("valve", 5)));
+  }
 }
 
 TEST(ModelCodecTest, EveryFieldReadsBackBitForBit) {
@@ -278,7 +282,7 @@ TEST(ModelCodecTest, RefusalsNameThePlaceAndTheReason) {
   auto older = bytes;
   older[4] = std::byte{2};
   EXPECT_THAT(Refusal(WithValidChecksum(older)),
-              HasSubstr("format version 2, this program reads 3 to 514"));
+              HasSubstr("format version 2, this program reads 3 to 1026"));
   EXPECT_THAT(Refusal({}), HasSubstr("is not a model set"));
   // The length of the name stands first in the payload, after 16 bytes.
   auto huge = bytes;

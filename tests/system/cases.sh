@@ -131,6 +131,21 @@ while IFS='|' read -r name zone onboards samples no_x no_f; do
   echo
 done <cases.txt
 [ ${#wrong[@]} -eq 0 ] || fail "wrong: ${wrong[*]/%/,}"
+
+# A real loop at a sample a minute, with a command and a flow alone: four days
+# are onboarded, and the other three are silent.
+loop=$FDI_REFERENCE_DATA/plant-loops/LIC-106.csv
+slow() {  # PROGRAM WORDS
+  run "$@"
+  [ "$code" -eq 0 ] || fail "LIC-106, $2: $(tail -1 verb.out)"
+}
+slow fdi-store runs sniff "$loop" --map-output lic.toml
+slow fdi-trainer onboard --valve LIC-106 --map lic.toml --file "$loop@0:345600" \
+  --no-coverage
+slow fdi-trainer evaluate --valve LIC-106 --map lic.toml --assume-normal \
+  --file "$loop@345600:"
+grep -q 'LIVE: *71' verb.out || fail "LIC-106 is not judged"
+grep -Eq 'normal +\. +1$' verb.out || fail "LIC-106 is not silent"
 [ -n "$all" ] || exit 0
 
 # All are healthy but one, and that one's transmitter is right.

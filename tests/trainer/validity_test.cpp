@@ -42,6 +42,22 @@ TEST(TrainedRegionTest, CommandsOfAllConditionsInputsOfNormalOperation) {
   EXPECT_DOUBLE_EQ(region.flow_cutoff, 0.5);
 }
 
+// The record went from 50 to 60 %, and for 30 samples up to 90 %.
+TEST(TrainedRegionTest, EndsWhereSamplesAre) {
+  std::vector<Condition> conditions = Conditions();
+  conditions.resize(1);
+  std::vector<Sample>& samples = conditions[0].training[0].samples;
+  samples.assign(3000, At(50.0, 3500.0, 2600.0, 100.0, 20.0));
+  for (std::size_t k = 0; k < 60; ++k) {
+    samples[20 * k].Set(Signal::kCv,
+                        k < 30 ? 60.0 : 31.0 + static_cast<double>(k));
+  }
+  EXPECT_DOUBLE_EQ(TrainedRegion(conditions).cv.maximum, 65.0);
+  // Once more is seen there, that is part of it.
+  samples[1].Set(Signal::kCv, 90.0);
+  EXPECT_DOUBLE_EQ(TrainedRegion(conditions).cv.maximum, 66.0);
+}
+
 TEST(StuckLimitsTest, TenTimesTheLongestRunAndAMinute) {
   Condition normal;
   normal.training = {{"a", {}}};

@@ -42,27 +42,6 @@ void VisitLimits(Models& models, Visitor visit) {
   }
 }
 
-// The least of the last n_d values.
-// A detection takes n_d samples in a row beyond a limit, so it is the least of
-// their shares that counts. The zeros at the start keep fewer samples from
-// counting.
-class Sustained {
- public:
-  explicit Sustained(int samples)
-      : last_(static_cast<std::size_t>(samples), 0.0) {}
-
-  void Restart() { std::fill(last_.begin(), last_.end(), 0.0); }
-  double Push(double value) {
-    last_[next_] = value;
-    next_ = (next_ + 1) % last_.size();
-    return *std::min_element(last_.begin(), last_.end());
-  }
-
- private:
-  std::vector<double> last_;
-  std::size_t next_{0};
-};
-
 // How much of each limit residuals use up, sample by sample.
 class LimitUse {
  public:

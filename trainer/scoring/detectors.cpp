@@ -33,6 +33,7 @@ class RunNames {
     name_.emplace(models_, std::make_shared<const SeverityCatalogue>());
   }
 
+  NameBeside beside() const { return name_->beside(); }
   bool suspects() const { return looks_ && looks_->suspects(); }
 
   NamedVerdict Step(const Sample& sample, const Verdict& engine) {
@@ -74,7 +75,8 @@ Answer FollowEngine(const std::shared_ptr<const ModelSet>& models,
       [&names](const Sample& sample, const Verdict& verdict) {
         return names.Step(sample, verdict);
       },
-      [&names] { return names.suspects(); }, [&names] { names.BeginAnew(); }};
+      [&names] { return names.suspects(); },
+      [&names] { return names.beside(); }, [&names] { names.BeginAnew(); }};
   const auto watch = [&](const Sample& sample, const Verdict& verdict) {
     if (CountsAsTime(verdict)) {
       samples.Add(verdict.quality);
@@ -92,6 +94,21 @@ Answer FollowEngine(const std::shared_ptr<const ModelSet>& models,
         static_cast<double>(samples[static_cast<Quality>(q)]);
   }
   return answer;
+}
+
+// The last second fault of the run, and its last name.
+void ScoreSecond(const std::vector<Indication>& all, EvaluatedRun& result) {
+  bool before = false;
+  for (const Indication& now : all) {
+    if (now.second && !before) {
+      result.second_t = now.time_s;
+      result.second_set.clear();
+    }
+    if (now.second && !now.second_set.empty()) {
+      result.second_set = now.second_set;
+    }
+    before = now.second;
+  }
 }
 
 }  // namespace
@@ -127,6 +144,7 @@ EvaluatedRun Evaluate(const Detector& detector, const ScoredRun& run,
       result.last_set = indication.isolated;
     }
   }
+  ScoreSecond(answer.indications, result);
   if (settings.scored) {
     settings.scored(run, result, answer.indications);
   }

@@ -17,6 +17,8 @@ struct EvaluatedRun {
   double duration_s{0.0};     ///< Of its samples: gaps do not count.
   std::vector<int> last_set;  ///< Last set isolated in the whole run.
   Wording last_wording;       ///< Of it.
+  double second_t{-1.0};  ///< When something came on top, last; −1: never.
+  std::vector<int> second_set{};  ///< What it was called then, at last.
   /// Seconds by quality; empty where a detector gives none.
   std::optional<std::array<double, kQualityCount>> seconds{};
 };

@@ -71,6 +71,11 @@ Json RunJson(const EvaluatedRun& run) {
   json["t_exact"] = run.indices.t_exact;
   json["episodes"] = run.indices.episodes;
   json["wrong_isolations"] = run.indices.wrong_isolations;
+  json["second_t"] = run.second_t;
+  json["second_set"] = Json::array();
+  for (const int fault : run.second_set) {
+    json["second_set"].push_back(FaultName(fault));
+  }
   return json;
 }
 

@@ -127,6 +127,9 @@ std::vector<Indication> Rescore(const std::shared_ptr<const ModelSet>& models,
     if (outside.suspects) {
       engine.Suspect(outside.suspects());
     }
+    if (outside.beside) {
+      engine.TakeName(outside.beside());
+    }
     if (OutOfOrder(verdict.intake)) {
       continue;
     }

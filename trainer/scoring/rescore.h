@@ -4,6 +4,7 @@
 #include <memory>
 #include <vector>
 
+#include "diagnosis/second_fault.h"
 #include "storage/runs/runs.h"
 #include "trainer/evaluation.h"
 
@@ -20,8 +21,9 @@ struct NamedVerdict {
 struct OutsideKnowledge {
   /// Given each verdict of the engine after the sink.
   std::function<NamedVerdict(const Sample&, const Verdict&)> name{};
-  std::function<bool()> suspects{};     ///< Asked behind each sample.
-  std::function<void()> begins_anew{};  ///< The monitor forgot what it knew.
+  std::function<bool()> suspects{};      ///< Asked behind each sample.
+  std::function<NameBeside()> beside{};  ///< Likewise: ValveEngine::TakeName.
+  std::function<void()> begins_anew{};   ///< The monitor forgot what it knew.
 };
 
 /// Runs the monitor's own engine over a stored run as the live one met it: all

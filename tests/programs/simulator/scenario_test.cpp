@@ -5,6 +5,8 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
+#include "simulator/fault_effects.h"
+#include "simulator/record_fit.h"
 #include "simulator/scenario/scenario_toml.h"
 #include "tests/storage/temporary_directory.h"
 
@@ -214,6 +216,48 @@ TEST(ScenarioTomlTest, ABypassHasTheSizeOfItsValve) {
   EXPECT_EQ(bypass("characteristic = 'linear'"), 7.0);
   EXPECT_DOUBLE_EQ(bypass("kv_m3_h = 400.0"), 70.0);
   EXPECT_EQ(bypass("kv_m3_h = 400.0\nbypass_kv_m3_h = 9.0"), 9.0);
+}
+
+// The lines of docs/model.md from this comment on to the next empty line.
+std::string ExampleOf(const std::string& comment) {
+  std::ifstream page(FDI_MODEL_PAGE);
+  std::string example;
+  for (std::string line; std::getline(page, line);) {
+    if (!example.empty() || line == "    # " + comment) {
+      if (line.empty()) {
+        break;
+      }
+      example += line + "\n";
+    }
+  }
+  return example;
+}
+
+// As they are written, at the position of their first row, with the flows that
+// the page computes by hand.
+TEST(ScenarioTomlTest, TheDataSheetsOfTheModelPageAreValves) {
+  struct Case {
+    const char* comment;
+    InputRow input;
+    double flow_t_h;
+  };
+  for (const Case& data_sheet :
+       {Case{"Globe valve for propane, DN 50: data sheet with F_L and "
+             "rangeability",
+             {60.3, 2000.0, 1500.0, 43.0},
+             5.27},
+        Case{"Steam valve, linear, with x_T",
+             {60.3, 1000.0, 700.0, 190.0},
+             2.60}}) {
+    const storage::TemporaryDirectory folder;
+    std::ofstream(folder.path() / "type.toml") << ExampleOf(data_sheet.comment);
+    const ValveParameters valve = FindParameters("type.toml", folder.path());
+    EXPECT_NO_THROW(Validate(valve));
+    EXPECT_EQ(valve.actuator.spring, SpringAction::kToClose);
+    EXPECT_NEAR(FlowReading(valve, {}, data_sheet.input, 60.3),
+                data_sheet.flow_t_h, 0.02 * data_sheet.flow_t_h)
+        << data_sheet.comment;
+  }
 }
 
 TEST(ScenarioTomlTest, ACsvExcitationKeepsTheModes) {

@@ -34,8 +34,8 @@ TEST_F(FdiStoreHistoryTest, ListedEpisodesHaveTheColumnsOfTheView) {
   EXPECT_THAT(KeysOf(episode),
               testing::UnorderedElementsAre(
                   "episode_id", "valve_id", "detected_utc", "isolated_utc",
-                  "cleared_utc", "fault", "peak_factor", "model_set",
-                  "end_reason", "label", "acked_by", "strength",
+                  "cleared_utc", "ended_utc", "fault", "peak_factor",
+                  "model_set", "end_reason", "label", "acked_by", "strength",
                   "worst_strength", "severity", "priority", "unconfirmed_utc",
                   "certainty", "look_alikes", "fault_name", "acked_utc",
                   "ack_comment", "alarm_state", "shelved_until_utc"));

@@ -75,11 +75,11 @@ TEST_F(AppEvaluateTest, JsonHasTheKeysOfTheContractAndFindsTheFault) {
     keys.push_back(key);
   }
   EXPECT_THAT(
-      keys, UnorderedElementsAre("run_id", "fault", "strength", "detected",
-                                 "t_dt_first", "t_dt", "t_it_first", "t_it",
-                                 "r_fd", "r_td", "r_fi", "r_ti", "r_mi", "fs_d",
-                                 "fs_i", "d_acc", "final_set", "certainty",
-                                 "t_exact", "episodes", "wrong_isolations"));
+      keys, UnorderedElementsAre(
+                "run_id", "fault", "strength", "detected", "t_dt_first", "t_dt",
+                "t_it_first", "t_it", "r_fd", "r_td", "r_fi", "r_ti", "r_mi",
+                "fs_d", "fs_i", "d_acc", "final_set", "certainty", "t_exact",
+                "episodes", "wrong_isolations", "second_t", "second_set"));
   EXPECT_EQ(run["run_id"], id);
   EXPECT_EQ(run["fault"], "f19");
   EXPECT_EQ(run["strength"], 0.5);

@@ -167,7 +167,7 @@ export function qualityText(tile) {
 }
 
 const kMarkWords = {
-  ISOLATED: 'named', REISOLATED: 'named anew', CHANGED: 'priority rose', ACK: 'acknowledged',
+  ISOLATED: 'named', REISOLATED: 'named anew', CHANGED: 'priority rose', SECOND: 'second fault', ACK: 'acknowledged',
   LABEL: 'labelled',
 };
 export const markWord = (kind) =>

@@ -1,0 +1,23 @@
+# Of lines of `fdi-trainer evaluate --csv` with the faults of a set joined by
+# bars (FDI_RUNS of set_calibration.sh and untrained.sh): answers of each
+# certainty, and how many of them hold the fault. A catalogue's look-alike that
+# the set does not know stands beside a single name that is called "one of".
+#
+#     awk -F, -f bench/certainty.awk RUNS
+function Beside(name, fault) {
+  return name == "f6" && fault == "f18" || name == "f18" && fault == "f6" ||
+    (name == "f2" || name == "f19") && fault == "f5"
+}
+# A line of set_calibration.sh begins with the valve.
+{ fault = $(NF - 19); name = $(NF - 4); certainty = $(NF - 3) }
+certainty == "" || certainty == "-" { silent++; next }
+{
+  answers[certainty]++
+  right[certainty] += index("|" name "|", "|" fault "|") > 0 ||
+    certainty == "one of" && Beside(name, fault)
+}
+END {
+  for (certainty in answers)
+    print certainty ": " right[certainty] + 0 " of " answers[certainty]
+  print "no alarm: " silent + 0
+}

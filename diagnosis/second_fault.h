@@ -1,0 +1,110 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "diagnosis/engine_plan.h"
+#include "diagnosis/episode.h"
+#include "diagnosis/standing_fault.h"
+#include "diagnosis/verdict.h"
+
+namespace fdi {
+
+/// A name that counts beside the engine's, by a simulation of the valve.
+struct NameBeside {
+  FaultSet faults{0};    ///< Empty: there is none.
+  std::size_t bit{0};    ///< The likeliest of them.
+  double strength{0.0};  ///< Of that one; signed.
+};
+
+/// Finds what comes on top of the fault that an open episode is named after.
+///
+/// 1. Following: the name has not changed, and its strength does not move.
+/// 2. Watching: the fault at its strength belongs to what is expected. Once
+///    what is left has been inside the limits of normal operation for long, the
+///    fault is settled.
+/// 3. In doubt: the limits are exceeded, as a detection asks for. The name is
+///    held. Pairs of the settled fault and another one compete with every
+///    single fault at every strength, both on the evidence from here on.
+/// 4. Open: no single fault fits, and a pair does or none does either.
+///
+/// Of a set that does not judge the fit (FitBounds) nothing is ever second.
+/// Memory of its own is taken where 2 begins, and given back with the episode.
+class SecondFaultWatch {
+ public:
+  SecondFaultWatch(std::shared_ptr<const EnginePlan> plan,
+                   InstructionSet instructions);
+  ~SecondFaultWatch();
+  SecondFaultWatch(SecondFaultWatch&&) noexcept;
+  SecondFaultWatch& operator=(SecondFaultWatch&&) noexcept;
+
+  /// There is no episode, or it is not judged by the observers.
+  void Restart();
+
+  /// Samples are missing.
+  void Interrupt();
+
+  /// The next judged sample of an open episode, before Episode::Step().
+  void Judge(const Sample& sample, const ObserverBank& bank);
+
+  /// How Episode::Step() has to take this sample.
+  Episode::NameHold hold() const;
+  /// The first fault is gone and the second one is left: the episode is over.
+  bool outlived() const { return outlived_; }
+
+  /// The same sample, after Episode::Step().
+  void Follow(const Episode& episode, const NameBeside& beside,
+              Verdict& verdict);
+
+ private:
+  enum class Phase : std::uint8_t {
+    kNone,
+    kFollowing,
+    kWatching,
+    kDoubt,
+    kOpen
+  };
+  struct Rivals;
+
+  FaultSet NameOf(const NameBeside& beside, const Verdict& verdict) const;
+  FaultBank::Leader LeaderOf(const Episode& episode,
+                             const NameBeside& beside) const;
+  void Begin(FaultSet name);
+  void LearnMargins(const ObserverBank& composed);
+  bool Settles(const Episode& episode, bool by_physics);
+  void FollowStrength(const FaultBank::Leader& leader);
+  void Compete(const Sample& sample, const ObserverBank& bank);
+  void Balance();
+  void CountSingles();
+  void Decide();
+  double Handicap(bool own) const;
+  bool IsPair(const FaultBank::Leader& pair) const;
+  void WatchOn();
+  void GiveUp();
+  FaultSet Likely() const;
+  void Write(Verdict& verdict) const;
+
+  std::shared_ptr<const EnginePlan> plan_;
+  InstructionSet instructions_;
+  FaultSet known_{0};  // faults that some observer knows
+  std::unique_ptr<Rivals> rivals_;
+  Phase phase_{Phase::kNone};
+  FaultSet name_{0};
+  StandingFault standing_;
+  double spread_{0.0};  // mean square of what the strength strays
+  int run_{0};          // samples with this name
+  int watched_{0};      // samples with the fault as expected
+  int quiet_{0};        // samples in a row inside the limits
+  int fitting_{0};      // samples that the name fits; a misfit undoes four
+  std::array<double, kMaxChannels> margins_{};  // what it leaves, at most
+  bool settled_{false};
+  int age_{0};      // samples since the doubt began
+  int decided_{0};  // samples in a row that one fault explains
+  int paired_{0};   // samples in a row that only a pair does
+  bool outlived_{false};
+  std::int64_t stamp_ns_{0};  // of the detection of what is second
+};
+
+}  // namespace fdi
