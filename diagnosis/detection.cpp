@@ -6,14 +6,13 @@
 #include <span>
 
 namespace fdi {
-namespace {
 
-// What is left of a residual when the extrapolation in it is taken away.
-double SoftThreshold(double residual, double uncertain) {
+double CertainResidual(const ObserverBank& bank, int channel, double margin) {
+  const double residual = bank.residual(0, channel);
+  const double uncertain =
+      kExtrapolationError * bank.extrapolation(0, channel) + margin;
   return std::copysign(std::max(std::abs(residual) - uncertain, 0.0), residual);
 }
-
-}  // namespace
 
 Detection::Detection(const ModelSet& models)
     : models_(&models), windows_(models) {}
@@ -31,12 +30,10 @@ bool Detection::Push(const ObserverBank& bank, const Sample& sample,
   std::array<double, kMaxChannels> certain{};
   for (std::size_t c = 0; c < channels; ++c) {
     const int channel = static_cast<int>(c);
-    certain[c] = bank.active(channel)
-                     ? SoftThreshold(bank.residual(0, channel),
-                                     kExtrapolationError *
-                                             bank.extrapolation(0, channel) +
-                                         (margins.empty() ? 0.0 : margins[c]))
-                     : kNan;
+    certain[c] =
+        bank.active(channel)
+            ? CertainResidual(bank, channel, margins.empty() ? 0.0 : margins[c])
+            : kNan;
   }
   windows_.Push({certain.data(), channels},
                 sample.Has(Signal::kCv) ? sample[Signal::kCv] : kNan);

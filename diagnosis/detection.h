@@ -10,6 +10,11 @@
 
 namespace fdi {
 
+/// What is left of the residual of normal operation where its extrapolation and
+/// `margin` are taken away.
+double CertainResidual(const ObserverBank& bank, int channel,
+                       double margin = 0.0);
+
 /// Detects a fault: equation (1) on the residuals of the normal observer, and
 /// alike on their windows. Each test counts for itself, as its limits were
 /// fitted: noise that passes one limit now and another one next is no

@@ -198,7 +198,11 @@ Episode::Episode(std::shared_ptr<const FaultPlan> plan)
       is_taught_(std::ranges::any_of(models_->observers, IsTaught)),
       recognition_(models_->decision, models_->faults.size()),
       clearing_(*models_),
-      misfit_counts_(models_->faults.size()) {}
+      // A single disturbance, which stays in the window for t_k samples,
+      // refutes nothing.
+      misfit_counts_(models_->faults.size(),
+                     std::max(models_->decision.isolation_samples * 3 / 2,
+                              models_->decision.reisolation_samples)) {}
 
 void Episode::Score(const ObserverBank& bank, Verdict& verdict) const {
   faults_.Score(bank, verdict);
@@ -312,8 +316,7 @@ void Episode::Open(std::int64_t stamp_ns, Verdict& verdict) {
   proven_run_ = 0;
   early_ = false;
   misfits_ = 0;
-  refuted_ = 0;
-  std::ranges::fill(misfit_counts_, 0);
+  misfit_counts_.Restart();
   stood_ = 0;
   Emit(TransitionKind::kDetected, detection_stamp_ns_, verdict);
 }
@@ -492,30 +495,14 @@ FaultSet Episode::LossBeside(FaultSet set, FaultSet floor, const Sample& sample,
   return of_process || of_meter ? 0 : loss;
 }
 
-// A fault that fits only some of the time, at another strength each time, is
-// not the one that acts: the command swings, a strength does not. So a misfit
-// counts twice as much as a fit, and what is refuted stays so until it has
-// fitted for long. A single disturbance, which stays in the window for t_k
-// samples, refutes nothing, and samples that normal operation explains count
-// neither way.
+// Samples that normal operation explains count neither way.
 void Episode::CountMisfits(FaultSet misfits, const Verdict& verdict) {
-  constexpr int kWeight = 2;
-  const int refuted =
-      kWeight * std::max(models_->decision.isolation_samples * 3 / 2,
-                         models_->decision.reisolation_samples);
-  misfits_ = misfits | refuted_;
+  misfits_ = misfits | misfit_counts_.refuted();
   if (verdict.normal_factor >= models_->decision.isolation_threshold) {
     return;
   }
-  for (std::size_t i = 0; i < misfit_counts_.size(); ++i) {
-    int& count = misfit_counts_[i];
-    count =
-        std::clamp(count + (Has(misfits, i) ? kWeight : -1), 0, 2 * refuted);
-    const FaultSet fault = FaultSet{1} << i;
-    refuted_ |= count >= refuted ? fault : 0;
-    refuted_ &= count == 0 ? ~fault : ~FaultSet{0};
-  }
-  misfits_ |= refuted_;
+  misfit_counts_.Push(misfits);
+  misfits_ |= misfit_counts_.refuted();
   stood_ += IsAllOf(verdict.isolated, misfits_) ? 0 : 1;
 }
 
@@ -523,7 +510,7 @@ void Episode::CountMisfits(FaultSet misfits, const Verdict& verdict) {
 // refuted, the name is taken back: what the episode shows is outside all that
 // is known.
 void Episode::Withdraw(Verdict& verdict) {
-  if (!IsAllOf(verdict.isolated, refuted_)) {
+  if (!IsAllOf(verdict.isolated, misfit_counts_.refuted())) {
     return;
   }
   early_ = false;
@@ -572,9 +559,8 @@ void Episode::KeepName() {
   contender_run_ = 0;
   proven_run_ = 0;
   if (hold_ == NameHold::kExplained) {
-    refuted_ = 0;
     misfits_ = 0;
-    std::ranges::fill(misfit_counts_, 0);
+    misfit_counts_.Restart();
   }
 }
 

@@ -10,6 +10,7 @@
 #include "diagnosis/detection.h"
 #include "diagnosis/fault_bank.h"
 #include "diagnosis/floor.h"
+#include "diagnosis/misfit_counts.h"
 #include "diagnosis/model_set.h"
 #include "diagnosis/observer_bank.h"
 #include "diagnosis/verdict.h"
@@ -214,8 +215,7 @@ class Episode {
   FaultSet contender_{0};  // candidate to replace the isolated set
   int contender_run_{0};   // samples that supported it and no other since
   FaultSet misfits_{0};    // do not fit the last t_k samples, or refuted
-  FaultSet refuted_{0};    // have not fitted for too long
-  std::vector<int> misfit_counts_;  // by fault; a misfit counts twice
+  MisfitCounts misfit_counts_;
   int stood_{0};  // samples that a fault of the present name fitted
 };
 

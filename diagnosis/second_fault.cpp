@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "diagnosis/detection.h"
+#include "diagnosis/misfit_counts.h"
 
 namespace fdi {
 namespace {
@@ -26,17 +27,6 @@ constexpr int kMostLikely = 4;     // faults; more are no name
 constexpr double kFarAhead = 6.0;  // the same, of a fault that fits
 constexpr int kDoubtWindows = 10;  // of t_k samples: the longest doubt
 
-// What is left of a residual when what is not known of it is taken away.
-double Certain(const ObserverBank& bank, int channel, double margin = 0.0) {
-  const double residual = bank.residual(0, channel);
-  return std::copysign(
-      std::max(std::abs(residual) -
-                   kExtrapolationError * bank.extrapolation(0, channel) -
-                   margin,
-               0.0),
-      residual);
-}
-
 }  // namespace
 
 // What only an episode with a settled fault needs.
@@ -46,16 +36,16 @@ struct SecondFaultWatch::Rivals {
         detection(plan.models()),
         pair(plan.faults()),
         singles(plan.faults()),
-        misfit_counts(plan.models().faults.size()) {}
+        misfits(plan.models().faults.size(),
+                plan.models().decision.isolation_samples * 3 / 2) {}
 
   ObserverBank composed;
   Detection detection;  // on what the standing fault leaves
   Episode pair;
   Verdict verdict{};  // of the pair
   FaultBank singles;
-  std::vector<int> misfit_counts;  // of single faults
-  FaultSet refuted{0};
-  FaultSet likely{0};  // where no pair fits; as of the end of the doubt
+  MisfitCounts misfits;  // of single faults
+  FaultSet likely{0};    // where no pair fits; as of the end of the doubt
 };
 
 SecondFaultWatch::SecondFaultWatch(std::shared_ptr<const EnginePlan> plan,
@@ -112,8 +102,9 @@ void SecondFaultWatch::LearnMargins(const ObserverBank& composed) {
   }
   for (std::size_t c = 0; c < plan_->models().channels.size(); ++c) {
     const int channel = static_cast<int>(c);
-    const double left =
-        composed.active(channel) ? std::abs(Certain(composed, channel)) : 0.0;
+    const double left = composed.active(channel)
+                            ? std::abs(CertainResidual(composed, channel))
+                            : 0.0;
     if (left > 0.0) {  // Not of NaN either.
       margins_[c] = std::max(margins_[c], kMargin * left);
     }
@@ -140,8 +131,7 @@ void SecondFaultWatch::Judge(const Sample& sample, const ObserverBank& bank) {
     rivals_->verdict = {};
     rivals_->pair.Excuse(standing_.path->inputs);
     rivals_->singles.Restart();
-    std::ranges::fill(rivals_->misfit_counts, 0);
-    rivals_->refuted = 0;
+    rivals_->misfits.Restart();
   }
   if (phase_ == Phase::kDoubt || phase_ == Phase::kOpen) {
     Compete(sample, bank);
@@ -157,7 +147,7 @@ void SecondFaultWatch::Compete(const Sample& sample, const ObserverBank& bank) {
   for (std::size_t c = 0; c < plan_->models().channels.size(); ++c) {
     const int channel = static_cast<int>(c);
     verdict.residuals[c] = composed.active(channel)
-                               ? Certain(composed, channel, margins_[c])
+                               ? CertainResidual(composed, channel, margins_[c])
                                : std::numeric_limits<double>::quiet_NaN();
   }
   Findings findings;
@@ -170,7 +160,7 @@ void SecondFaultWatch::Compete(const Sample& sample, const ObserverBank& bank) {
   if (phase_ == Phase::kOpen) {
     Balance();
   }
-  CountSingles();
+  rivals_->misfits.Push(rivals_->singles.misfits());
   ++age_;
 }
 
@@ -184,22 +174,6 @@ void SecondFaultWatch::Balance() {
   rivals_->pair.RaiseTo(single - most);
 }
 
-// As Episode::CountMisfits().
-void SecondFaultWatch::CountSingles() {
-  constexpr int kWeight = 2;
-  const int refuted =
-      kWeight * plan_->models().decision.isolation_samples * 3 / 2;
-  for (std::size_t i = 0; i < rivals_->misfit_counts.size(); ++i) {
-    int& count = rivals_->misfit_counts[i];
-    count =
-        std::clamp(count + (Has(rivals_->singles.misfits(), i) ? kWeight : -1),
-                   0, 2 * refuted);
-    const FaultSet fault = FaultSet{1} << i;
-    rivals_->refuted |= count >= refuted ? fault : 0;
-    rivals_->refuted &= count == 0 ? ~fault : ~FaultSet{0};
-  }
-}
-
 void SecondFaultWatch::Decide() {
   const int quiet = 3 * plan_->models().decision.clearing_samples;
   quiet_ = rivals_->detection.pending() ? 0 : quiet_ + 1;
@@ -209,7 +183,8 @@ void SecondFaultWatch::Decide() {
   }
   const DecisionParameters& decision = plan_->models().decision;
   const FaultBank& singles = rivals_->singles;
-  const FaultSet fitting = known_ & ~rivals_->refuted & ~singles.misfits();
+  const FaultSet fitting =
+      known_ & ~rivals_->misfits.refuted() & ~singles.misfits();
   const FaultBank::Leader single = singles.LeaderOf(fitting);
   const FaultBank::Leader pair = rivals_->pair.LeaderOf(known_ & ~name_);
   const bool own =
@@ -225,7 +200,7 @@ void SecondFaultWatch::Decide() {
     return;
   }
   paired_ = IsPair(pair) ? paired_ + 1 : 0;
-  const bool by_none = (known_ & ~rivals_->refuted) == 0;
+  const bool by_none = (known_ & ~rivals_->misfits.refuted()) == 0;
   if (phase_ == Phase::kDoubt &&
       (by_none || paired_ >= decision.isolation_samples)) {
     phase_ = Phase::kOpen;
@@ -252,7 +227,7 @@ bool SecondFaultWatch::IsPair(const FaultBank::Leader& pair) const {
   if (pair.path == nullptr || (rivals_->verdict.isolated & ~name_) == 0) {
     return false;
   }
-  const bool misfit = (name_ & ~rivals_->refuted) == 0;
+  const bool misfit = (name_ & ~rivals_->misfits.refuted()) == 0;
   const double ahead =
       pair.evidence -
       std::max(singles.LeaderOf(name_).evidence, singles.normal_evidence());

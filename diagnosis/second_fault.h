@@ -77,7 +77,6 @@ class SecondFaultWatch {
   void FollowStrength(const FaultBank::Leader& leader);
   void Compete(const Sample& sample, const ObserverBank& bank);
   void Balance();
-  void CountSingles();
   void Decide();
   double Handicap(bool own) const;
   bool IsPair(const FaultBank::Leader& pair) const;

@@ -1,5 +1,7 @@
 #include "diagnosis/verdict.h"
 
+#include <utility>
+
 namespace fdi {
 namespace {
 
@@ -67,6 +69,12 @@ std::string_view TransitionName(TransitionKind kind) {
   return NameOf(kind, std::array<std::string_view, 7>{
                           "DETECTED", "ISOLATED", "REISOLATED", "CLEARED",
                           "CLOSED", "CHANGED", "SECOND"});
+}
+
+std::string SecondValue(const SecondFault& second, std::string names) {
+  return !second.open         ? "none"
+         : second.faults == 0 ? "unknown"
+                              : std::move(names);
 }
 
 std::string_view EndReasonName(EndReason reason) {

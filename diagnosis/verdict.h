@@ -121,6 +121,10 @@ struct SecondFault {
   double factor{0.0};    ///< The largest of theirs.
 };
 
+/// The value of TransitionKind::kSecond: `names`, those of second.faults, or
+/// "unknown", or "none" where it is over.
+std::string SecondValue(const SecondFault& second, std::string names);
+
 /// A transition of an episode.
 struct Transition {
   TransitionKind kind{TransitionKind::kDetected};

@@ -199,10 +199,11 @@ Json MarksOf(const std::vector<storage::HistoryEntry>& events) {
   Json marks = Json::array();
   for (const storage::HistoryEntry& event : events) {
     if (event.who.empty()) {
-      marks.push_back(
-          {{"t_ms", Ms(event.stamp_ns)},
-           {"kind", event.kind},
-           {"text", event.faults.empty() ? event.reason : event.faults}});
+      marks.push_back({{"t_ms", Ms(event.stamp_ns)},
+                       {"kind", event.kind},
+                       {"text", !event.value.empty()   ? event.value
+                                : event.faults.empty() ? event.reason
+                                                       : event.faults}});
     }
   }
   return marks;

@@ -45,6 +45,11 @@ report::Json EventJson(const FaultEvent& event, bool persisted,
   const report::FaultWords words =
       texts.Words(fault, t.strength, PriorityOf(t.severity));
   const bool closed = t.kind == TransitionKind::kClosed;
+  report::Json second;
+  if (t.kind == TransitionKind::kSecond && event.models != nullptr) {
+    second =
+        SecondValue(t.second, FaultSetName(*event.models, t.second.faults));
+  }
   storage::Episode episode;
   episode.valve_id = event.valve_id;
   episode.fault = fault.empty() ? std::nullopt : std::optional(fault);
@@ -56,6 +61,7 @@ report::Json EventJson(const FaultEvent& event, bool persisted,
       {"episode_id", storage::EpisodeIdText(event.episode_id)},
       {"stamp_utc", FormatTime(t.stamp_ns, true)},
       {"fault", fault.empty() ? report::Json() : report::Json(fault)},
+      {"second", second},
       {"name", named ? report::Json(words.name) : report::Json()},
       {"certainty", CertaintyName(CertaintyOf(event))},
       {"look_alikes", LookAlikesOf(event)},

@@ -73,13 +73,11 @@ struct Entry {
 
   std::string IsolatedNames() const { return NamesOf(transition.faults); }
 
-  // Of SECOND: the faults on top of those, "unknown", or that there are none.
   std::string Value() const {
     const SecondFault& second = transition.second;
-    return transition.kind != TransitionKind::kSecond ? ""
-           : !second.open                             ? "none"
-           : second.faults == 0                       ? "unknown"
-                                                      : NamesOf(second.faults);
+    return transition.kind == TransitionKind::kSecond
+               ? SecondValue(second, NamesOf(second.faults))
+               : "";
   }
 };
 

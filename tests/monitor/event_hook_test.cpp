@@ -288,6 +288,18 @@ TEST(EventJsonTest, EventSpeaksTheLanguageOfTheCatalogue) {
   EXPECT_EQ(changed["kind"], "CHANGED");
   EXPECT_EQ(changed["severity"], "high");
   EXPECT_EQ(changed["priority"], 2);
+  EXPECT_TRUE(changed["second"].is_null());
+
+  event.transition.kind = TransitionKind::kSecond;
+  event.transition.second.open = true;
+  event.transition.second.faults = 1;
+  const report::Json second = EventJson(event, true, texts);
+  EXPECT_EQ(second["fault"], "f7");
+  EXPECT_EQ(second["second"], FaultSetName(*event.models, 1));
+  event.transition.second.faults = 0;
+  EXPECT_EQ(EventJson(event, true, texts)["second"], "unknown");
+  event.transition.second = {};
+  EXPECT_EQ(EventJson(event, true, texts)["second"], "none");
 }
 
 TEST(EventJsonTest, AShelvedAlarmSaysSo) {
