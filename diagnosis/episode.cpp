@@ -178,6 +178,12 @@ bool ClearingWindow::Cleared() const {
 
 namespace {
 
+// An episode that has lasted for a day, and for so many memories of the
+// evidence, is long; a fault that is contradicted for so many is refuted.
+constexpr double kLongS = 86400.0;
+constexpr double kLongMemories = 4.0;
+constexpr double kRefutingMemories = 2.0;
+
 // A stuck transmitter is certain, so observers are not needed.
 void ApplyStuckFindings(FaultSet stuck, Verdict& verdict) {
   verdict.normal_factor = 0.0;
@@ -202,7 +208,13 @@ Episode::Episode(std::shared_ptr<const FaultPlan> plan)
       // refutes nothing.
       misfit_counts_(models_->faults.size(),
                      std::max(models_->decision.isolation_samples * 3 / 2,
-                              models_->decision.reisolation_samples)) {}
+                              models_->decision.reisolation_samples)),
+      names_last_(models_->physics.empty() &&
+                  models_->decision.interpolation_allowance > 0.0),
+      contradictions_(models_->faults.size(),
+                      static_cast<int>(kRefutingMemories *
+                                       models_->decision.evidence_window)),
+      shares_(models_->faults.size()) {}
 
 void Episode::Score(const ObserverBank& bank, Verdict& verdict) const {
   faults_.Score(bank, verdict);
@@ -317,6 +329,8 @@ void Episode::Open(std::int64_t stamp_ns, Verdict& verdict) {
   early_ = false;
   misfits_ = 0;
   misfit_counts_.Restart();
+  contradictions_.Restart();
+  std::ranges::fill(shares_, 0.0);
   stood_ = 0;
   Emit(TransitionKind::kDetected, detection_stamp_ns_, verdict);
 }
@@ -554,6 +568,51 @@ void Episode::NameEarly(const Sample& sample, FaultSet beginning,
   }
 }
 
+bool Episode::IsLong() const {
+  return age_ > std::max(kLongS / models_->sample_period_s,
+                         kLongMemories * models_->decision.evidence_window);
+}
+
+// The memory of a share is half the age. Samples that support no set count
+// neither way.
+void Episode::CountSupport(FaultSet supported) {
+  if (!names_last_) {
+    return;
+  }
+  contradictions_.Push(faults_.Contradicted());
+  const double gain = std::min(1.0, 2.0 / std::max(age_, 1));
+  for (std::size_t i = 0; supported != 0 && i < shares_.size(); ++i) {
+    shares_[i] += gain * ((Has(supported, i) ? 1.0 : 0.0) - shares_[i]);
+  }
+}
+
+// A fault that grows slowly passes for hours between two trained strengths,
+// where a look-alike may be ahead that is just at one of its own. To be ahead
+// is not to refute: in a long episode a fault leaves the name once the evidence
+// refutes it, or has supported it for next to nothing of the episode, and
+// joins it if it is supported for more than a while. A set too large to be a
+// diagnosis says nothing against the name.
+FaultSet Episode::Lasting(FaultSet supported, const Verdict& verdict) const {
+  constexpr double kJoining = 0.5;
+  constexpr double kLeaving = 0.25;
+  FaultSet standing = verdict.isolated & ~floor_names_;
+  FaultSet joining = supported & ~floor_names_;
+  if (!names_last_ || standing == 0 || !IsLong()) {
+    return supported;
+  }
+  for (std::size_t i = 0; i < shares_.size(); ++i) {
+    const FaultSet fault = FaultSet{1} << i;
+    const bool refuted = (contradictions_.refuted() & fault) != 0;
+    joining &= refuted || shares_[i] < kJoining ? ~fault : ~FaultSet{0};
+    standing &= refuted || shares_[i] < kLeaving ? ~fault : ~FaultSet{0};
+  }
+  if (standing == 0) {
+    return supported;
+  }
+  const FaultSet both = standing | joining;
+  return std::popcount(both) > kMaxFaultSetSize ? joining : both;
+}
+
 // What the name does not explain comes on top of it, or may.
 void Episode::KeepName() {
   contender_run_ = 0;
@@ -579,6 +638,7 @@ void Episode::Isolate(const Sample& sample, const Findings& findings,
   }
   Withdraw(verdict);
   FaultSet supported = isolation_.Supported();
+  CountSupport(supported);
   if (IsAllOf(supported, misfits_)) {
     supported = 0;
   }
@@ -599,6 +659,7 @@ void Episode::Isolate(const Sample& sample, const Findings& findings,
   if (models_->floor && std::popcount(supported) > kMaxFaultSetSize) {
     supported = floor_;
   }
+  supported = Lasting(supported, verdict);
   supported |= LossBeside(supported, floor_, sample, verdict);
   // The first fault replaces findings of the floor at once, and the first set
   // of equation (6) a name that came before it.

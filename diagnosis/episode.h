@@ -172,6 +172,9 @@ class Episode {
   FaultSet LossBeside(FaultSet set, FaultSet floor, const Sample& sample,
                       const Verdict& verdict) const;
   void CountMisfits(FaultSet misfits, const Verdict& verdict);
+  bool IsLong() const;
+  void CountSupport(FaultSet supported);
+  FaultSet Lasting(FaultSet supported, const Verdict& verdict) const;
   void KeepName();
   void Withdraw(Verdict& verdict);
   bool ExplainsLoss(FaultSet set, const Verdict& verdict) const;
@@ -216,6 +219,11 @@ class Episode {
   int contender_run_{0};   // samples that supported it and no other since
   FaultSet misfits_{0};    // do not fit the last t_k samples, or refuted
   MisfitCounts misfit_counts_;
+  // What the evidence refutes; counted in sets without a second look, which
+  // have no other rule for a name that changes with a growing strength.
+  bool names_last_;
+  MisfitCounts contradictions_;
+  std::vector<double> shares_;  // of the episode that supported each fault
   int stood_{0};  // samples that a fault of the present name fitted
 };
 

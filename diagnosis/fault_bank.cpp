@@ -103,6 +103,10 @@ double FaultBank::Allowance() const {
       interpolation = tracker.Interpolation(trained_);
     }
   }
+  return AllowanceOf(interpolation);
+}
+
+double FaultBank::AllowanceOf(double interpolation) const {
   return plan_->models().decision.interpolation_allowance * interpolation *
          std::accumulate(effects_.begin(), effects_.end(), 0.0);
 }
@@ -221,6 +225,25 @@ FaultSet FaultBank::Unrefuted(double margin) const {
     }
   }
   return unrefuted;
+}
+
+FaultSet FaultBank::Contradicted() const {
+  const DecisionParameters& decision = plan_->models().decision;
+  if (decision.interpolation_allowance <= 0.0) {
+    return 0;
+  }
+  const double best = BestEvidence();
+  FaultSet contradicted = 0;
+  FaultSet standing = 0;
+  for (const StrengthTracker& tracker : trackers_) {
+    const double allowance =
+        std::max(allowance_, AllowanceOf(tracker.TrackedInterpolation()));
+    const bool behind = best - tracker.evidence(trained_) - allowance >=
+                        decision.evidence_support;
+    (behind ? contradicted : standing) |= FaultSet{1}
+                                          << tracker.path().fault_index;
+  }
+  return contradicted & ~standing;
 }
 
 FaultSet FaultBank::Recognised(double margin, bool fitting) const {

@@ -69,6 +69,11 @@ class FaultBank {
   FaultSet misfits() const { return misfits_; }
   bool judges_fit() const { return plan_->judges_fit(); }
 
+  /// The faults that the evidence refutes (by the support or more), even if the
+  /// allowance is that of their own place between two trained strengths: none
+  /// where the set has no allowance for interpolation.
+  FaultSet Contradicted() const;
+
   /// The explanation of `faults` with the most evidence, tracked or trained.
   struct Leader {
     const StrengthPath* path{nullptr};  ///< Null: there is none.
@@ -88,6 +93,7 @@ class FaultBank {
   double BestEvidence() const;
   void UpdateEffect(const ObserverBank& bank);
   double Allowance() const;
+  double AllowanceOf(double interpolation) const;
   double EvidenceMembership(double behind) const;
   bool SuitsInputs(const StrengthTracker& tracker) const;
   bool Fits(const StrengthTracker& tracker) const;

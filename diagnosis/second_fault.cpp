@@ -375,6 +375,10 @@ void SecondFaultWatch::Write(Verdict& verdict) const {
   second.doubt = phase_ == Phase::kDoubt;
   second.open = phase_ == Phase::kOpen;
   second.standing = second.doubt || second.open ? name_ : FaultSet{0};
+  if (standing_.path != nullptr && !standing_.path->taught) {
+    second.standing_bit = standing_.path->fault_index;
+    second.standing_strength = standing_.path->sign * standing_.strength;
+  }
   if (!second.open) {
     return;
   }

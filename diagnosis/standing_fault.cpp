@@ -3,14 +3,16 @@
 #include <algorithm>
 #include <cmath>
 
+#include "diagnosis/fault_catalogue.h"
+
 namespace fdi {
 namespace {
 
 // The model of a fault is off by as much of its effect: the deviation of the
 // second look (docs/method.md, 19).
 constexpr double kEffectError = 0.05;
-// A flow below this share of the largest that is predicted has no ratio.
-constexpr double kMinFlowShare = 0.02;
+// Below this share of the largest that is predicted there is no ratio.
+constexpr double kMinShare = 0.02;
 constexpr double kMinRatio = 1e-3;
 constexpr double kMaxRatio = 10.0;
 
@@ -37,8 +39,8 @@ StandingEffect::StandingEffect(const ObserverBank& bank, const ModelSet& models,
     const double normal = bank.prediction(0, channel);
     const TsModel& model = models.observers.front().channels[c].model;
     shifts_[c] = faulty - normal;
-    if (model.output == Signal::kF &&
-        normal > kMinFlowShare * model.output_max) {
+    if ((kRodSignals & MaskOf(model.output)) != 0 &&
+        normal > kMinShare * model.output_max) {
       ratios_[c] = std::clamp(faulty / normal, kMinRatio, kMaxRatio);
     }
     const double interpolation =

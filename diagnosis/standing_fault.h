@@ -16,12 +16,13 @@ struct StandingFault {
 
 /// What a standing fault makes of the predictions for one sample, by channel.
 ///
-/// Effects on the flow multiply, those on every other output add up,
+/// Effects on rod and flow multiply, those on every other output add up,
 ///
-///     F_fg = F_g F_f/F_0,   y_fg = y_g + (y_f - y_0),
+///     X_fg = X_g X_f/X_0,   F_fg = F_g F_f/F_0,   y_fg = y_g + (y_f - y_0),
 ///
-/// because what narrows a valve passes a share of the flow, and what shifts a
-/// reading shifts it whatever else acts.
+/// because what narrows a valve passes a share of the flow, a position
+/// transmitter that is wrong reads a share of wherever the rod stands, and what
+/// shifts another reading shifts it whatever else acts.
 class StandingEffect {
  public:
   /// @param bank with the predictions of every observer for this sample.

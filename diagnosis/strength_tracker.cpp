@@ -77,9 +77,12 @@ double StrengthTracker::strength(const ObserverEvidence& trained) const {
 }
 
 double StrengthTracker::Interpolation(const ObserverEvidence& trained) const {
-  if (trained.total(BestNode(trained).observer) >= total_) {
-    return 0.0;
-  }
+  return trained.total(BestNode(trained).observer) >= total_
+             ? 0.0
+             : TrackedInterpolation();
+}
+
+double StrengthTracker::TrackedInterpolation() const {
   const PathPlace place = path_->PlaceOf(strength_);
   const double h = place.from_low / (path_->nodes[place.segment + 1].strength -
                                      path_->nodes[place.segment].strength);

@@ -54,6 +54,8 @@ class StrengthTracker {
   /// How far that explanation lies from a trained strength, 4 |h (1 − h)| at a
   /// share h of the way between two of them: 0 at either, 1 midway and at most.
   double Interpolation(const ObserverEvidence& trained) const;
+  /// The same of the tracked strength, whichever explains better.
+  double TrackedInterpolation() const;
 
   /// True once a reading since the detection could have refuted the fault: on a
   /// channel where it differs from normal operation and the transmitter's limit

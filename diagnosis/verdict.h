@@ -115,6 +115,8 @@ struct SecondFault {
   bool open{false};      ///< There is something.
   bool doubt{false};     ///< There may be: the name is to stay meanwhile.
   FaultSet standing{0};  ///< What it is on top of.
+  std::size_t standing_bit{0};    ///< The likeliest of that,
+  double standing_strength{0.0};  ///< and its strength, signed.
   std::int64_t detection_stamp_ns{0};
   FaultSet faults{0};    ///< Its name; empty: what it is cannot be told.
   double strength{0.0};  ///< Of the likeliest of them.

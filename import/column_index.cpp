@@ -176,6 +176,8 @@ void ColumnIndex::IndexRows() {
   }
 }
 
+// Of a wide table the begin of each cell is kept, in bytes from that of the
+// record; of a long one the rows of each tag.
 void ColumnIndex::TakeRecord(std::size_t begin, std::size_t end,
                              std::size_t line) {
   const std::string_view record(text_.data() + begin, end - begin);
@@ -240,6 +242,8 @@ std::size_t ColumnIndex::bytes() const {
          cells_.capacity() * sizeof(std::uint32_t);
 }
 
+// Rows keep their line: an empty line stands for each that is left out, so that
+// ReadCsv() reports mistakes by the lines of the original file.
 std::string ColumnIndex::Project(
     const std::vector<std::string>& tags, const std::string& words_of,
     const std::map<std::string, std::string>& words) const {

@@ -9,6 +9,11 @@
 #include "base/toml_reader.h"
 #include "import/tag_map.h"
 
+// Both forms of the table, TOML and CSV, are first read into a RawTable: cells
+// of text by key, the defaults apart from the rows. RowReader makes the rows
+// from it, so that a key means the same in both forms. What is wrong with one
+// row stays with that row; what is wrong with the file or its defaults is
+// thrown.
 namespace fdi::importer {
 namespace {
 
@@ -29,6 +34,8 @@ std::string Lower(std::string text) {
   return text;
 }
 
+// All keys of a row. A tag has a unit and a range, but the mode, which is
+// words.
 std::vector<std::string> KnownKeys() {
   std::vector<std::string> keys(std::begin(kOtherKeys), std::end(kOtherKeys));
   for (const std::string_view tag : kTagNames) {
@@ -70,6 +77,8 @@ bool MatchesStars(std::string_view pattern, std::string_view text) {
   return pattern.find_first_not_of('*', p) == std::string_view::npos;
 }
 
+// The words of a list. Three separators are accepted, because in CSV one of
+// them may separate the cells; lists of TOML arrive with commas.
 std::vector<std::string> Words(const std::string& text) {
   std::vector<std::string> words;
   std::size_t begin = 0;
@@ -93,6 +102,8 @@ class RowReader {
   RowReader(const NamedCells& own, std::span<const NamedCells* const> defaults)
       : own_(own), defaults_(defaults) {}
 
+  // Name and group come first: they fill the placeholders of the tags and
+  // files.
   PlantRow Read(std::string place) {
     row_.place = std::move(place);
     row_.name = Cell("name");
@@ -109,6 +120,7 @@ class RowReader {
   }
 
  private:
+  // Only the first mistake is reported: later ones may just follow from it.
   void Refuse(const std::string& what) {
     if (row_.error.empty()) {
       row_.error = what;
@@ -135,6 +147,8 @@ class RowReader {
     return {};
   }
 
+  // Replaces {loop} and {group}. The search goes on behind what was filled in,
+  // so a brace in a name is not taken for a placeholder.
   std::string Filled(std::string text) {
     std::size_t begin = 0;
     while ((begin = text.find('{', begin)) != std::string::npos) {
@@ -153,6 +167,8 @@ class RowReader {
     return text;
   }
 
+  // The name becomes the pattern of the valve's entry in models.db, where a
+  // star or a question mark would match other valves, too.
   void CheckName() {
     const std::string& name = row_.name;
     if (name.empty()) {
@@ -171,6 +187,8 @@ class RowReader {
       const std::string key(kTagNames[i]);
       TagCell& tag = row_.tags[i];
       tag.pattern = Filled(Cell(key));
+      // A tag that the row itself states has to be in the file; one of a
+      // default may be missing (MatchTags).
       tag.own = IsOwn(key);
       tag.unit = Cell(key + "_unit");
       if (const std::string range = Cell(key + "_range"); !range.empty()) {
@@ -238,6 +256,9 @@ struct RawTable {
   std::vector<Row> rows;
 };
 
+// A cell is that of the row, else of its group, else of the defaults of all.
+// The group itself may be a default of all, so it is found out before the rest.
+// Of rows with one name, all but the first are refused.
 std::vector<PlantRow> RowsOf(const RawTable& raw) {
   static const NamedCells kNone;
   std::vector<PlantRow> rows;
@@ -271,6 +292,7 @@ std::vector<PlantRow> RowsOf(const RawTable& raw) {
 
 // A number, a range or a list of the file as text, as in a cell of CSV.
 std::string CellOf(TomlReader& table, const std::string& key) {
+  // The reader refuses a value of another type, so the types are tried in turn.
   const auto tried = [](const auto& read) -> std::optional<std::string> {
     try {
       return read();
@@ -357,6 +379,10 @@ RawTable ReadToml(TomlReader& file, PlantTable& table) {
   return raw;
 }
 
+// The rows of a CSV. A line that begins with # is a comment, unless a quoted
+// cell is open. The separator is found out from the first fifty lines, the
+// first row is the header, and rows with the name * are defaults: of the group
+// that they name, or of all.
 RawTable ReadCells(const std::string& text, const PlantTable& table) {
   std::vector<std::string_view> lines;
   for (std::string_view rest = text; !rest.empty();) {
@@ -452,6 +478,8 @@ PlantTable ReadPlantTable(const std::filesystem::path& path) {
   return table;
 }
 
+// Two columns of a file may have one name, hence the multimaps. That makes the
+// name ambiguous for the rows that use it, but the file can still be read.
 TagNames::TagNames(std::vector<std::string> names) : names_(std::move(names)) {
   for (std::size_t i = 0; i < names_.size(); ++i) {
     lower_.push_back(Lower(names_[i]));
@@ -460,6 +488,8 @@ TagNames::TagNames(std::vector<std::string> names) : names_(std::move(names)) {
   }
 }
 
+// The same spelling wins over other cases, and both win over stars, so that a
+// tag can be stated which has a star in its own name.
 std::vector<std::string> TagNames::Find(const std::string& pattern) const {
   std::vector<std::size_t> found;
   const auto look_up = [&](const auto& names, const std::string& name) {
@@ -505,6 +535,8 @@ std::vector<std::string> TagNames::Like(const std::string& part) const {
   return like;
 }
 
+// Every tag is looked up even if an earlier one was refused: the dry run lists
+// all that is not there or ambiguous, while the row is refused for the first.
 TagMatch MatchTags(const PlantRow& row, const TagNames& names,
                    const std::string& source) {
   TagMatch match;
@@ -577,7 +609,9 @@ void Bound(const std::optional<std::pair<double, double>>& range,
   }
 }
 
-// The reading in the unit of the signal; see ReadUnit() of tag_map.cpp.
+// The reading in the unit of the signal; see ReadUnit() of tag_map.cpp. Of op
+// and x the range of the row is spread over 0..100 %, whatever the unit, and is
+// 4..20 for mA. Of the others the range only bounds what counts as a reading.
 ColumnMapping MappingOf(const PlantRow& row, LoopTag tag, Signal signal,
                         const std::string& column, ColumnMap& map) {
   const TagCell& cell = row[tag];
@@ -626,6 +660,7 @@ ColumnMapping MappingOf(const PlantRow& row, LoopTag tag, Signal signal,
 
 ColumnMap LoopColumns(const PlantRow& row, const TagMatch& match,
                       ColumnMap file) {
+  // The audit has no model, and reads the measured value of any loop as F.
   file.columns = {
       MappingOf(row, LoopTag::kOp, Signal::kCv, match[LoopTag::kOp], file)};
   if (!match[LoopTag::kX].empty()) {

@@ -10,6 +10,9 @@
 #include "base/time_text.h"
 #include "base/toml_reader.h"
 
+// A tag map says which column is which signal, and in what unit
+// (docs/import.md, "The map"). Raw counts, span and unit of a column become one
+// straight line, reading = offset + scale · cell.
 namespace fdi::importer {
 namespace {
 
@@ -49,6 +52,8 @@ struct UnitEntry {
 
 constexpr FlowUnit kVolume = FlowUnit::kM3PerHour;
 constexpr FlowUnit kMass = FlowUnit::kTPerHour;
+// To %, kPa, degC, and m3/h or t/h, with scale and offset. The unit of a flow
+// also says whether it is one of volume or of mass.
 constexpr UnitEntry kSignalUnits[] = {
     {"%", Quantity::kPercent, {1.0, 0.0, kVolume}},
     {"1", Quantity::kPercent, {100.0, 0.0, kVolume}},

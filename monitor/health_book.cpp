@@ -9,6 +9,11 @@
 #include "monitor/checkpoint.h"
 #include "monitor/counters.h"
 
+// All sums of an hour are integers, in quanta of what they count: time in ms,
+// travel, shares and residuals in units of their own. Integers add up exactly
+// in any order, so an hour that was cut in parts by restarts and checkpoints
+// has the same figures as one that was not (docs/planner.md, "Health by
+// hours").
 namespace fdi::monitor {
 namespace {
 
@@ -26,6 +31,8 @@ std::int64_t Quanta(double value, double quantum, double limit) {
   return std::llround(std::clamp(value / quantum, -limit, limit));
 }
 
+// The quantum of a channel is a power of two: the largest of which
+// kQuantaPerBand fit between the thresholds.
 HealthChannel ChannelOf(const ChannelSpec& channel) {
   const double band = channel.upper_threshold - channel.lower_threshold;
   const double exponent =
@@ -107,6 +114,8 @@ void HealthBook::Add(const Sample& sample, const Verdict& verdict,
       hour.AddStroke(std::move(test));
     }
   }
+  // Where no further row may be begun, At() returns another one. Time counts
+  // there, too, but residuals and decisions belong to their own model set.
   if (models != nullptr && verdict.quality == Quality::kLive &&
       hour.SameKey(key)) {
     AddDecision(verdict, *models, period_ms, hour);
@@ -157,6 +166,8 @@ void HealthBook::AddCounts(const Sample& sample, double period_s,
       hour.counts);
 }
 
+// By X, and by CV while X cannot be used. The step from one to the other, or to
+// another source of the samples, is no travel.
 void HealthBook::AddStroke(const Sample& sample, std::int64_t period_ms,
                            HealthHour& hour) {
   const double x = GoodReading(sample, Signal::kX);
@@ -188,6 +199,7 @@ void HealthBooks::OnVerdict(const std::string& valve_id, const Sample& sample,
   }
 }
 
+// The counter of strokes is of whole ones: what is left counts the next time.
 void HealthBooks::Drain(const std::string& valve_id, HealthBook& book,
                         std::vector<HealthHour>& hours) {
   const std::size_t known = hours.size();

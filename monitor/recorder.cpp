@@ -7,6 +7,9 @@
 
 #include "base/printable.h"
 
+// Record() runs in the diagnosis thread, everything that Run() calls in the
+// recorder's, which alone uses the sink. They share the queue, the counters and
+// what `missing_mutex_` guards: CountDropped() is called by both.
 namespace fdi::monitor {
 namespace {
 
@@ -75,6 +78,9 @@ void Recorder::Run() {
   Close();
 }
 
+// While commits fail only the period leads to another one, not the number of
+// samples: each try costs time in which the queue fills. What waits is dropped
+// at the limit.
 void Recorder::Take(const ReceivedSample& sample) {
   try {
     sink_.Append(sample);
@@ -119,6 +125,7 @@ void Recorder::Close() {
   }
   {
     const MutexLock lock(missing_mutex_);
+    // No commit period follows, so the gap is reported now.
     missing_more_ = false;
   }
   ReportMissing();

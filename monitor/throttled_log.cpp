@@ -22,6 +22,8 @@ std::string LogLine(LogId id, std::string_view event, std::string_view fields) {
   return line.append(" id=").append(IdName(id)).append(" ").append(fields);
 }
 
+// The first lines of an interval are shown and the others counted. Their number
+// is told by the first line that is shown again.
 bool LogLimit::Admit(std::string_view kind, std::uint64_t& not_shown) {
   const auto now = std::chrono::steady_clock::now();
   const MutexLock lock(mutex_);
@@ -58,6 +60,7 @@ void ThrottledLog::Line(LogLevel level, std::string_view line) const {
   }
 }
 
+// The kind of a line is its first word, the name of the event.
 LogSink LimitLog(LogSink sink, const LogLimitOptions& options) {
   return [sink = std::move(sink), limit = std::make_shared<LogLimit>(options)](
              LogLevel level, std::string_view line) {

@@ -5,6 +5,10 @@
 #include <cmath>
 #include <utility>
 
+// Four rings of equal length hold one row for each instant: head, signals,
+// residuals and factors. A factor is kept in 1/32768 and a residual as a float,
+// which is enough to show; signals stay exact, because what is stored of an
+// episode may be learnt from (docs/learning.md).
 namespace fdi::monitor {
 namespace {
 
@@ -64,6 +68,8 @@ void Trace::Begin(const Sample& sample, const Verdict& verdict, int channels,
   layout_.faults = static_cast<std::size_t>(faults);
 }
 
+// The rings double up to the capacity, so that a short trace takes little
+// memory.
 void Trace::Grow() {
   const std::size_t rows =
       std::min(capacity_, std::max(kFirstGrowth, 2 * heads_.size()));
@@ -75,6 +81,8 @@ void Trace::Grow() {
 }
 
 void Trace::MakeRoom(std::int64_t stamp_ns) {
+  // First what is too old, then, if the rings are full at their capacity, the
+  // oldest.
   while (size_ > 0 && stamp_ns - heads_[first_].stamp_ns > span_ns_) {
     first_ = Row(1);
     --size_;

@@ -21,6 +21,11 @@
 #include "storage/models/models.h"
 #include "storage/models/plant_loops.h"
 
+// The report is made in two steps. `Fleet` puts what the history and the caller
+// know into one document of JSON, which is also what `report.json` keeps for
+// the comparison with the next report. AddViews() then shows parts of that
+// document to people and finds nothing new. docs/reports.md explains the score,
+// docs/json.md the keys.
 namespace fdi::planner {
 namespace {
 
@@ -30,6 +35,7 @@ using report::Json;
 using report::Tone;
 using storage::Episode;
 
+// An audit has no decision factor: these are the confidence of its verdicts.
 constexpr double kSureAudit = 0.9;
 constexpr double kLikelyAudit = 0.5;
 // A loop that was judged for a smaller share of the time is listed as such.
@@ -88,10 +94,14 @@ std::string QualityText(const std::string& quality) {
   return quality;
 }
 
+// How much a loop counts by its grade. A loop without one counts as grade 2, so
+// a plant that states no grades is ranked by severity and confidence alone.
 double GradeFactor(std::optional<int> grade) {
   return grade == 1 ? 2.0 : grade == 3 ? 0.5 : 1.0;
 }
 
+// One line of the report: what is wrong with a loop, or with several loops that
+// share a cause or a period.
 struct Finding {
   std::vector<std::string> valves;
   std::string shares;  // What they have in common; empty: one loop.
@@ -117,6 +127,8 @@ struct Finding {
   }
 };
 
+// The order of the report. Equal scores are decided by what is open and then by
+// the ids, so that the same facts give the same report line by line.
 bool IsWorse(const Finding& a, const Finding& b) {
   if (a.score() != b.score()) {
     return a.score() > b.score();
@@ -150,6 +162,9 @@ class Fleet {
       Know(valve);
       named_.insert(valve);
     }
+    // The order matters. FindAudits() looks for the named fault of its loop,
+    // and MergeShared() needs the findings of both. They are sorted when none
+    // will be joined with another any more.
     if (history != nullptr) {
       ReadTimes();
       FindFaults();
@@ -170,6 +185,8 @@ class Fleet {
   Json Document() const;
 
  private:
+  // A loop that nobody has listed, but which was heard, recorded or found,
+  // counts as one of the plant: the coverage must not leave it out.
   void Know(const std::string& valve) {
     loops_.try_emplace(valve, FleetLoop{valve});
   }
@@ -211,6 +228,8 @@ class Fleet {
   std::vector<Finding> findings_;
 };
 
+// Adds up the hours of each valve. Of the qualities other than LIVE the one
+// that lasted longest is kept, which says why the valve was not judged.
 void Fleet::ReadTimes() {
   storage::EpisodeFilter filter;
   filter.since_ns = query_.since_ns;
@@ -247,6 +266,10 @@ std::map<std::string, Episode> Fleet::Episodes() const {
   return episodes;
 }
 
+// A loop has one finding: of its faults the one with the largest product of
+// severity and confidence, and of equal ones one that still lasts. Age and
+// repetition, which weigh in the work list that the faults are read from, are
+// left out: a report says what is worst, not what to open first.
 void Fleet::FindFaults() {
   WorkQuery work;
   work.since_ns = query_.since_ns;
@@ -378,6 +401,8 @@ void Fleet::Merge(const std::string& shares,
   findings_.push_back(std::move(all));
 }
 
+// Common causes come first: what was joined has `shares` set and is left alone
+// afterwards, so a loop with both a cause and a period is listed by its cause.
 void Fleet::MergeShared() {
   for (const storage::CommonCause& cause : query_.causes) {
     // The finding may be a newer episode with the same fault.
@@ -399,6 +424,8 @@ void Fleet::MergeShared() {
   }
 }
 
+// The quality that lasted longest, or else what the plant's table says about
+// the record; and, with either, why the audit could not judge the loop.
 std::string Fleet::WhyNotJudged(const std::string& valve) const {
   const auto time = times_.find(valve);
   std::string why;
@@ -484,6 +511,9 @@ Json Fleet::SharedJson() const {
   return list;
 }
 
+// Loops that nothing watched, and loops with named faults that were judged for
+// less than half of the time in which they were heard. A loop that is only
+// audited has no such share: the audit judges windows, not hours.
 Json Fleet::UnjudgedJson() const {
   Json list = Json::array();
   for (const auto& [valve, loop] : loops_) {
@@ -539,6 +569,8 @@ Json Fleet::LoopsJson() const {
   return list;
 }
 
+// Each loop counts once: one that is both judged for named faults and audited
+// counts among the named faults, so the three numbers add up to all loops.
 Json Fleet::CoverageJson() const {
   std::size_t names = 0;
   std::size_t audit = 0;
@@ -564,6 +596,8 @@ struct Said {
   bool unjudged{false};
 };
 
+// Reads a document instead of a Fleet, because of the last report there is only
+// the document, and both sides of a comparison should be read in the same way.
 std::map<std::string, Said> SaidIn(const Json& document) {
   std::map<std::string, Said> said;
   for (const char* part : {"worst", "others"}) {
@@ -590,7 +624,9 @@ std::string SaidText(const Said& said) {
   return said.name.empty() ? "" : said.name + ", " + said.severity;
 }
 
-// How a loop has changed; empty: not, or not enough to say.
+// How a loop has changed; empty: not, or not enough to say. What was found and
+// whether the loop was judged are compared one by one, so a loop may have two
+// changes. Worse and better are by severity: a change of confidence is none.
 std::vector<std::string> ChangesOf(const Said& before, const Said& now) {
   std::vector<std::string> changes;
   if (before.fault.empty() != now.fault.empty()) {
@@ -611,6 +647,8 @@ std::vector<std::string> ChangesOf(const Said& before, const Said& now) {
   return changes;
 }
 
+// Whatever is wrong with the last document ends as one DataError: it may be a
+// file of the user that happens to have its name, which must not be replaced.
 Json ChangesJson(const Json& last, const std::string& file, const Json& now) {
   if (last.is_null()) {
     return {};
@@ -714,6 +752,8 @@ Column SeverityColumn() {
   return column;
 }
 
+// The columns of both lists. Each factor of the score stands beside what it was
+// made from ("high · 4"), so that a reader can multiply them by hand.
 std::vector<Column> FindingColumns() {
   return {{"rank", "rank"},
           LoopsColumn(),
@@ -926,6 +966,8 @@ std::vector<storage::CommonCause> CausesOf(const std::filesystem::path& history,
                                            std::int64_t since_ns) {
   storage::HistoryReader reader(history);
   storage::CauseFilter filter;
+  // Open causes count however old they are. `until_ns` keeps this query to
+  // those from before the period, so that none is read twice.
   filter.open_only = true;
   filter.until_ns = since_ns;
   std::vector<storage::CommonCause> causes =

@@ -230,6 +230,9 @@ Json StrokesJson(std::span<const HealthHour> hours) {
   return list;
 }
 
+// Days are those of UTC, also before 1970, hence the second remainder. Hours of
+// another model set, epoch or list of channels stay apart, because their
+// residuals do not add up.
 std::vector<HealthHour> DaysOf(std::span<const HealthHour> hours) {
   std::vector<HealthHour> days;
   for (HealthHour hour : hours) {

@@ -11,6 +11,10 @@
 #include "base/toml_reader.h"
 #include "report/shared_files.h"
 
+// The words of the fault catalogue, faults.toml: the shipped file has all keys
+// of all faults, and the file of the data directory and that of
+// `--fault-catalogue` then override those that they state (docs/planner.md,
+// "Words for faults: the catalogue").
 namespace fdi::report {
 namespace {
 
@@ -180,6 +184,10 @@ const FaultText& FaultTexts::Of(int fault) const {
   return text->second;
 }
 
+// Of several faults that are one answer, the words have the names and
+// disciplines of all, the gravest class and severity, and the check of the
+// first. A priority that was stored with the episode says the severity better
+// than the catalogue of now.
 FaultWords FaultTexts::Words(std::string_view answer, double strength,
                              std::optional<std::int64_t> priority) const {
   FaultWords words;

@@ -32,6 +32,9 @@ spdlog::level::level_enum ToSpdlog(LogLevel level) {
   return spdlog::level::err;
 }
 
+// A log that nobody reads must not hold up the program. A line that stderr does
+// not take at once is dropped and counted; the count comes before the next
+// line.
 class NeverWaitingSink : public spdlog::sinks::base_sink<std::mutex> {
  protected:
   void sink_it_(const spdlog::details::log_msg& message) override {

@@ -13,6 +13,10 @@
 #include "base/time_text.h"
 #include "base/time_units.h"
 
+// A report is one document of JSON and a list of views that refer to its
+// members by key. Nothing is rendered before it is printed; TextPrinter and
+// HtmlPrinter visit the same views, so that a terminal and a page show the same
+// values, and --json prints the document itself.
 namespace fdi::report {
 namespace {
 
@@ -33,8 +37,8 @@ const Json& ValueAt(const Json& json, std::string_view path) {
   return *value;
 }
 
-// The rows of a table; members of an object become rows with a name, in
-// `named`.
+// The rows of a table. The members of an object become rows with a name; they
+// are made in `named`, which therefore has to outlive the result.
 const Json& RowsAt(const Json& document, const std::string& path, Json& named) {
   const Json& value = ValueAt(document, path);
   if (!value.is_object()) {
@@ -86,10 +90,13 @@ std::string RawText(const Json& row, const Column& column, bool utc) {
   return text.empty() ? "-" : text;
 }
 
+// Texts come from files and from the bus, and a terminal would obey the control
+// characters in them.
 std::string TextOf(const Json& row, const Column& column, bool utc) {
   return Printable(RawText(row, column, utc));
 }
 
+// A column of numbers is known by any of its values, because some may be null.
 Align AlignOf(const Json& rows, const Column& column) {
   if (column.align) {
     return *column.align;
@@ -101,6 +108,8 @@ Align AlignOf(const Json& rows, const Column& column) {
   return numbers ? Align::kRight : Align::kLeft;
 }
 
+// The page is one file without a script, so that it can be sent and archived.
+// Colours are the same in meaning on a light screen, a dark one and on paper.
 constexpr std::string_view kPageStyle =
     R"(body{margin:1.5em auto;max-width:1240px;padding:0 1em;background:#fff;color:#222;font:14px/1.45 system-ui,"DejaVu Sans",sans-serif}
 h1{font-size:1.5em}h2{font-size:1.2em;margin-top:2em}h3{font-size:1em;margin:2em 0 .3em}
@@ -126,6 +135,7 @@ table,dl{font-size:8pt}th,td{white-space:normal;padding:2px 5px}td.wrap{min-widt
 h1,h2,h3{break-after:avoid}tr,li,svg,dl{break-inside:avoid}.checks{break-before:avoid}svg{max-height:230mm}h2{margin-top:.9em}.checks li{margin:.25em 0}.blanks td{width:100%;min-width:0;height:1.6em}.blanks th{white-space:nowrap}a{color:inherit;text-decoration:none}}
 )";
 
+// Also for attributes, hence the quotation mark.
 std::string HtmlText(std::string_view text) {
   std::string escaped;
   for (const char c : Printable(text, "\n")) {

@@ -8,6 +8,15 @@
 #include "diagnosis/fault_catalogue.h"
 #include "simulator/require_range.h"
 
+// The text of a schedule, which ToText() writes and ParseFaultSchedule() reads:
+//
+//     schedule  = fault ":" profile *(":" option)
+//     profile   = "abrupt@" start / "flatline@" start
+//               / "incipient@" start "+" duration
+//     option    = "strength=" number / "from=" number / "until=" time
+//
+// Times are in s from the start of the run. `from` is for incipient faults
+// only, and a flatline, which holds a reading, has no strength.
 namespace fdi::simulator {
 namespace {
 
@@ -158,6 +167,8 @@ double StrengthAt(const FaultSchedule& schedule, double time_s) {
              schedule.development_s;
 }
 
+// A sample has room for one fault as its truth. Where several act at once, that
+// is the first of the list, while EffectsAt() combines them all.
 FaultTruth TruthAt(const std::vector<FaultSchedule>& schedules, double time_s) {
   for (const FaultSchedule& schedule : schedules) {
     const double strength = StrengthAt(schedule, time_s);

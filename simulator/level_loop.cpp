@@ -39,7 +39,9 @@ double TonsPerHour(double flow_m3_h) {
   return flow_m3_h * FeedDensity() / 1000.0;
 }
 
-// Additional pressure loss of a throttled hand valve [Pa].
+// Additional pressure loss of a throttled hand valve [Pa]: 1 bar rho/1000
+// (Q/Kv)^2 with Kv in proportion to the opening, less the loss of the open
+// valve, which is part of that of the line.
 double HandValveLoss(double flow_m3_h, double opening) {
   const double open = flow_m3_h / kHandValveKv;
   return 1e5 * FeedDensity() / 1000.0 * open * open *
@@ -109,12 +111,17 @@ void LevelLoop::AdvanceBoiler() {
   }
 }
 
+// The integral stays within 0..100 %, so that CV leaves its end once the error
+// turns.
 double InventoryController::Next(double error, double period_s) {
   integral_pct_ += gain_ / integral_time_s_ * error * period_s;
   integral_pct_ = std::clamp(integral_pct_, 0.0, 100.0);
   return std::clamp(integral_pct_ + gain_ * error, 0.0, 100.0);
 }
 
+// While CV is prescribed the loop is held: boiler and controller stand, to go
+// on from there, but the pressures follow the flow. Forty halvings leave 1e-9
+// m3/h of it.
 ProcessInputs LevelLoop::Next(const FlowOfPressures& flow) {
   if (started_ && !held_) {
     AdvanceBoiler();
@@ -164,6 +171,8 @@ ProcessInputs InventoryLoop::InitialInputs() const {
 ProcessInputs InventoryLoop::Next(const FlowOfPressures& flow) {
   const double now = flow(last_.inlet_pressure_pa, last_.outlet_pressure_pa);
   const double demand = 1.0 + 0.01 * demand_.Next();
+  // The flow of the start is what a demand of 1 takes, so the loop is in
+  // balance with a valve of any size.
   if (mean_flow_ == 0.0) {
     mean_flow_ = std::max(now, 1e-12);
   } else if (!held_) {

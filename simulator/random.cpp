@@ -23,6 +23,8 @@ double NormalSource::Uniform() {
   return static_cast<double>(engine_() >> 11U) * 0x1p-52 - 1.0;
 }
 
+// The polar method gives two numbers at a time; the second waits for the next
+// call.
 double NormalSource::operator()() {
   if (has_spare_) {
     has_spare_ = false;
@@ -46,6 +48,8 @@ DisturbanceProcess::DisturbanceProcess(const Disturbance& disturbance,
                                        NormalSource source)
     : disturbance_(disturbance), source_(source) {}
 
+// v(k) = a v(k-1) + sd sqrt(1 - a^2) e(k), which keeps the standard deviation
+// at sd for any correlation a.
 double DisturbanceProcess::Next() {
   const double a = disturbance_.correlation;
   const double e = source_();

@@ -74,7 +74,10 @@ class Minimiser {
  public:
   Minimiser(const ResidualFunction& residuals, const PointBounds& bounds,
             const RobustFitOptions& options)
-      : residuals_(residuals), bounds_(bounds), options_(options) {}
+      : residuals_(residuals),
+        bounds_(bounds),
+        options_(options),
+        damping_(options.damping) {}
 
   RobustFit Run(const VectorXd& start);
 
@@ -98,7 +101,7 @@ class Minimiser {
   MatrixXd present_;  // Residuals at fit_.point.
   VectorXd gradient_;
   double share_{1.0};  // c.
-  double damping_{1e-2};
+  double damping_;
   RobustFit fit_;
 };
 
@@ -224,6 +227,8 @@ RobustFit Minimiser::Run(const VectorXd& start) {
   // residuals.
   Rescale();
   fit_.residuals = present_;
+  fit_.damping = damping_;
+  fit_.settled = !improves;
   return fit_;
 }
 

@@ -27,6 +27,7 @@ struct RobustFitOptions {
   double tolerance{2e-3};        ///< Relative decrease of the loss to stop.
   Eigen::VectorXd least_scale;   ///< Per channel: transmitter noise.
   Eigen::Index block_rows{60};   ///< Block length for estimating `scatter`.
+  double damping{1e-2};          ///< Of the first iteration.
 };
 
 /// Result of a fit; see StandardDeviations().
@@ -36,6 +37,10 @@ struct RobustFit {
   Eigen::MatrixXd information;  ///< p x p, sum of w J'J / scale^2.
   Eigen::MatrixXd scatter;      ///< p x p, sum of the blocks' scores s s'.
   Eigen::MatrixXd residuals;    ///< At the point.
+  /// Of the next iteration: a fit that begins with it at `point` goes on as if
+  /// this one had not ended.
+  double damping{RobustFitOptions{}.damping};
+  bool settled{false};  ///< It ended because nothing lowers the loss by enough.
 };
 
 /// Mean of Huber's loss rho(r_kj / s_j) over all residuals.

@@ -9,11 +9,15 @@
 
 #include "base/error.h"
 
+// Numbers of equations are those of docs/model.md, which has the sources and
+// the departures from them. Tables without a source here are the benchmark's.
 namespace fdi::simulator {
 double WaterDensity(double temperature_c) {
   constexpr double kCriticalTemperatureK = 647.096;
   constexpr double kCriticalDensity = 322.0;
   const double theta = std::clamp(temperature_c, 0.0, 350.0) + 273.15;
+  // The density of the saturated liquid in powers of the cube root of tau. The
+  // line ends before the critical point, where its slope is infinite.
   const double tau = 1.0 - theta / kCriticalTemperatureK;
   const double third = std::cbrt(tau);
   return kCriticalDensity *
@@ -38,6 +42,8 @@ double FlowFromUnit(FlowUnit unit, double flow, double density_kg_m3) {
                                      : flow;
 }
 
+// The sample's own T1 and P1 come first, so that its flow is converted at its
+// own state; where it has none, at the last known.
 void FlowConversion::Apply(Sample& sample) {
   if (sample.Has(Signal::kT1)) {
     to_.t1_degc = sample[Signal::kT1];
@@ -69,6 +75,8 @@ double VapourPressure(double temperature_c) {
 
 namespace {
 
+// The root of (12) and (16) has an infinite slope at 0, where a flow turns
+// round. An implicit integrator needs a finite one for its Jacobian.
 constexpr double kRegularPa = 1e3;
 
 // sqrt(d), odd and with a finite slope at 0: inside +-epsilon a cubic that
@@ -108,6 +116,7 @@ constexpr std::array<double, 11> kTenths{0.0, 0.1, 0.2, 0.3, 0.4, 0.5,
 }  // namespace
 
 double SaturationTemperature(double pressure_pa) {
+  // n1 to n10 of the release; beta, E, F, G and D are its names, too.
   constexpr std::array kN{1167.0521452767,  -724213.16703206, -17.073846940092,
                           12020.82470247,   -3232555.0322333, 14.91510861353,
                           -4823.2657361591, 405113.40542057,  -0.23855557567849,
@@ -155,6 +164,8 @@ double Opening(const Trim& trim, double closing) {
   const auto curve = [&trim](double at) {
     return std::max(trim.leakage, std::exp(-trim.exponent * at));
   };
+  // An equal percentage trim never shuts by its own formula: from `shut_off`
+  // on, a straight line leads to the leakage.
   if (x <= trim.shut_off) {
     return curve(x);
   }
@@ -169,6 +180,7 @@ double RecoveryCoefficient(const Trim& trim, double closing) {
   constexpr std::array<double, 10> kKm{1.00,  0.95, 0.90, 0.85,  0.785,
                                        0.725, 0.67, 0.61, 0.555, 0.50};
   const double x = std::clamp(closing, 0.0, 1.0) * 10.0;
+  // The last tenth of the travel has one point more, at 0.99.
   if (x >= 9.0) {
     return x < 9.9 ? 0.50 - 0.05 * (x - 9.0) / 0.9
                    : 0.45 - 0.05 * (x - 9.9) / 0.1;
@@ -211,6 +223,8 @@ double VapourPressure(const Medium& medium, double temperature_c) {
 
 MediumState MediumAt(const Medium& medium, double inlet_pressure_pa,
                      double outlet_pressure_pa, double temperature_c) {
+  // P2 is passed on unlimited: the force on the plug is that of the whole drop,
+  // and only the flow is limited by choking (EffectivePressureDrop).
   constexpr double kMolarGasConstant = 8314.0;  // J/(kmol K)
   constexpr double kAirExponent = 1.40;         // gamma that x_T is stated for
   constexpr double kSteamExponent = 1.30;       // 1.28..1.30 at 0.5..10 MPa
@@ -249,6 +263,8 @@ double EffectivePressureDrop(const MediumState& medium, double recovery,
                              double choked_pressure_ratio) {
   const double drop = medium.inlet_pressure_pa - medium.outlet_pressure_pa;
   if (medium.gas_factor > 0.0) {
+    // A choked gas stays at x = `most` and Y = 2/3, whatever P2 is. A reversed
+    // gas does not flow, whereas a reversed liquid does, below.
     const double most = medium.gas_factor * choked_pressure_ratio;
     const double x = std::clamp(drop / medium.inlet_pressure_pa, 0.0, most);
     const double expansion = 1.0 - x / (3.0 * most);
@@ -290,6 +306,7 @@ double ChamberPressure(const ActuatorParameters& actuator, double charge,
          (actuator.chamber_volume_m3 + actuator.diaphragm_area_m2 * position_m);
 }
 
+// Both branches meet where Pa2 is half of Pa1: the root is Pa1/2 there.
 double AirFlow(double from_pa, double to_pa) {
   if (from_pa < to_pa) {
     return -AirFlow(to_pa, from_pa);

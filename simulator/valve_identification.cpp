@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <functional>
 #include <future>
 #include <limits>
 #include <numeric>
@@ -99,6 +100,28 @@ using Answers = std::vector<std::vector<RecordAnswer>>;  // By segment.
 constexpr double kFine = 1.0;
 constexpr double kCoarse = 10.0;
 
+// Calls task(i) for all i below `count`, from `threads` threads.
+void InParallel(std::size_t count, int threads,
+                const std::function<void(std::size_t)>& task) {
+  std::atomic<std::size_t> next{0};
+  const auto work = [&] {
+    for (std::size_t i = next++; i < count; i = next++) {
+      task(i);
+    }
+  };
+  // Destroyed first: if work() throws here, these futures of std::async() wait
+  // for the threads before what they use is gone.
+  std::vector<std::future<void>> helpers;
+  for (std::size_t t = 1;
+       t < std::min(static_cast<std::size_t>(threads), count); ++t) {
+    helpers.push_back(std::async(std::launch::async, work));
+  }
+  work();
+  for (std::future<void>& helper : helpers) {
+    helper.get();
+  }
+}
+
 // Simulates all candidates on all segments with `threads` threads. Each pair
 // has a place of its own for its answers, which need no lock and do not depend
 // on the number of threads.
@@ -106,27 +129,13 @@ std::vector<Answers> Simulate(const std::vector<ValveCandidate>& candidates,
                               const std::vector<RecordSegment>& segments,
                               double tolerance_scale, int threads) {
   std::vector<Answers> motions(candidates.size(), Answers(segments.size()));
-  const std::size_t count = candidates.size() * segments.size();
-  std::atomic<std::size_t> next{0};
-  const auto work = [&] {
-    for (std::size_t i = next++; i < count; i = next++) {
-      const ValveCandidate& candidate = candidates[i / segments.size()];
-      const RecordSegment& segment = segments[i % segments.size()];
-      motions[i / segments.size()][i % segments.size()] =
-          SimulateRecord(candidate.parameters, *segment.rows, segment.first,
-                         segment.last, candidate.drive, tolerance_scale);
-    }
-  };
-  // Destroyed first: if work() throws here, these futures of std::async() wait
-  // for the threads before what they use is gone.
-  std::vector<std::future<void>> helpers;
-  for (int t = 1; t < threads; ++t) {
-    helpers.push_back(std::async(std::launch::async, work));
-  }
-  work();
-  for (std::future<void>& helper : helpers) {
-    helper.get();
-  }
+  InParallel(candidates.size() * segments.size(), threads, [&](std::size_t i) {
+    const ValveCandidate& candidate = candidates[i / segments.size()];
+    const RecordSegment& segment = segments[i % segments.size()];
+    motions[i / segments.size()][i % segments.size()] =
+        SimulateRecord(candidate.parameters, *segment.rows, segment.first,
+                       segment.last, candidate.drive, tolerance_scale);
+  });
   return motions;
 }
 
@@ -284,15 +293,14 @@ ValveUnknown FrictionUnknown(const ValveParameters& nominal) {
   return {kFriction, in, 0.0, 0.005 * range_n, 0.5 * range_n, false};
 }
 
-// The possible air relays: the nominal one, then the other of (16) and the
-// benchmark's square root with the transducer's dead zone.
-std::vector<ValveParameters> RelayVariants(const ValveParameters& nominal) {
-  ValveParameters other = nominal;
+// With the other air relay: of (16), and of the benchmark's square root with
+// the transducer's dead zone.
+ValveParameters OtherRelay(ValveParameters nominal) {
   const bool orifice = nominal.positioner.relay == AirRelay::kOrifice;
-  other.positioner.relay =
+  nominal.positioner.relay =
       orifice ? AirRelay::kCompressible : AirRelay::kOrifice;
-  other.positioner.transducer_dead_zone = !orifice;
-  return {nominal, other};
+  nominal.positioner.transducer_dead_zone = !orifice;
+  return nominal;
 }
 
 // Bounds of `unknowns` as logarithms, with a prior around the nominal values
@@ -512,6 +520,15 @@ struct Hypothesis {
   VectorXd point;
   RobustFit fit;
   std::vector<FittedParameter> rejected;
+  std::optional<double> error{};  // Of Best(), once it is fitted there.
+};
+
+// How far a fit goes, and how much it may cost.
+struct FitEffort {
+  int iterations;
+  double tolerance_scale;
+  int threads;
+  double damping{RobustFitOptions{}.damping};  // Where another fit ended.
 };
 
 // A parameter at a bound of its search compensates for something missing in the
@@ -556,12 +573,17 @@ class Identification {
   Hypothesis Start(const ValveParameters& variant, const RecordDrive& drive,
                    bool friction) const;
   Hypothesis BestStart() const;
-  Hypothesis BestRelay(const Hypothesis& hypothesis) const;
+  Hypothesis BestRelay(const Hypothesis& fitted) const;
   std::optional<Hypothesis> WithFriction(const Hypothesis& without) const;
   bool Gains(const Hypothesis& trial, const Hypothesis& hypothesis) const;
   RobustFit Fit(const Hypothesis& hypothesis,
-                const std::vector<RecordSegment>& segments, int iterations,
-                double tolerance_scale) const;
+                const std::vector<RecordSegment>& segments,
+                const FitEffort& effort) const;
+  RobustFit FitFinely(const Hypothesis& hypothesis) const {
+    return Fit(hypothesis, segments_,
+               {kMaxIterations, kFine, options_.threads});
+  }
+  void FitBriefly(std::vector<Hypothesis>& hypotheses) const;
   Hypothesis Best(std::vector<Hypothesis> hypotheses) const;
   void KeepIdentified(Hypothesis& hypothesis) const;
   void AddStated(Hypothesis& hypothesis) const;
@@ -638,7 +660,7 @@ Hypothesis Identification::Start(const ValveParameters& variant,
 
 // Chooses first how and when the command acts, then the relay. Of equally good
 // fits the first is kept: the nominal relay, a held command without delay. That
-// takes 8 + 2 fits, all combinations would take 16.
+// takes 8 + 1 fits, all combinations would take 16.
 Hypothesis Identification::BestStart() const {
   const bool friction = nominal_.actuator.coulomb_friction_n > 0.0;
   std::vector<Hypothesis> drives;
@@ -651,13 +673,10 @@ Hypothesis Identification::BestStart() const {
   return BestRelay(Best(std::move(drives)));
 }
 
-Hypothesis Identification::BestRelay(const Hypothesis& hypothesis) const {
-  std::vector<Hypothesis> relays;
-  for (const ValveParameters& variant : RelayVariants(nominal_)) {
-    relays.push_back(
-        Start(variant, hypothesis.base.drive, HasFriction(hypothesis)));
-  }
-  return Best(std::move(relays));
+// @param fitted by Best(), with the nominal relay.
+Hypothesis Identification::BestRelay(const Hypothesis& fitted) const {
+  return Best({fitted, Start(OtherRelay(nominal_), fitted.base.drive,
+                             HasFriction(fitted))});
 }
 
 // The best start with friction, if it follows X better than the one without.
@@ -667,6 +686,8 @@ std::optional<Hypothesis> Identification::WithFriction(
     const Hypothesis& without) const {
   const int latest = without.base.drive.command_delay;
   std::vector<Hypothesis> rods{without};
+  rods.front().error.reset();  // Is fitted once more, as the others are.
+  rods.front().fit = {};
   for (const int delay : {latest, std::max(-1, latest - 1)}) {
     for (const bool interpolated : {false, true}) {
       rods.push_back(
@@ -679,7 +700,7 @@ std::optional<Hypothesis> Identification::WithFriction(
 
 RobustFit Identification::Fit(const Hypothesis& hypothesis,
                               const std::vector<RecordSegment>& segments,
-                              int iterations, double tolerance_scale) const {
+                              const FitEffort& effort) const {
   // Points that differ only in the trim share a simulation, so that derivatives
   // for Kv and the exponent cost none. The last single point is the present one
   // of the fit, because Minimiser takes derivatives only where its last trial
@@ -697,7 +718,7 @@ RobustFit Identification::Fit(const Hypothesis& hypothesis,
       }
     }
     std::vector<Answers> added =
-        Simulate(candidates, segments, tolerance_scale, options_.threads);
+        Simulate(candidates, segments, effort.tolerance_scale, effort.threads);
     if (points.size() == 1 && !added.empty()) {
       simulated.clear();
       motions.clear();
@@ -716,7 +737,8 @@ RobustFit Identification::Fit(const Hypothesis& hypothesis,
     return result;
   };
   RobustFitOptions options;
-  options.max_iterations = iterations;
+  options.max_iterations = effort.iterations;
+  options.damping = effort.damping;
   options.huber = kHuber;
   const Instrumentation& i = nominal_.instruments;
   options.least_scale.resize(options_.has_flow ? 2 : 1);
@@ -728,33 +750,83 @@ RobustFit Identification::Fit(const Hypothesis& hypothesis,
                      options);
 }
 
-// Fits each briefly to the liveliest segment, and compares X on all of them; F
-// where there is no X.
-Hypothesis Identification::Best(std::vector<Hypothesis> hypotheses) const {
+// Fits those that are not yet fitted to the liveliest segment. One whose X (F
+// where there is no X) is off by twice as much as that of another after the
+// first iteration is given up: none of the three that are left makes up for a
+// wrong delay, which puts X off by three times as much.
+void Identification::FitBriefly(std::vector<Hypothesis>& hypotheses) const {
   constexpr int kIterations = 4;
+  constexpr double kHopeless = 2.0;
+  std::vector<Hypothesis*> open;
+  for (Hypothesis& h : hypotheses) {
+    if (!h.error) {
+      open.push_back(&h);
+    }
+  }
+  // Each is one thread's as far as there are enough of them: of a single
+  // segment, most simulations of a fit come one after the other.
+  const auto fit = [&](int iterations) {
+    const int threads = std::max(
+        1, options_.threads /
+               static_cast<int>(std::max(open.size(), std::size_t{1})));
+    InParallel(open.size(), options_.threads, [&](std::size_t i) {
+      Hypothesis& h = *open[i];
+      h.fit = Fit(h, {segments_.front()},
+                  {iterations, kCoarse, threads, h.fit.damping});
+      h.point = h.fit.point;
+    });
+  };
+  fit(1);
+  const auto error = [&](const Hypothesis* h) {
+    return HasPosition(records_) ? h->fit.residuals.col(0).norm()
+                                 : h->fit.residuals.norm();
+  };
+  double least = std::numeric_limits<double>::infinity();
+  for (const Hypothesis* h : open) {
+    least = std::min(least, error(h));
+  }
+  for (Hypothesis* h : open) {
+    if (error(h) > kHopeless * least) {
+      h->error = std::numeric_limits<double>::infinity();
+    }
+  }
+  std::erase_if(open, [](const Hypothesis* h) {
+    return h->error.has_value() || h->fit.settled;
+  });
+  fit(kIterations - 1);
+}
+
+// Fits each briefly, and compares X on all segments; F where there is no X.
+Hypothesis Identification::Best(std::vector<Hypothesis> hypotheses) const {
+  FitBriefly(hypotheses);
+  std::vector<Hypothesis*> fitted;
   std::vector<ValveCandidate> candidates;
   for (Hypothesis& h : hypotheses) {
-    h.point = Fit(h, {segments_.front()}, kIterations, kCoarse).point;
-    candidates.push_back(Candidate(h, h.point));
+    if (!h.error) {
+      fitted.push_back(&h);
+      candidates.push_back(Candidate(h, h.point));
+    }
   }
   const std::vector<Answers> motions =
       Simulate(candidates, segments_, kCoarse, options_.threads);
-  std::size_t best = 0;
-  double least = std::numeric_limits<double>::infinity();
   const bool by_flow = !HasPosition(records_);
   for (std::size_t i = 0; i < motions.size(); ++i) {
-    const double loss =
+    fitted[i]->error =
         Residuals(candidates[i].parameters, motions[i], segments_,
                   static_cast<std::size_t>(options_.settle_rows), by_flow)
             .norm();
+  }
+  std::size_t best = 0;
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < hypotheses.size(); ++i) {
     // A lag of the valve resembles a delay of part of a sample, and so does
     // friction.
     const bool alike =
         hypotheses[i].base.drive.command_delay ==
             hypotheses[best].base.drive.command_delay &&
         HasFriction(hypotheses[i]) == HasFriction(hypotheses[best]);
-    if (loss < (alike ? 0.99 : 0.9) * least) {
-      least = loss;
+    if (*hypotheses[i].error < (alike ? 0.99 : 0.9) * least) {
+      least = *hypotheses[i].error;
       best = i;
     }
   }
@@ -769,7 +841,7 @@ void Identification::KeepIdentified(Hypothesis& hypothesis) const {
   constexpr double kSurely = 3.0;  // deviations
   const bool has_position = HasPosition(records_);
   for (bool changed = true; changed && !hypothesis.unknowns.empty();) {
-    hypothesis.fit = Fit(hypothesis, segments_, kMaxIterations, kFine);
+    hypothesis.fit = FitFinely(hypothesis);
     hypothesis.point = hypothesis.fit.point;
     const PointBounds bounds = BoundsOf(hypothesis.unknowns);
     std::vector<Index> kept = AllOf(hypothesis.unknowns);
@@ -814,7 +886,7 @@ void Identification::AddStated(Hypothesis& hypothesis) const {
     trial.unknowns.push_back(unknown);
     trial.point.conservativeResize(trial.point.size() + 1);
     trial.point.tail<1>() = BoundsOf({unknown}).prior_mean;
-    trial.fit = Fit(trial, segments_, kMaxIterations, kFine);
+    trial.fit = FitFinely(trial);
     trial.point = trial.fit.point;
     const double sd =
         StandardDeviations(trial.fit, BoundsOf(trial.unknowns),

@@ -9,6 +9,9 @@
 #include "base/text.h"
 #include "simulator/require_range.h"
 
+// The shipped valves, and the range of each parameter. The ranges are wide:
+// they keep the equations solvable (no mass, volume or lag of 0) and catch most
+// values in another unit, but do not say what is usual.
 namespace fdi::simulator {
 namespace {
 
@@ -101,6 +104,7 @@ void ValidateTrim(const Trim& t) {
   RequireRange("trim.exponent", t.exponent, 0.1, 20.0);
   RequireRange("trim.shut_off", t.shut_off, 0.5, 0.9999);
   RequireRange("trim.leakage", t.leakage, 0.0, 0.1);
+  // 0 stands for the benchmark's table of Km (RecoveryCoefficient).
   if (t.liquid_recovery != 0.0) {
     RequireRange("trim.liquid_recovery", t.liquid_recovery, 0.1, 1.0);
   }

@@ -8,6 +8,7 @@
 
 #include "base/error.h"
 #include "diagnosis/fault_catalogue.h"
+#include "trainer/cluster_antecedents.h"
 #include "trainer/regression.h"
 #include "trainer/statistics.h"
 
@@ -168,7 +169,10 @@ TsModel FitRows(const ChannelPlan& plan,
     if (plan.from_any_past && IsFreeRunning(model)) {
       const double error = FreeRunError(model, condition.validation);
       if (!std::isnan(error)) {
-        return error;
+        const double range = model.output_max - model.output_min;
+        return ForgetsItsPast(model, condition.training)
+                   ? error
+                   : error + range * range;
       }
     }
     return ErrorOf(RunResiduals(model, condition.validation, options.settling,
@@ -221,6 +225,74 @@ double FreeRunError(const TsModel& model,
     }
   }
   return std::sqrt(sum / pieces);
+}
+
+namespace {
+
+constexpr std::size_t kPieceToForget = 300;
+
+// Whether runs over the piece from both limits of the predictions meet.
+bool RunsMeet(const TsModel& model, const Stretch& piece) {
+  constexpr double kTolerance = 0.01;
+  const double apart = kTolerance * (model.output_max - model.output_min);
+  const double from_low = RunPredictions(model, piece, model.output_min).back();
+  const double from_high =
+      RunPredictions(model, piece, model.output_max).back();
+  return std::abs(from_high - from_low) <= apart;
+}
+
+// The piece with its commands moved to a mean of `mean`, within `range`.
+Stretch Moved(Stretch piece, double mean, SignalRange range) {
+  double sum = 0.0;
+  for (const Sample& sample : piece.samples) {
+    sum += sample[Signal::kCv];
+  }
+  const double by = mean - sum / static_cast<double>(piece.samples.size());
+  for (Sample& sample : piece.samples) {
+    sample.Set(Signal::kCv, std::clamp(sample[Signal::kCv] + by, range.minimum,
+                                       range.maximum));
+  }
+  return piece;
+}
+
+// Whether the runs meet wherever in `range` the commands of the piece are.
+bool RunsMeetAnywhere(const TsModel& model, const Stretch& piece,
+                      SignalRange range) {
+  constexpr int kPlaces = 8;
+  for (int i = 0; i <= kPlaces; ++i) {
+    const double mean =
+        range.minimum + (range.maximum - range.minimum) * i / kPlaces;
+    if (!RunsMeet(model, Moved(piece, mean, range))) {
+      return false;
+    }
+  }
+  return true;
+}
+
+}  // namespace
+
+bool ForgetsItsPast(const TsModel& model,
+                    const std::vector<Stretch>& stretches) {
+  std::vector<Stretch> pieces;
+  SignalRange commands{std::numeric_limits<double>::infinity(),
+                       -std::numeric_limits<double>::infinity()};
+  for (const Stretch& stretch : stretches) {
+    const auto& samples = stretch.samples;
+    for (const Sample& sample : samples) {
+      commands.minimum = std::min(commands.minimum, sample[Signal::kCv]);
+      commands.maximum = std::max(commands.maximum, sample[Signal::kCv]);
+    }
+    for (std::size_t k = 0; k + kPieceToForget <= samples.size();
+         k += kPieceToForget) {
+      const auto begin = samples.begin() + static_cast<std::ptrdiff_t>(k);
+      pieces.push_back({stretch.run_id, {begin, begin + kPieceToForget}});
+    }
+  }
+  return pieces.empty() ||
+         (RunsMeetAnywhere(model, pieces[pieces.size() / 2], commands) &&
+          std::ranges::all_of(pieces, [&](const Stretch& piece) {
+            return RunsMeet(model, piece);
+          }));
 }
 
 FitOptions FitOptionsOf(const ChannelPlan& plan, FitOptions options) {
@@ -290,6 +362,8 @@ std::vector<Regressor> ChooseRegressors(const ChannelPlan& plan,
     trial.rules.both_antecedents = false;
     trial.max_rows = options.search_rows;
     trial.rules.fit.clustering.num_starts = 1;
+    KnownClusters known;
+    trial.rules.known = &known;
     const auto criterion = [&](const std::vector<int>& indices) {
       const TsModel model =
           FitChannel(plan, chosen(indices), normal, trial, saturation);

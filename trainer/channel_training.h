@@ -66,7 +66,8 @@ struct ChannelPlan {
   /// What a normal observer that runs on its own past may read, for difference
   /// observers (FitNormalChannel); empty: it never does.
   std::vector<std::vector<Regressor>> own_past{};
-  /// Models that run on their own past are told apart by FreeRunError().
+  /// Models that run on their own past are told apart by FreeRunError(), and
+  /// ForgetsItsPast().
   bool from_any_past{false};
   bool saturates{false};       ///< The transmitter may be at its upper limit.
   std::vector<int> windows{};  ///< Lengths N of the windows [samples].
@@ -89,6 +90,15 @@ struct FitOptions {
 /// over a day, and the plain error of some hours does not show it. NaN where no
 /// stretch has 40 samples.
 double FreeRunError(const TsModel& model,
+                    const std::vector<Stretch>& stretches);
+
+/// False where a model on its own past may stay at a limit of its predictions:
+/// over a piece of 300 samples, its runs from `output_min` and from
+/// `output_max` as the past end further apart than 1 % of that range. Every
+/// piece is tried, and one of them with its commands moved to nine places from
+/// the smallest to the largest. Rules that are only locally stable let a model
+/// settle beyond the data for good. True where no stretch has 300 samples.
+bool ForgetsItsPast(const TsModel& model,
                     const std::vector<Stretch>& stretches);
 
 /// `options` with the numbers of rules that the plan tries.

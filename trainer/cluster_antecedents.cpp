@@ -243,6 +243,18 @@ void Standardize(RuleClusters& clusters) {
   }
 }
 
+// With z in the units of the data, and without a partition.
+RuleClusters Unclustered(const RegressionData& data,
+                         const TakagiSugenoOptions& options) {
+  CheckData(data, options.num_rules);
+  RuleClusters clusters;
+  clusters.columns = VaryingColumns(data.x, options.antecedents);
+  clusters.z.resize(data.x.rows(),
+                    static_cast<Index>(clusters.columns.size()) + 1);
+  clusters.z << data.x(Eigen::all, clusters.columns), data.y;
+  return clusters;
+}
+
 FuzzyPartition OneCluster(const MatrixXd& z) {
   FuzzyPartition partition;
   partition.memberships = MatrixXd::Ones(z.rows(), 1);
@@ -310,15 +322,34 @@ std::vector<TsRule> ProductSpaceRules(const RegressionData& data,
 
 RuleClusters FindRuleClusters(const RegressionData& data,
                               const TakagiSugenoOptions& options) {
-  CheckData(data, options.num_rules);
-  RuleClusters clusters;
-  clusters.columns = VaryingColumns(data.x, options.antecedents);
-  clusters.z.resize(data.x.rows(),
-                    static_cast<Index>(clusters.columns.size()) + 1);
-  clusters.z << data.x(Eigen::all, clusters.columns), data.y;
+  RuleClusters clusters = Unclustered(data, options);
   Standardize(clusters);
   clusters.partition = Cluster(clusters.z, options);
   return clusters;
+}
+
+const RuleClusters& KnownClusters::Of(const RegressionData& data,
+                                      const TakagiSugenoOptions& options) {
+  constexpr std::size_t kMostKnown = 4;
+  RuleClusters fresh = Unclustered(data, options);
+  const auto same = [&](const Known& known) {
+    return known.num_rules == options.num_rules &&
+           known.points.rows() == fresh.z.rows() &&
+           known.points.cols() == fresh.z.cols() && known.points == fresh.z;
+  };
+  const auto found = std::ranges::find_if(known_, same);
+  if (found != known_.end()) {
+    found->clusters.columns = std::move(fresh.columns);
+    return found->clusters;
+  }
+  if (known_.size() == kMostKnown) {
+    known_.erase(known_.begin());
+  }
+  Eigen::MatrixXd points = fresh.z;
+  Standardize(fresh);
+  fresh.partition = Cluster(fresh.z, options);
+  known_.push_back({std::move(points), options.num_rules, std::move(fresh)});
+  return known_.back().clusters;
 }
 
 std::vector<TsRule> RuleAntecedents(const RegressionData& data,

@@ -60,6 +60,26 @@ struct RuleClusters {
 RuleClusters FindRuleClusters(const RegressionData& data,
                               const TakagiSugenoOptions& options);
 
+/// FindRuleClusters() for fits that differ in the regressors that do not tell
+/// the rules apart, as in a search for regressors: points that were clustered
+/// lately are not clustered again. For one thread.
+class KnownClusters {
+ public:
+  /// @param options with the same clustering in every call.
+  /// @return valid until the next call.
+  /// @throws as FindRuleClusters().
+  const RuleClusters& Of(const RegressionData& data,
+                         const TakagiSugenoOptions& options);
+
+ private:
+  struct Known {
+    Eigen::MatrixXd points;  // Z in the units of the data.
+    int num_rules;
+    RuleClusters clusters;
+  };
+  std::vector<Known> known_;
+};
+
 /// One rule per cluster, with antecedents alone.
 std::vector<TsRule> RuleAntecedents(const RegressionData& data,
                                     const RuleClusters& clusters,

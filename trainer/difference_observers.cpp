@@ -185,13 +185,15 @@ NormalChannel ChooseNormal(const ChannelPlan& plan, const Condition& normal,
   // Among those that do, the one that forgets its past best is taken: a model
   // fitted one step ahead can rest for half a minute where no valve would, and
   // its plain error over some hours does not show that (docs/onboarding.md,
-  // "How it works", 2). An error of NaN compares false and never wins.
+  // "How it works", 2). One that may stay at a limit of its predictions is
+  // none. An error of NaN compares false and never wins.
   double least = std::numeric_limits<double>::infinity();
   for (const std::vector<Regressor>& regressors : plan.own_past) {
     const ChannelPlan own_plan = OwnPastPlan(plan, regressors);
     TsModel own = FitPlan(own_plan, normal, options, saturation);
     const double from_any_past = FreeRunError(own, normal.validation);
-    if (IsFreeRunning(own) && from_any_past < least &&
+    if (IsFreeRunning(own) && ForgetsItsPast(own, normal.training) &&
+        from_any_past < least &&
         error(own) < kMaxOwnPastErrorRatio * error(channel.inputs)) {
       least = from_any_past;
       channel.plan = own_plan;
@@ -452,7 +454,7 @@ ModelSet Assemble(const Healthy& fitted,
       FitFaults(fitted, faults, faulty_by, options, reporter, models);
   reporter.Report(kNormalShare + kObserverShare, "comparing faults");
   FitLimits(fitted, held_out, options, models);
-  FitInterpolationErrors(compared, models);
+  FitInterpolationErrors(compared, options.threads, models);
   SetFitBounds(compared, options.threads, models);
   SetAccounting(compared, options.threads, models);
   if (like == nullptr) {

@@ -51,6 +51,9 @@ std::pair<int, int> RisingEdges(const std::vector<Indication>& all, Zone zone,
   return edges;
 }
 
+// The indices of the time in which a fault acts: `zone` is [t_from, t_hor]. The
+// final set is the last one that was named in it. It outlives the end of that
+// name, but not its withdrawal.
 void IndexFault(const std::vector<Indication>& all, Zone zone,
                 RunIndices& result) {
   const double start_s = all[zone.first].time_s;
@@ -168,6 +171,7 @@ Indication IndicationOf(const ModelSet& models, const Verdict& verdict,
   now.withdrawn = IsWithdrawn(models, verdict);
   now.second = verdict.second.open;
   now.second_set = FaultsIn(models, verdict.second.faults);
+  // A name keeps the wording that it was given with.
   const bool stays = before != nullptr && !now.isolated.empty() &&
                      now.isolated == before->isolated;
   now.wording =
@@ -229,7 +233,15 @@ RunIndices ComputeIndices(const std::vector<Indication>& all,
 std::vector<Indication> ScoreRun(const std::shared_ptr<const ModelSet>& models,
                                  const TrainingRun& run,
                                  const VerdictSink& sink) {
-  ValveEngine engine(models);
+  return ScoreRun(std::make_shared<const EnginePlan>(models), run, sink);
+}
+
+std::vector<Indication> ScoreRun(const std::shared_ptr<const EnginePlan>& plan,
+                                 const TrainingRun& run,
+                                 const VerdictSink& sink) {
+  const ModelSet& models = plan->models();
+  ValveEngine engine(
+      EngineParts(plan, std::make_shared<ObserverOutputs>(*plan->observers())));
   std::vector<Indication> all;
   all.reserve(run.samples.size());
   for (const LabelledSample& labelled : run.samples) {
@@ -238,7 +250,7 @@ std::vector<Indication> ScoreRun(const std::shared_ptr<const ModelSet>& models,
       sink(labelled.sample, verdict);
     }
     Indication indication =
-        IndicationOf(*models, verdict, all.empty() ? nullptr : &all.back());
+        IndicationOf(models, verdict, all.empty() ? nullptr : &all.back());
     indication.time_s =
         static_cast<double>(labelled.sample.stamp_ns -
                             run.samples.front().sample.stamp_ns) *

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "diagnosis/engine_plan.h"
 #include "diagnosis/model_set.h"
 #include "diagnosis/records/certainty.h"
 #include "diagnosis/verdict.h"
@@ -95,6 +96,11 @@ using VerdictSink = std::function<void(const Sample&, const Verdict&)>;
 /// it for the indices and never reaches the engine. DD holds from the stamp of
 /// the detection, which is the first abnormal sample.
 std::vector<Indication> ScoreRun(const std::shared_ptr<const ModelSet>& models,
+                                 const TrainingRun& run,
+                                 const VerdictSink& sink = {});
+
+/// The same for many runs of one set, which is prepared only once.
+std::vector<Indication> ScoreRun(const std::shared_ptr<const EnginePlan>& plan,
                                  const TrainingRun& run,
                                  const VerdictSink& sink = {});
 

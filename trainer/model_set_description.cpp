@@ -93,7 +93,7 @@ double LargestStep(const std::vector<Stretch>& stretches) {
 
 // The running mean of CV, once it has settled.
 SignalRange MeanCommands(const Condition& condition) {
-  std::vector<double> means;
+  SignalRange range = kEmpty;
   for (const auto* stretches : {&condition.training, &condition.validation}) {
     for (const Stretch& stretch : *stretches) {
       double mean =
@@ -101,12 +101,12 @@ SignalRange MeanCommands(const Condition& condition) {
       for (std::size_t k = 1; k < stretch.samples.size(); ++k) {
         mean += kCvMeanGain * (stretch.samples[k][Signal::kCv] - mean);
         if (k >= static_cast<std::size_t>(kCvMeanSettling)) {
-          means.push_back(mean);
+          range = Joined(range, {mean, mean});
         }
       }
     }
   }
-  return Inhabited(std::move(means));
+  return range;
 }
 
 SignalRange Widened(SignalRange range, double least) {
@@ -119,6 +119,9 @@ double Largest(SignalRange range) {
   return std::max(std::abs(range.minimum), std::abs(range.maximum));
 }
 
+// Samples after which a reading that repeats itself counts as stuck: ten times
+// the longest repetition in normal operation, and 60 more. 0, for no limit,
+// where a sample lacks the signal.
 int StuckLimit(const Condition& normal, Signal signal) {
   int longest = 0;
   for (const auto* stretches : {&normal.training, &normal.validation}) {
@@ -145,6 +148,9 @@ StuckLimits FitStuckLimits(const Condition& normal) {
           StuckLimit(normal, Signal::kP2)};
 }
 
+// Commands may be those of any condition, since the observers of faults know
+// these, too. Pressures, temperature and flow are those of normal operation: in
+// the other conditions a fault may have moved them.
 ValidityRegion TrainedRegion(const std::vector<Condition>& conditions) {
   Require(!conditions.empty() && !conditions.front().training.empty() &&
               !conditions.front().training.front().samples.empty(),

@@ -94,8 +94,8 @@ Scale ScaleOf(const TsModel& model) {
 //     λ Σ_i |δ_i|² + 0.01 λ |δ_0|² = λ |θ|²;
 //
 // AddTo() undoes that.
-MatrixXd Design(const TsModel& model, const MatrixXd& x, const Scale& scale) {
-  const MatrixXd weights = DegreesOfFulfilment(model.rules, x);
+MatrixXd Design(const MatrixXd& weights, const MatrixXd& x,
+                const Scale& scale) {
   const Index n = x.cols();
   MatrixXd z(x.rows(), n + 1);
   z.leftCols(n) =
@@ -115,12 +115,24 @@ struct Systems {
   std::vector<VectorXd> uses;                 // per fold: 1 where a row counts
   std::vector<std::vector<Index>> members;    // per fold: where it is 0
   std::vector<MatrixXd> parts;                // the design of these rows
-  std::vector<Eigen::LLT<MatrixXd>> factors;  // per penalty: folds, then all
+  std::vector<Eigen::LLT<MatrixXd>> factors;  // per penalty: per fold
+  MatrixXd all;                               // DᵀD, lower triangle
+
+  // Of all rows: of one penalty alone it is needed.
+  Eigen::LLT<MatrixXd> Whole(double penalty) const {
+    return Penalized(all, penalty);
+  }
+
+  // Eigen's LLT reads the lower triangle alone.
+  static Eigen::LLT<MatrixXd> Penalized(MatrixXd gram, double penalty) {
+    gram.diagonal().array() += penalty;
+    return Eigen::LLT<MatrixXd>(gram);
+  }
 };
 
 // Forming DᵀD costs N p² for N rows and p columns. It is done once for the rows
 // of each fold; sums of these serve the folds and the whole, and λ adds to the
-// diagonal alone, so that all 25 factors share the work.
+// diagonal alone, so that all factors share the work.
 Systems Factorize(const MatrixXd& design, const std::vector<int>& folds) {
   Systems systems;
   // Lower triangles; of the rows of each fold, then of those that it uses.
@@ -151,13 +163,11 @@ Systems Factorize(const MatrixXd& design, const std::vector<int>& folds) {
     }
   }
   for (const double penalty : kPenalties) {
-    for (const MatrixXd& gram : grams) {
-      // Eigen's LLT reads the lower triangle alone.
-      MatrixXd regular = gram;
-      regular.diagonal().array() += penalty;
-      systems.factors.emplace_back(regular);
+    for (std::size_t f = 0; f < kPenaltyFolds; ++f) {
+      systems.factors.push_back(Systems::Penalized(grams[f], penalty));
     }
   }
+  systems.all = std::move(grams.back());
   return systems;
 }
 
@@ -230,10 +240,11 @@ struct Adaptation::Impl {
     RequireEnough(condition, rows);
     x = rows.data.x;
     shares = rows.shares;
-    design = Design(normal, x, scale);
+    const MatrixXd weights = DegreesOfFulfilment(normal.rules, x);
+    design = Design(weights, x, scale);
     design.array().colwise() *=
         Eigen::Map<const Eigen::ArrayXd>(shares.data(), x.rows());
-    base = Predict(normal.rules, x);
+    base = Predict(normal.rules, x, weights);
     systems = Factorize(design, rows.fold);
   }
 
@@ -241,8 +252,8 @@ struct Adaptation::Impl {
     return base + design * theta;
   }
   Target TargetOf(const VectorXd& y) const;
-  VectorXd Solve(const Target& target, std::size_t penalty, std::size_t fold,
-                 VectorXd theta) const;
+  VectorXd Solve(const Target& target, const Eigen::LLT<MatrixXd>& factor,
+                 std::size_t fold, VectorXd theta) const;
   VectorXd CrossPredict(const Target& target, std::size_t penalty,
                         std::vector<VectorXd>& thetas) const;
 
@@ -277,10 +288,9 @@ Target Adaptation::Impl::TargetOf(const VectorXd& y) const {
 }
 
 // θ for the rows that `fold` uses (kPenaltyFolds: all), starting from `theta`.
-VectorXd Adaptation::Impl::Solve(const Target& target, std::size_t penalty,
+VectorXd Adaptation::Impl::Solve(const Target& target,
+                                 const Eigen::LLT<MatrixXd>& factor,
                                  std::size_t fold, VectorXd theta) const {
-  const Eigen::LLT<MatrixXd>& factor =
-      systems.factors[penalty * (kPenaltyFolds + 1) + fold];
   if (!target.censored) {
     return factor.solve(target.scores[fold]);
   }
@@ -316,7 +326,8 @@ VectorXd Adaptation::Impl::CrossPredict(const Target& target,
                                         std::vector<VectorXd>& thetas) const {
   VectorXd predicted = base;
   for (std::size_t f = 0; f < kPenaltyFolds; ++f) {
-    thetas[f] = Solve(target, penalty, f, thetas[f]);
+    thetas[f] = Solve(target, systems.factors[penalty * kPenaltyFolds + f], f,
+                      std::move(thetas[f]));
     predicted(systems.members[f]) += systems.parts[f] * thetas[f];
   }
   return predicted;
@@ -360,7 +371,8 @@ AdaptedModel Adaptation::Fit(const Condition& condition) const {
   }
   if (chosen) {
     AddTo(adapted.model,
-          impl_->Solve(target, *chosen, kPenaltyFolds, thetas.front()),
+          impl_->Solve(target, impl_->systems.Whole(kPenalties[*chosen]),
+                       kPenaltyFolds, thetas.front()),
           impl_->scale);
   } else {
     // Not the widened copy: nothing speaks for outputs beyond the usual ones.

@@ -250,13 +250,23 @@ struct InterpolationSums {
   double samples{0.0};
 };
 
+// Everything but the observers.
+ModelSet Frame(ModelSet& models) {
+  std::vector<Observer> observers = std::move(models.observers);
+  models.observers.clear();
+  ModelSet frame = models;
+  models.observers = std::move(observers);
+  return frame;
+}
+
 // The set with some of its observers alone, normal first: what the others
 // predict takes the same time and is not asked for.
-ModelSet WithObservers(const ModelSet& models, const std::vector<int>& chosen) {
-  ModelSet some = models;
-  some.observers.clear();
+ModelSet WithObservers(const ModelSet& frame,
+                       const std::vector<Observer>& observers,
+                       const std::vector<int>& chosen) {
+  ModelSet some = frame;
   for (const int i : chosen) {
-    some.observers.push_back(models.observers[static_cast<std::size_t>(i)]);
+    some.observers.push_back(observers[static_cast<std::size_t>(i)]);
   }
   return some;
 }
@@ -269,24 +279,24 @@ ModelSet WithObservers(const ModelSet& models, const std::vector<int>& chosen) {
 //
 // s the strengths.
 std::vector<InterpolationSums> CompareWithNeighbours(
-    const std::vector<Condition>& conditions, const ModelSet& models, int low,
-    int middle, int high) {
+    const std::vector<Condition>& conditions, const ModelSet& frame,
+    const std::vector<Observer>& observers, int low, int middle, int high) {
   const auto strength = [&](int i) {
-    return models.observers[static_cast<std::size_t>(i)].strength;
+    return observers[static_cast<std::size_t>(i)].strength;
   };
   const double w =
       (strength(middle) - strength(low)) / (strength(high) - strength(low));
-  std::vector<InterpolationSums> sums(models.channels.size());
+  std::vector<InterpolationSums> sums(frame.channels.size());
   const Condition& condition = conditions[static_cast<std::size_t>(middle)];
   // 0 normal, 1 low, 2 middle, 3 high.
-  const ModelSet four = WithObservers(models, {0, low, middle, high});
+  const ModelSet four = WithObservers(frame, observers, {0, low, middle, high});
   const auto plan = std::make_shared<const ObserverPlan>(four);
   for (const Stretch& stretch : condition.validation) {
     ObserverBank bank(plan);
     bank.Initialise(stretch.samples.front());
     for (std::size_t k = 0; k < stretch.samples.size(); ++k) {
       bank.Step(stretch.samples[k]);
-      if (static_cast<int>(k) < models.decision.settling_samples) {
+      if (static_cast<int>(k) < frame.decision.settling_samples) {
         continue;
       }
       for (std::size_t c = 0; c < sums.size(); ++c) {
@@ -411,23 +421,28 @@ void ScoreStretch(const Stretch& stretch,
 }  // namespace
 
 void FitInterpolationErrors(const std::vector<Condition>& conditions,
-                            ModelSet& models) {
-  for (const int fault : models.faults) {
-    for (const bool negative : {false, true}) {
-      const std::vector<int> chain = Chain(models, fault, negative);
-      for (std::size_t n = 1; n + 1 < chain.size(); ++n) {
-        const auto sums = CompareWithNeighbours(
-            conditions, models, chain[n - 1], chain[n], chain[n + 1]);
-        SetInterpolationErrors(
-            sums, models.observers[static_cast<std::size_t>(chain[n])]);
-      }
-      if (chain.size() > 2) {
-        CopyErrors(
-            models.observers[static_cast<std::size_t>(chain[chain.size() - 2])],
-            models.observers[static_cast<std::size_t>(chain.back())]);
-      }
-    }
-  }
+                            int threads, ModelSet& models) {
+  const ModelSet frame = Frame(models);
+  // A task reads and writes the observers of its own fault and direction alone,
+  // but for the normal one, which stays.
+  ParallelFor(
+      2 * static_cast<int>(models.faults.size()), threads, [&](int task) {
+        const int fault = models.faults[static_cast<std::size_t>(task / 2)];
+        const std::vector<int> chain = Chain(models, fault, task % 2 == 0);
+        for (std::size_t n = 1; n + 1 < chain.size(); ++n) {
+          const auto sums =
+              CompareWithNeighbours(conditions, frame, models.observers,
+                                    chain[n - 1], chain[n], chain[n + 1]);
+          SetInterpolationErrors(
+              sums, models.observers[static_cast<std::size_t>(chain[n])]);
+        }
+        if (chain.size() > 2) {
+          CopyErrors(
+              models
+                  .observers[static_cast<std::size_t>(chain[chain.size() - 2])],
+              models.observers[static_cast<std::size_t>(chain.back())]);
+        }
+      });
 }
 
 namespace {
@@ -554,8 +569,9 @@ void SetFitBounds(const std::vector<Condition>& conditions, int threads,
   const double share =
       kMisfitShare / (3.0 * static_cast<double>(models.channels.size()));
   std::vector<std::vector<FitBlocks>> blocks(models.observers.size());
+  const ModelSet frame = Frame(models);
   ParallelFor(static_cast<int>(blocks.size()) - 1, threads, [&](int i) {
-    const ModelSet two = WithObservers(models, {0, i + 1});
+    const ModelSet two = WithObservers(frame, models.observers, {0, i + 1});
     const auto o = static_cast<std::size_t>(i) + 1;
     blocks[o] =
         BlocksOf(conditions[o], std::make_shared<const ObserverPlan>(two));
@@ -621,11 +637,12 @@ SignalMask ExplainedBy(const Condition& condition,
 void SetAccounting(const std::vector<Condition>& conditions, int threads,
                    ModelSet& models) {
   std::vector<SignalMask> explained(models.observers.size());
+  const ModelSet frame = Frame(models);
   ParallelFor(static_cast<int>(explained.size()) - 1, threads, [&](int i) {
     const auto o = static_cast<std::size_t>(i) + 1;
-    explained[o] =
-        ExplainedBy(conditions[o], std::make_shared<const ObserverPlan>(
-                                       WithObservers(models, {0, i + 1})));
+    explained[o] = ExplainedBy(
+        conditions[o], std::make_shared<const ObserverPlan>(
+                           WithObservers(frame, models.observers, {0, i + 1})));
   });
   for (std::size_t o = 1; o < explained.size(); ++o) {
     models.observers[o].moved |= explained[o];

@@ -66,7 +66,7 @@ NormalResiduals CrossValidate(const Condition& normal, const Observer& chosen,
 ///
 /// @param conditions parallel to models.observers.
 void FitInterpolationErrors(const std::vector<Condition>& conditions,
-                            ModelSet& models);
+                            int threads, ModelSet& models);
 
 /// Sets ChannelObserver::fit of every fault observer from the validation
 /// stretches of its condition: bounds that the mean and the logarithm of the

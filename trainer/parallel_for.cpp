@@ -10,6 +10,10 @@
 
 namespace fdi::trainer {
 
+// Tasks are taken one by one from a counter, not dealt out in blocks, because
+// they differ widely in length. Their order is not determined: each has to
+// write to a place of its own, and then results do not depend on the number of
+// threads.
 void ParallelFor(int count, int threads, const std::function<void(int)>& task) {
   const int available = static_cast<int>(std::thread::hardware_concurrency());
   const int wanted = threads > 0 ? threads : std::max(1, available);
@@ -25,6 +29,7 @@ void ParallelFor(int count, int threads, const std::function<void(int)>& task) {
         if (!failure) {
           failure = std::current_exception();
         }
+        // No task begins any more; those at work are waited for.
         next = count;
       }
     }

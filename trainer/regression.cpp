@@ -192,6 +192,7 @@ TsModel MakeModel(std::vector<TsRule> rules, const RegressionData& data,
   }
   const double low = data.y.minCoeff();
   const double high = data.y.maxCoeff();
+  // The limits keep a model that runs on its own predictions from running away.
   // What a transmitter at its limit hides may be far beyond.
   const double reach = high >= data.saturation ? 2.0 : 0.5;
   const double margin = reach * (high - low) + 1e-9;

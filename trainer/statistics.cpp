@@ -14,6 +14,8 @@ double Mean(std::span<const double> values) {
   return values.empty() ? 0.0 : sum / static_cast<double>(values.size());
 }
 
+// In a second pass, about the mean: the difference of two sums of squares would
+// lose the digits of a small variance beside a large mean.
 double Variance(std::span<const double> values) {
   const double mean = Mean(values);
   double sum = 0.0;
@@ -83,7 +85,8 @@ namespace {
 
 constexpr double kTail = 0.05;
 
-// P(N ≤ events) of a Poisson distribution of mean μ.
+// P(N ≤ events) of a Poisson distribution of mean μ. Each term by its
+// logarithm, because powers and factorials overflow.
 double AtMost(int events, double mean) {
   double sum = 0.0;
   for (int k = 0; k <= events; ++k) {
@@ -97,6 +100,8 @@ double AtMost(int events, double mean) {
 EventRate RateOf(int events, double hours) {
   Require(events >= 0 && hours > 0.0,
           "a rate needs a number of events and a time");
+  // AtMost() falls with the mean, so bisection finds where it passes 5 %. For
+  // any number of events that is below 10 + 3 events.
   double low = 1e-6;
   double high = 10.0 + 3.0 * events;
   for (int i = 0; i < 100; ++i) {

@@ -369,9 +369,11 @@ RuleSelection SelectRules(const RegressionData& data,
   RuleSelection selection;
   std::vector<std::vector<TsRule>> rules;
   double least = kInfinity;
+  KnownClusters none;
+  KnownClusters& known = options.known != nullptr ? *options.known : none;
   for (const int count : Counts(options, data)) {
     const auto variants = Variants(options, count);
-    const RuleClusters clusters = FindRuleClusters(data, variants.front());
+    const RuleClusters& clusters = known.Of(data, variants.front());
     const double validity = SugenoYasukawa(clusters.z, clusters.partition,
                                            options.fit.clustering.fuzziness);
     for (const TakagiSugenoOptions& variant : variants) {

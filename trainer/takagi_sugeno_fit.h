@@ -72,6 +72,8 @@ struct RegressionData {
   double saturation{std::numeric_limits<double>::infinity()};
 };
 
+class KnownClusters;
+
 /// What tells the rules apart.
 enum class AntecedentKind {
   kProjected,    ///< Sets on each regressor: readable; the default.
@@ -128,8 +130,9 @@ struct RuleSelectionOptions {
   int max_rules{8};         ///< ≥ min_rules, at most kMaxRules.
   double tolerance{0.02};   ///< ≥ 0, relative validation error given away.
   std::vector<int> counts;  ///< Numbers of rules to try instead of all between.
-  bool both_methods{false};      ///< Try local and global consequents alike.
-  bool both_antecedents{false};  ///< And both kinds of antecedents.
+  bool both_methods{false};       ///< Try local and global consequents alike.
+  bool both_antecedents{false};   ///< And both kinds of antecedents.
+  KnownClusters* known{nullptr};  ///< Of earlier fits, if there were any.
 };
 
 /// What was tried with one number of rules.

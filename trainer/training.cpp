@@ -16,6 +16,10 @@ namespace {
 constexpr double kStructureShare = 0.3;
 constexpr double kFitShare = 0.5;
 
+// One channel of the observer of a fault: the normal model of the channel,
+// adapted to the data of the fault, where the plan says so and that model does
+// not run on its own predictions; otherwise the simplest model that explains
+// them (FitFaultChannel).
 ChannelObserver FitObserver(const ChannelPlan& plan,
                             const ChannelObserver& normal_channel,
                             const Condition& normal, const Condition& condition,
@@ -95,6 +99,8 @@ ModelSet TrainModelSet(const std::vector<TrainingRun>& runs,
                     "fitting " + models.observers[o].name);
   });
   reporter.Report(kStructureShare + kFitShare, "setting thresholds");
+  // Of data that the models were not fitted to: on its own data a model is
+  // better than it will ever be in service, and thresholds would be too close.
   const NormalResiduals normal_data =
       CrossValidate(conditions.front(), models.observers.front(),
                     options.channels, options.fit, options.threads);
@@ -106,7 +112,7 @@ ModelSet TrainModelSet(const std::vector<TrainingRun>& runs,
   FitThresholds(normal_data.residuals, windows, options.false_alarms_per_hour,
                 models, normal_data.commands);
   reporter.Report(0.9, "comparing faults");
-  FitInterpolationErrors(conditions, models);
+  FitInterpolationErrors(conditions, options.threads, models);
   SetFitBounds(conditions, options.threads, models);
   FindGroups(conditions, options.threads, models);
   Validate(models);

@@ -58,6 +58,9 @@ void BusDecisionSink::Fill(const std::string& valve_id, const ModelSet* models,
   message.verdict = verdict;
 }
 
+// While nobody reads, vectors are not even filled in. Who comes then gets the
+// last one of each valve first; `skipped_` stands until that is done
+// (LastValuesDue).
 bool BusDecisionSink::ToLive() {
   skipped_ = skipped_ || live_.matched() == 0;
   return !skipped_;
@@ -154,6 +157,8 @@ bool BusEventSink::Publish(const FaultEvent& event, bool persisted) {
   return Send(message);
 }
 
+// The log names the transition itself. On the bus a kind that its type does not
+// know goes by an older one (OnTheBus).
 bool BusEventSink::Send(const FaultEvent& message) {
   if (log_) {
     const Transition& transition = message.transition;

@@ -78,7 +78,7 @@ const Verdict& EpisodeName::Step(const Inputs& inputs) {
     if (choice.faults != now_.faults || choice.faults != told_) {
       Rename(choice, inputs);
     }
-    FollowSecond(inputs.engine);
+    FollowSecond(inputs);
   }
   if (open_) {
     WriteVerdict();
@@ -101,11 +101,19 @@ void EpisodeName::FollowLook(const Inputs& inputs) {
 }
 
 // Of a name that is not the engine's, the engine knows nothing on top.
-void EpisodeName::FollowSecond(const Verdict& engine) {
-  if ((now_.faults & engine.second.standing) == 0) {
-    verdict_.second = {};
+// A look that counts is the better judge of what is on top: observers know each
+// fault by itself, the physics simulates both at once.
+void EpisodeName::FollowSecond(const Inputs& inputs) {
+  SecondFault& second = verdict_.second;
+  if ((now_.faults & second.standing) == 0) {
+    second = {};
   }
-  const SecondFault& second = verdict_.second;
+  if (second.open && inputs.on_top) {
+    second.faults = SetOf(inputs.on_top->faults);
+    second.strength = second.faults != 0
+                          ? inputs.on_top->faults.front().estimate.strength
+                          : 0.0;
+  }
   if (second.open != second_.open || second.faults != second_.faults) {
     Announce(TransitionKind::kSecond);
   }

@@ -73,7 +73,8 @@ class EpisodeName {
     const Verdict& engine;
     FaultSet remembered{0};  ///< engine.isolated with the observers' memory.
     std::optional<Look> look{};
-    bool can_look{false};  ///< Looks are taken at this valve.
+    bool can_look{false};          ///< Looks are taken at this valve.
+    std::optional<Look> on_top{};  ///< At engine.second.
   };
 
   EpisodeName(std::shared_ptr<const ModelSet> models,
@@ -121,7 +122,7 @@ class EpisodeName {
   Choice OfObservers(const Inputs& inputs) const;
   bool InheritedStands(const Inputs& inputs) const;
   void FollowLook(const Inputs& inputs);
-  void FollowSecond(const Verdict& engine);
+  void FollowSecond(const Inputs& inputs);
   void Rename(const Choice& choice, const Inputs& inputs);
   void Estimates(const Inputs& inputs);
   const SeverityBands& BandsOf(int fault) const;

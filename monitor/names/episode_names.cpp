@@ -14,6 +14,21 @@ namespace {
 // Smaller changes of a strength are not worth a row of the history.
 constexpr double kMinMove = 0.02;
 
+EpisodeName::Look LookOf(const simulator::LookAnswer& answer,
+                         const std::vector<int>& names,
+                         const ModelSet& models) {
+  EpisodeName::Look look;
+  look.outside = answer.outcome == simulator::LookOutcome::kNoneFits;
+  for (const simulator::Explanation& e : answer.faults) {
+    const int index = FaultIndex(models, e.fault);
+    if (index >= 0 && std::ranges::count(names, e.fault) > 0) {
+      look.faults.push_back(
+          {static_cast<std::size_t>(index), {e.strength, e.lowest, e.highest}});
+    }
+  }
+  return look;
+}
+
 }  // namespace
 
 std::optional<EpisodeName::Look> LookThatCounts(
@@ -22,19 +37,16 @@ std::optional<EpisodeName::Look> LookThatCounts(
   const auto names = answer != nullptr
                          ? simulator::NamesBeside(engine, models, *answer)
                          : std::nullopt;
-  if (!names) {
-    return std::nullopt;
-  }
-  EpisodeName::Look look;
-  look.outside = answer->outcome == simulator::LookOutcome::kNoneFits;
-  for (const simulator::Explanation& e : answer->faults) {
-    const int index = FaultIndex(models, e.fault);
-    if (index >= 0 && std::ranges::count(*names, e.fault) > 0) {
-      look.faults.push_back(
-          {static_cast<std::size_t>(index), {e.strength, e.lowest, e.highest}});
-    }
-  }
-  return look;
+  return names ? std::optional(LookOf(*answer, *names, models)) : std::nullopt;
+}
+
+std::optional<EpisodeName::Look> SecondThatCounts(
+    const Verdict& engine, const ModelSet& models,
+    const simulator::LookAnswer* answer) {
+  const auto names =
+      answer != nullptr ? simulator::NamesOf(*answer, engine.second.faults != 0)
+                        : std::nullopt;
+  return names ? std::optional(LookOf(*answer, *names, models)) : std::nullopt;
 }
 
 EpisodeNames::EpisodeNames(std::string valve_id,
@@ -57,13 +69,16 @@ const Verdict& EpisodeNames::Step(const Sample& sample, const Verdict& engine,
       ForgetEpisode();
     }
   }
-  EpisodeName::Inputs inputs{engine, engine.isolated, {}, physics_ != nullptr};
+  EpisodeName::Inputs inputs{
+      engine, engine.isolated, {}, physics_ != nullptr, {}};
   const bool in_order = !OutOfOrder(engine.intake);
   if (looks_) {
     StepLooks(sample, engine, held);
     if (engine.detected && !held && in_order) {
       inputs.look = TakeAnswer(engine);
       inputs.remembered = looks_->Observed(*models_, engine.isolated);
+      inputs.on_top =
+          SecondThatCounts(engine, *models_, looks_->SecondAnswer());
     }
   }
   name_.Step(inputs);
@@ -170,8 +185,8 @@ void EpisodeNames::CollectAnswers() {
 }
 
 void EpisodeNames::RequestGrowth() {
-  if (known_.empty()) {
-    return;
+  if (known_.empty() || name_.verdict().second.open) {
+    return;  // A strength that explains both faults is that of neither.
   }
   if (auto task = looks_->GrowthTask(known_)) {
     const auto rows = static_cast<std::int64_t>(task->window.rows.size());

@@ -26,6 +26,11 @@ std::optional<EpisodeName::Look> LookThatCounts(
     const Verdict& engine, const ModelSet& models,
     const simulator::LookAnswer* answer);
 
+/// The same of what comes on top of the fault of the episode.
+std::optional<EpisodeName::Look> SecondThatCounts(
+    const Verdict& engine, const ModelSet& models,
+    const simulator::LookAnswer* answer);
+
 /// The episodes of one valve and what EpisodeName calls them: asks for second
 /// looks and for strengths when they are due, and gives it the answers. So what
 /// leaves the monitor is what `fdi-trainer evaluate` scores. Routine looks may

@@ -39,7 +39,8 @@ std::future<LookWorker::Answer> LookWorker::Submit(std::string valve_id,
   std::future<Answer> answer = look.answer.get_future();
   const MutexLock lock(mutex_);
   using simulator::LookOccasion;
-  const bool naming = look.task.occasion == LookOccasion::kEpisode;
+  const bool naming = look.task.occasion == LookOccasion::kEpisode ||
+                      look.task.occasion == LookOccasion::kSecond;
   const bool growth = look.task.occasion == LookOccasion::kGrowth;
   std::deque<Look>& waiting = naming ? waiting_ : growth ? growth_ : routine_;
   // A newer look at a valve makes one that still waits pointless. Looks for

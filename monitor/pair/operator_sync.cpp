@@ -54,6 +54,9 @@ void OperatorSync::Start() {
   });
 }
 
+// A reader that has just come has missed what was sent before, so all actions
+// of the last thirty days are sent again. Who has one already ignores it
+// (Adopt).
 void OperatorSync::SendActions() {
   if (out_.matched() == 0) {
     return;

@@ -7,6 +7,9 @@
 #include "base/toml_reader.h"
 #include "diagnosis/fault_catalogue.h"
 
+// groups.toml, and a common cause as `--on-event` delivers it (docs/planner.md,
+// "One cause for many"). An unknown key is an error, because a mistyped
+// `within_s` would leave the default in force without anybody noticing.
 namespace fdi::planner {
 namespace {
 
@@ -62,6 +65,8 @@ std::vector<storage::CauseGroup> ReadCauseGroups(
   return groups;
 }
 
+// The stamp is that of the end, and while the cause is open that of its
+// opening, also when a further valve joins it.
 report::Json CauseJson(const storage::CauseChange& change) {
   const storage::CommonCause& cause = change.cause;
   report::Json members = report::Json::array();

@@ -44,6 +44,8 @@ std::shared_ptr<const console::ModelFacts> PlantFeed::Add(
   return facts;
 }
 
+// Monitors are told apart by their participant, which every message has. The
+// name of a monitor comes only with its status.
 console::MonitorLine& PlantFeed::MarkAlive(const idl::Reception& reception,
                                            Clock::time_point now) {
   Monitor& monitor = monitors_[reception.participant_id];

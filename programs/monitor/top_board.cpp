@@ -129,6 +129,9 @@ void TopBoard::Hear(const idl::Reception& reception) {
   least = std::min(least, delay_ns);
 }
 
+// DDS hands the last vector of a valve to who comes late, so its arrival says
+// little. The smallest delay of a participant is the difference of both clocks
+// and the quickest way; what a vector took beyond that, it has waited.
 bool TopBoard::IsSilent(const LatestVector& latest,
                         Clock::time_point now) const {
   const auto least = least_delay_ns_.find(latest.participant_id);
@@ -173,6 +176,8 @@ std::string TopBoard::Health(Clock::time_point now) const {
   return text;
 }
 
+// The state is that of the vector. Since when it lasts, and that no known fault
+// fits, only the events of the episode say.
 Json TopBoard::RowOf(const LatestVector& latest, Clock::time_point now) const {
   const idl::DecisionMessage& message = latest.message;
   const Verdict& verdict = message.verdict;

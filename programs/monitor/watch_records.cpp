@@ -63,6 +63,8 @@ void WatchRecords::Add(const idl::DecisionMessage& message,
   Flush(now);
 }
 
+// Vectors are written in the order of their arrival, each once its model set is
+// known and gives its numbers names, or without names after kPatience.
 void WatchRecords::Flush(Clock::time_point now) {
   while (!waiting_.empty() && (names_.Explains(waiting_.front().second) ||
                                now - waiting_.front().first >= kPatience)) {

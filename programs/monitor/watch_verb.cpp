@@ -93,6 +93,7 @@ int RunWatch(const WatchOptions& given, const report::Context& context) {
     bus.Take(
         [&](const auto& message, const auto&) {
           counts.Add(message);
+          // Only what is of a valve: the status of a monitor comes each second.
           if constexpr (requires { message.valve_id; }) {
             last_message = Clock::now();
           }
@@ -104,6 +105,7 @@ int RunWatch(const WatchOptions& given, const report::Context& context) {
     records.Flush(Clock::now());
     std::cout.flush();
   }
+  // What still waits for its model set is printed without its names.
   records.Flush(Clock::time_point::max());
   if (options.count) {
     PrintCounts(counts, bus.lost(), json);

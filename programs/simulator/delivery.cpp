@@ -66,7 +66,8 @@ class Pacer {
   steady_clock::time_point start_;
 };
 
-// Delivers samples until the feed ends or a stop is requested.
+// Delivers samples until the feed ends or a stop is requested. A sample is
+// published first: what nobody could have received is not recorded either.
 void DeliverAll(Feed& feed, const FeedSinks& sinks, Pacer pacer,
                 std::vector<FedValve>& valves) {
   while (const auto next = feed.Next()) {

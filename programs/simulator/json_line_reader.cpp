@@ -92,6 +92,8 @@ std::optional<JsonRow> JsonLineReader::TakeLine(std::string_view line) {
   return row;
 }
 
+// F_m3_h and F_t_h are one signal: the unit of the first line that has it
+// holds.
 void JsonLineReader::Set(const std::string& key, double value, JsonRow& row) {
   if (IsTime(key)) {
     row.t_s = value;

@@ -93,6 +93,8 @@ void SamplePublisher::AwaitReader() {
   }
 }
 
+// A lossless writer tries a sample until there is room, so that the reader sets
+// the pace. Otherwise a sample that finds no room is gone, as on a live bus.
 bool SamplePublisher::Publish(std::size_t valve, const Sample& sample) {
   message_.valve_id = valve_ids_[valve];
   message_.sample = sample;
@@ -117,6 +119,8 @@ bool SamplePublisher::Publish(std::size_t valve, const Sample& sample) {
   return false;
 }
 
+// A stop shortens the wait and does not end it: the last samples are on their
+// way.
 bool SamplePublisher::AwaitAcknowledged() {
   auto deadline = steady_clock::now() +
                   (options_.lossless ? kLosslessAcknowledge : kLiveAcknowledge);
@@ -133,6 +137,8 @@ bool SamplePublisher::AwaitAcknowledged() {
   return true;
 }
 
+// The streams end after their samples have arrived. After a stop that left some
+// unacknowledged they are not ended, because that would be waited for, too.
 bool SamplePublisher::Finish() {
   bool complete = AwaitAcknowledged();
   const bool giving_up = !complete && signals_.stop_requested();

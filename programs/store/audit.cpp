@@ -124,6 +124,8 @@ std::optional<std::string> ColumnOf(std::span<const char* const> names,
   return std::nullopt;
 }
 
+// The record of one loop, cut into stretches without a gap. `gain_sign` is that
+// of the loop, from OP to what is judged: 0 if only the record can tell.
 struct LoopRecord {
   std::string loop;
   std::string source;
@@ -182,6 +184,7 @@ LoopRecord ReadLoop(const std::string& file, const AuditOptions& options,
   csv.source = file;
   csv.map = LoopMap(lines, options, file);
   csv.split_gaps = true;
+  // A PV is in any unit, so the plausible range of F does not apply to it.
   csv.check_values = false;
   csv.skip_repeats = true;
   csv.log = context.log;
@@ -315,7 +318,9 @@ void SetService(char service, loop::Window& window) {
   }
 }
 
-// The loop of `part`; nothing if no PV, F or X is there throughout.
+// The loop of `part`; nothing if no PV, F or X is there throughout. It is read
+// off the first of these that is: a change from one to another within a window
+// would look like a step of the process.
 std::optional<loop::Window> WindowOf(Samples part, double period_s,
                                      char service, const LoopRecord& record,
                                      const AuditOptions& options) {
@@ -384,6 +389,10 @@ std::string HintOf(const Judged& one, bool has_sp) {
   return {};
 }
 
+// Cuts the stretches in automatic into windows and judges each. A slow record
+// gets windows longer than `--window`, because an audit takes a number of
+// samples, not of seconds. Parts that are too short are counted, and told once
+// for the record.
 void JudgeRecord(const LoopRecord& record, const AuditOptions& options,
                  std::vector<Judged>& judged, Json& skipped) {
   const char service =
@@ -440,6 +449,7 @@ Json Optional(bool known, double value) {
   return known ? NumberJson(value) : Json(nullptr);
 }
 
+// A figure for which the window has no evidence is null, not 0.
 Json JudgedJson(const Judged& one) {
   const loop::Evidence& e = one.audit.evidence;
   const loop::PlayFit fit = e.fit.value_or(loop::PlayFit{});
@@ -523,7 +533,9 @@ void Rank(std::vector<Judged>& judged) {
 }
 
 // Loops that oscillate regularly with periods within 5 % of one another: one
-// cause, perhaps, in the loop among them that is sticky or badly tuned.
+// cause, perhaps, in the loop among them that is sticky or badly tuned. A group
+// is measured from its shortest period: a chain of periods, each close to the
+// next, is not one group.
 Json CommonPeriods(const std::vector<Judged>& judged) {
   struct Wave {
     double period_s;
@@ -691,6 +703,7 @@ Report AuditLoops(const AuditOptions& options, const Context& context) {
     throw ConfigError("audit: nothing to read; try FILE, --runs or --valve");
   }
   if (!options.plot.empty()) {
+    // A name that cannot be drawn to is refused before the files are judged.
     plot::FormatOf(options.plot);
   }
   std::vector<Judged> judged;

@@ -153,6 +153,9 @@ const std::vector<std::string>& EpisodeKeys() {
   return keys;
 }
 
+// An episode is stored with the name that its fault had in the catalogue of
+// then. That name is shown, unless the user states a catalogue or it was stored
+// without one.
 void NameFaults(std::vector<Episode>& episodes, const Context& context) {
   std::optional<report::FaultTexts> texts;
   for (Episode& episode : episodes) {
@@ -169,6 +172,7 @@ void NameFaults(std::vector<Episode>& episodes, const Context& context) {
   }
 }
 
+// A strength is that of a fault: while there is no name, it is null and not 0.
 Json EpisodeJson(const Alarm& alarm) {
   const Episode& episode = alarm.episode;
   const bool named = IsNamed(episode);

@@ -102,6 +102,7 @@ Report Statistics(const HistoryOptions& options, const Context& context) {
   const AlarmStatistics alarms = history->AlarmFigures(filter, filter.now_ns);
   const std::vector<DataGap> gaps = history->Gaps(filter);
   const std::vector<CoverageTime> coverage = history->Coverage(filter);
+  // A gap counts by the part of it that lies in the time that was asked for.
   double gaps_s = 0.0;
   for (const DataGap& gap : gaps) {
     const std::int64_t from_ns = std::max(gap.from_ns, filter.since_ns);

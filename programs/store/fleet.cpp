@@ -74,6 +74,8 @@ Report WriteFleet(const FleetOptions& options, const Context& context) {
   }
   std::unique_ptr<History> history;
   const bool of_plant = options.plant.asked();
+  // Runs and models are enough for a report. Where there are none either, the
+  // missing history is the mistake to tell.
   const bool only_runs = !of_plant &&
                          !std::filesystem::exists(data.history()) &&
                          (std::filesystem::exists(data.runs()) ||

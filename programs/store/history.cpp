@@ -61,7 +61,8 @@ Json ListedJson(const Alarm& alarm) {
   return row;
 }
 
-// "2026-11-20 14:56", by the clock on the wall.
+// "2026-11-20 14:56", by the clock on the wall: a list is for finding an
+// episode, and `history show` has the seconds.
 std::string WallClock(const Json& time, bool utc) {
   const std::int64_t stamp_ns = ParseTime(time.get<std::string>(), true);
   std::string text = FormatTime(stamp_ns / 1'000'000'000 * 1'000'000'000, utc);
@@ -152,6 +153,7 @@ std::string SecondText(const std::string& value) {
                               : "and " + value;
 }
 
+// Why the engine changed its mind, or what a person did, from where and why.
 std::string NoteText(const HistoryEntry& event) {
   if (event.who.empty()) {
     if (const auto severity = event.priority && event.kind == "CHANGED"
@@ -261,6 +263,7 @@ const char* TrendName(const GrowthRate& rate) {
   return rate.grows() ? "growing" : rate.falls() ? "falling" : "steady";
 }
 
+// All keys are there; those of a rate that is not known yet are null.
 Json GrowthJson(const Growth& growth) {
   const StrengthPoint& last = growth.last;
   Json json = {{"fault", FaultName(last.fault)},
@@ -289,6 +292,7 @@ Json GrowthJson(const Growth& growth) {
   return json;
 }
 
+// One estimate of the series that GrowthOf() is computed from.
 Json StrengthJson(const StrengthPoint& p) {
   return {{"stamp_utc", TimeJson(p.stamp_ns)},
           {"fault", FaultName(p.fault)},

@@ -58,6 +58,8 @@ bool Exists(const std::filesystem::path& path) {
   return there;
 }
 
+// Whatever is wrong with a file becomes its trouble, so that the others are
+// examined all the same.
 Json Examine(const File& file) {
   Json finding = {{"name", file.name},
                   {"present", false},
@@ -205,6 +207,8 @@ Report Doctor(const NoOptions&, const Context& context) {
   return report;
 }
 
+// All copies are refused if one of them exists already: a folder must not hold
+// files of two backups.
 Report Backup(const std::string& target, const Context& context) {
   const std::filesystem::path folder(target);
   const DataDirectory data = DataOf(context);
@@ -232,6 +236,8 @@ Report Backup(const std::string& target, const Context& context) {
   return report;
 }
 
+// To open a database as a writer is to migrate it, which keeps a copy of the
+// old one.
 Report Migrate(const NoOptions&, const Context& context) {
   Report report;
   report.document["databases"] = Json::array();
@@ -282,7 +288,8 @@ struct PruneOptions {
   bool trust_clock{false};
 };
 
-// One row per kind of record that has a limit.
+// One row per kind of record that has a limit. The clock matters to what is
+// deleted by age, so a dry run and a limit of size do not ask about it.
 Json PruneAll(const PruneOptions& options, const DataDirectory& data) {
   struct Task {
     const AgeAndSize& asked;

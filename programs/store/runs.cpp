@@ -168,6 +168,7 @@ struct RunImportOptions {
   bool assume_normal{false};
 };
 
+// Each import is a source of its own: samples of two files are not one stream.
 std::uint64_t RandomSource() {
   std::random_device device;
   return (std::uint64_t{device()} << 32U) | device();
@@ -257,6 +258,8 @@ struct FileOptions {
   std::string output;
 };
 
+// What the intake rejected is left out, because late and repeated samples would
+// make a file that cannot be imported.
 int ExportRun(const FileOptions& options, const Context& context) {
   const StoredRun run = RunStore(DataOf(context).runs()).Load(options.selector);
   std::vector<LabelledSample> samples;

@@ -1,3 +1,6 @@
+// fdi-trainer limits: the limits of an onboarded valve by more healthy hours.
+// What becomes of them is decided in trainer/learning/limits_plan.h; here it is
+// said, limit by limit, what changes and where the data came closest.
 #include <optional>
 
 #include <CLI/CLI.hpp>
@@ -52,6 +55,8 @@ Json LimitsJson(const LimitsPlan& plan) {
   return rows;
 }
 
+// Only the faults for which the smallest strength that passes a limit has
+// changed.
 Json VisibilityJson(const std::vector<Visibility>& faults) {
   Json rows = Json::array();
   for (const Visibility& fault : faults) {
@@ -91,6 +96,8 @@ Json EpisodesJson(const LimitsPlan& plan) {
   return rows;
 }
 
+// Time that the limits do not rest on: that of episodes, and that of samples
+// that would not have been judged, by the quality that they would have had.
 Json LeftOutJson(const LimitsPlan& plan) {
   Json rows = Json::array();
   const auto add = [&](std::string reason, double seconds) {

@@ -1,3 +1,6 @@
+// fdi-trainer train: from stored runs, from a campaign, which simulates or
+// imports what is missing, or from what people have labelled. A list of runs is
+// a campaign in memory, so that both are trained in one way.
 #include <charconv>
 #include <chrono>
 #include <cmath>
@@ -183,6 +186,8 @@ report::Report TrainAndStore(const std::vector<TrainingRun>& runs,
   return report;
 }
 
+// Strengths by the begin of an episode id. 0 is refused: that there was no
+// fault is said by the label `false`.
 GivenStrengths ParseStrengths(const std::vector<std::string>& texts) {
   GivenStrengths strengths;
   for (const std::string& text : texts) {
@@ -261,6 +266,9 @@ void CheckTeaching(const TrainOptions& options, const ModelSet& parent) {
   }
 }
 
+// What the plan shows to be wrong is refused before the evidence of the labels
+// is stored. A set of onboarding then gets further observers (TeachAndStore);
+// any other is trained anew on its own runs and on that evidence.
 report::Report TrainFromLabels(const TrainOptions& options,
                                const report::Context& context) {
   const storage::DataDirectory directory{context.options.data_dir};

@@ -11,6 +11,9 @@
 #include "report/text_table.h"
 #include "storage/history/certainty.h"
 
+// The page of an episode, to take to the valve (docs/reports.md, "The page of
+// an episode"). `fdi-store history report` and the console make the same page,
+// and `history show` has the fields of its first part.
 namespace fdi::plot {
 namespace {
 
@@ -194,6 +197,8 @@ void AddChecks(const Episode& episode, const report::FaultTexts& texts,
   }
 }
 
+// The page is worth printing without its picture, too: what gnuplot lacks or
+// refuses becomes a sentence in its place.
 void AddPicture(const EpisodeEvidence& evidence,
                 const report::FaultTexts& texts, const GnuplotLimits& limits,
                 report::Report& page) {

@@ -50,7 +50,9 @@ path Resolve(const path& folder, const path& file) {
   return file.is_absolute() ? file : folder / file;
 }
 
-// Sets the fields that the table contains; all keys become known.
+// Sets the fields that the table contains; all keys become known. A field whose
+// key is not there keeps its value, which is that of the base, of an earlier
+// scenario or the default.
 class FieldReader {
  public:
   explicit FieldReader(TomlReader& table) : table_(table) {}
@@ -60,6 +62,7 @@ class FieldReader {
   }
   void operator()(const char* key, int& field) {
     constexpr int kMaxInt = std::numeric_limits<int>::max();
+    // Number() refuses what is beyond an int, before Integer() is cast to one.
     if (table_.Number(key, -kMaxInt, kMaxInt)) {
       field = static_cast<int>(*table_.Integer(key));
     }
@@ -151,6 +154,8 @@ class FieldWriter {
 
 // Appends the fields of `value` that differ from those of `defaults`.
 template <typename Struct>
+// Appends the fields of `value` that differ from those of `defaults`. Both are
+// copies, because VisitFields() serves readers and writers and takes no const.
 void AppendDifferences(const std::string& prefix, Struct value, Struct defaults,
                        Lines& result) {
   Lines lines;
@@ -219,6 +224,8 @@ void LoadExcitation(const path& folder, const std::string& file,
   scenario.config.excitation = std::move(recorded);
 }
 
+// The name comes first, as it sets all values of its kind; the other keys of
+// the table then change some of them.
 void ReadExcitation(TomlReader& table, const path& folder, Scenario& scenario) {
   constexpr const char* kKey = "excitation";
   if (table.IsTable(kKey)) {
@@ -234,6 +241,8 @@ void ReadExcitation(TomlReader& table, const path& folder, Scenario& scenario) {
   table.At(kKey, [&] { Validate(scenario.config.excitation); });
 }
 
+// An empty list takes the faults of an earlier scenario away, a missing key
+// leaves them. So it is with inputs and modes.
 void ReadFaults(TomlReader& table, ValveSimulationConfig& config) {
   constexpr const char* kKey = "faults";
   const auto texts = table.Texts(kKey);
@@ -299,7 +308,8 @@ void ReadNumbers(TomlReader& table, ValveSimulationConfig& config) {
   }
 }
 
-// Parses the value as TOML if possible, else as text.
+// Parses the value as TOML if possible, else as text, so that a word needs no
+// quotes within those of the shell.
 TomlReader ReaderOf(const std::string& setting, std::string_view key,
                     std::string_view value) {
   const std::string source = "setting '" + setting + "'";
@@ -311,6 +321,8 @@ TomlReader ReaderOf(const std::string& setting, std::string_view key,
   }
 }
 
+// What differs from a shipped set; a valve that is based on none of them is
+// written as the difference from the first.
 void AppendParameters(const ValveParameters& parameters, Lines& result) {
   const auto names = ParameterSetNames();
   const bool shipped = std::ranges::count(names, parameters.name) > 0;
@@ -397,6 +409,9 @@ void ChooseExcitation(const std::string& name, const path& folder,
   scenario.excitation_file.clear();
 }
 
+// The order matters. The default of an inventory loop depends on the medium,
+// which is one of the parameters; a recorded excitation brings a period and a
+// duration, which the numbers behind it override.
 void ApplyScenario(TomlReader& table, const path& folder, Scenario& scenario) {
   ValveSimulationConfig& config = scenario.config;
   scenario.valve_id = table.Text("valve").value_or(scenario.valve_id);

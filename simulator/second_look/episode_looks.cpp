@@ -216,7 +216,8 @@ std::optional<LookAnswer> TakeLook(const ValvePhysics& physics,
   // Routine looks come for every valve every five minutes. Where the valve is
   // healthy, one simulation without a fault has to be enough.
   double without_fault = 0.0;
-  if (task.occasion != LookOccasion::kEpisode) {
+  if (task.occasion != LookOccasion::kEpisode &&
+      task.occasion != LookOccasion::kSecond) {
     without_fault = MisfitWithoutFault(physics, task.window);
     if (task.occasion == LookOccasion::kStill ||
         without_fault <= kHealthyMisfit) {
@@ -363,23 +364,24 @@ void EpisodeLooks::BeginRows(std::int64_t stamp_ns) {
   rows_.clear();
 }
 
-std::optional<LookTask> EpisodeLooks::Task() const {
+std::optional<LookTask> EpisodeLooks::Task(std::int64_t detection_ns) const {
   LookTask task;
-  task.detection_stamp_ns = *detection_ns_;
+  task.detection_stamp_ns = detection_ns;
   task.set_back_ns = set_back_ns_;
   task.window.signals = signals_;
   task.window.at_position = at_position_;
   task.slowness = slowness_;
-  const std::int64_t begin_ns = *detection_ns_ - set_back_ns_;
+  const std::int64_t begin_ns = detection_ns - set_back_ns_;
   // A routine look finds what has been there for minutes.
+  const bool by_routine = by_routine_ && detection_ns == detection_ns_;
   const std::int64_t from_ns =
-      by_routine_ ? rows_.front().stamp_ns
-                  : begin_ns - static_cast<std::int64_t>(kBefore) * period_ns_;
+      by_routine ? rows_.front().stamp_ns
+                 : begin_ns - static_cast<std::int64_t>(kBefore) * period_ns_;
   for (const Row& row : rows_) {
     if (row.stamp_ns < from_ns) {
       continue;
     }
-    if (row.stamp_ns < begin_ns && !by_routine_) {
+    if (row.stamp_ns < begin_ns && !by_routine) {
       task.window.detection = task.window.rows.size() + 1;
     }
     task.window.rows.push_back(row.row);
@@ -426,12 +428,41 @@ std::optional<LookTask> EpisodeLooks::GrowthTask(
     std::vector<Explanation> known) const {
   std::optional<LookTask> task;
   if (detection_ns_ && !rows_.empty()) {
-    task = Task();
+    task = Task(*detection_ns_);
   }
   if (task) {
     task->occasion = LookOccasion::kGrowth;
     task->known = std::move(known);
   }
+  return task;
+}
+
+// Only as long as the window begins with the standing fault alone: from there
+// it is known what is usual with it.
+std::optional<LookTask> EpisodeLooks::SecondTask(const Verdict& verdict) {
+  constexpr std::size_t kLeastBefore = 60;
+  const SecondFault& second = verdict.second;
+  if (!second.open || second.standing_strength == 0.0 || at_position_) {
+    return std::nullopt;
+  }
+  if (std::exchange(second_ns_, second.detection_stamp_ns) !=
+      second.detection_stamp_ns) {
+    second_age_ns_ = kFirstAge;
+  }
+  const std::int64_t age_ns =
+      rows_.back().stamp_ns + set_back_ns_ - second.detection_stamp_ns;
+  if (age_ns < slowness_ * second_age_ns_) {
+    return std::nullopt;
+  }
+  while (age_ns >= slowness_ * second_age_ns_) {
+    second_age_ns_ = AgeAfter(second_age_ns_);
+  }
+  std::optional<LookTask> task = Task(second.detection_stamp_ns);
+  if (!task || task->window.detection < kLeastBefore) {
+    return std::nullopt;
+  }
+  task->occasion = LookOccasion::kSecond;
+  task->window.standing_strength = second.standing_strength;
   return task;
 }
 
@@ -481,7 +512,11 @@ std::optional<LookTask> EpisodeLooks::Step(const Sample& sample,
     while (is_due()) {
       next_age_ns_ = AgeAfter(next_age_ns_);
     }
-    due = Task();
+    // This look would see both faults at once.
+    due = verdict.second.open ? std::nullopt : Task(*detection_ns_);
+  }
+  if (detection_ns_ && !due) {
+    due = SecondTask(verdict);
   }
   // If there are not more rows than were judged before, AddRow() has begun
   // anew, and so does the count: all rows of a routine look have been judged.
@@ -643,6 +678,12 @@ std::optional<LookTask> ValveLooks::Step(const Sample& sample,
   const LookAnswer* found = suspicion_.found();
   auto due = looks_.Step(trained_.Of(sample), verdict, found != nullptr);
   open_ = verdict.detected;
+  second_ns_ = verdict.second.open ? verdict.second.detection_stamp_ns : 0;
+  if (due && due->occasion == LookOccasion::kSecond) {
+    // Without a set the bits of its faults mean nothing.
+    due->window.standing =
+        models_ != nullptr ? models_->faults[verdict.second.standing_bit] : 0;
+  }
   for (const Transition& transition : verdict.Transitions()) {
     detection_ns_ = transition.detection_stamp_ns;
     if (transition.kind == TransitionKind::kDetected && found != nullptr) {
@@ -680,7 +721,11 @@ void ValveLooks::Enter(const LookTask& task, LookAnswer answer) {
   if (models_ != nullptr) {
     BindGroups(models_->groups, answer);
   }
-  if (task.occasion != LookOccasion::kEpisode) {
+  if (task.occasion == LookOccasion::kSecond) {
+    if (task.detection_stamp_ns == second_ns_) {
+      second_book_.Enter(task, std::move(answer));
+    }
+  } else if (task.occasion != LookOccasion::kEpisode) {
     suspicion_.Enter(task.stamp_ns, std::move(answer));
   } else if (task.detection_stamp_ns == detection_ns_) {
     if (answer.outcome == LookOutcome::kNothing && !answer.early) {
@@ -692,6 +737,11 @@ void ValveLooks::Enter(const LookTask& task, LookAnswer answer) {
 
 const LookAnswer* ValveLooks::Answer() const {
   return open_ ? book_.At(detection_ns_, stamp_ns_) : nullptr;
+}
+
+const LookAnswer* ValveLooks::SecondAnswer() const {
+  return open_ && second_ns_ != 0 ? second_book_.At(second_ns_, stamp_ns_)
+                                  : nullptr;
 }
 
 FaultSet ValveLooks::Observed(const ModelSet& models, FaultSet isolated) const {

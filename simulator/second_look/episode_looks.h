@@ -21,13 +21,15 @@ enum class LookOccasion : std::uint8_t {
   kRoutine,  ///< There is no episode: should there be one?
   kStill,    ///< A routine look opened it: is the valve abnormal still?
   kGrowth,   ///< There is a name: how strong are its faults by now?
+  kSecond,   ///< To name what comes on top of the fault of an open episode.
 };
 
 /// A look that is due: at what, and for which episode.
 struct LookTask {
   LookWindow window;
   std::int64_t stamp_ns{0};            ///< Of the last row.
-  std::int64_t detection_stamp_ns{0};  ///< Key of the episode.
+  std::int64_t detection_stamp_ns{0};  ///< Key of the episode, or of what
+                                       ///< comes on top (kSecond).
   LookOccasion occasion{LookOccasion::kEpisode};
   std::vector<Explanation> known{};  ///< Of kGrowth: EstimateStrengths().
   std::int64_t slowness{1};          ///< See SlownessOf().
@@ -145,8 +147,10 @@ inline constexpr std::int64_t kRoutineDelayNs = 60'000'000'000;
 /// should look at an episode that is open: 20 (early), 40, 150 and 300 s after
 /// its detection, then at twice the age each time. While there is none, or
 /// one that a routine look opened, a routine look is due every 300 s, at the
-/// same stamps whenever a program was started. All of these are longer by
-/// SlownessOf() the period. Keeps the last 420 samples.
+/// same stamps whenever a program was started. What comes on top of the fault
+/// of an episode is looked at 40, 150 and 300 s after it was detected, with
+/// that fault as it stood before. All of these are longer by SlownessOf() the
+/// period. Keeps the last 420 samples.
 class EpisodeLooks {
  public:
   /// `physics` must outlive it.
@@ -171,7 +175,8 @@ class EpisodeLooks {
   void AddRow(const Sample& sample);
   void BeginRows(std::int64_t stamp_ns);
   double FlowShare(bool last) const;
-  std::optional<LookTask> Task() const;
+  std::optional<LookTask> Task(std::int64_t detection_ns) const;
+  std::optional<LookTask> SecondTask(const Verdict& verdict);
   std::optional<LookTask> RoutineTask(bool suspected) const;
 
   const ValvePhysics& physics_;
@@ -187,10 +192,12 @@ class EpisodeLooks {
   std::optional<double> share_before_{};
   std::optional<std::int64_t> detection_ns_{};
   std::int64_t next_age_ns_{0};
-  std::int64_t set_back_ns_{0};  // See LookTask.
-  bool by_routine_{false};       // The open episode.
-  std::size_t judged_{0};        // Rows in a row that a routine look may have.
-  std::int64_t slot_{0};         // Of a routine look.
+  std::int64_t set_back_ns_{0};    // See LookTask.
+  bool by_routine_{false};         // The open episode.
+  std::int64_t second_ns_{0};      // Detection of what is on top.
+  std::int64_t second_age_ns_{0};  // Of the next look at it.
+  std::size_t judged_{0};  // Rows in a row that a routine look may have.
+  std::int64_t slot_{0};   // Of a routine look.
 };
 
 /// The answer of the layer that speaks last: that of the last look at the open
@@ -280,6 +287,8 @@ class ValveLooks {
 
   /// What counts for the open episode at the last sample, if there is one.
   const LookAnswer* Answer() const;
+  /// The same for what is on top of the fault of that episode.
+  const LookAnswer* SecondAnswer() const;
 
   /// What the observers name at the last sample, where the engine isolates
   /// `isolated`: see ObserversMemory. Empty if that is more than
@@ -302,10 +311,12 @@ class ValveLooks {
   TrainedSignals trained_;
   std::int64_t period_ns_;
   LookBook book_;
+  LookBook second_book_;  // Of what is on top.
   Suspicion suspicion_;
   ObserversMemory memory_;
   std::int64_t stamp_ns_{0};
   std::int64_t detection_ns_{0};
+  std::int64_t second_ns_{0};  // Detection of what is on top; 0: nothing is.
   bool open_{false};
 };
 

@@ -90,6 +90,11 @@ class Looker {
         rows_(static_cast<int>(window.rows.size())),
         detection_(static_cast<int>(window.detection)) {
     valve_.instruments.flow.high = MeterEnd();
+    if (window_.standing != 0) {
+      ApplyFault(window_.standing, window_.standing_strength, standing_);
+      bare_ = Simulate(0, 0.0, {0, false});
+      stands_ = true;
+    }
     // Before any fault: those of the flow alone are built on it, and the effect
     // of every fault is the difference from it.
     healthy_ = Simulate(0, 0.0, {0, false});
@@ -112,6 +117,8 @@ class Looker {
   double MeterEnd() const;
   void FindUsualInputs();
   InputRow InputAt(int row, int fault, double strength) const;
+  void Hide(int fault, const InputRow& instead, InputRow& input) const;
+  FaultEffects EffectsOf(bool stands, int fault, double strength) const;
   bool IsSeenInInputs(const Hypothesis& h) const;
   Trajectory Simulate(int fault, double strength, Course course,
                       double supply = 1.0);
@@ -146,7 +153,10 @@ class Looker {
   int detection_;
   InputRow usual_{};  // Mean inputs before the detection, or in onboarding.
   std::optional<double> command_away_{};
-  Trajectory healthy_;
+  FaultEffects standing_{};  // What the standing fault does,
+  bool stands_{false};       // and whether it acts by now.
+  Trajectory bare_;          // Without it; empty if there is none.
+  Trajectory healthy_;       // With it: what is expected.
 };
 
 // Of a valve in another size than its type the range of the flow transmitter is
@@ -207,22 +217,44 @@ InputRow Looker::InputAt(int row, int fault, double strength) const {
   InputRow input = window_.rows[static_cast<std::size_t>(row)].input;
   input.cv_pct = DelayedCommand(window_.rows, static_cast<std::size_t>(row),
                                 physics_.drive.command_delay);
-  const auto hidden =
-      strength == 0.0 || fault == 0 ? std::nullopt : FaultFactsOf(fault).hides;
-  if (hidden == Signal::kT1) {
-    input.t1_degc = usual_.t1_degc;
-  } else if (hidden == Signal::kP1) {
-    input.p1_kpa = usual_.p1_kpa;
-  } else if (hidden == Signal::kP2) {
-    input.p2_kpa = usual_.p2_kpa;
-  } else if (ActsOnInputs(fault) && strength != 0.0) {
-    // What is measured has moved already; what is not is the usual value still.
-    FaultEffects effects;
-    ApplyFault(fault, strength, effects);
-    input.p1_kpa *= Measures(Signal::kP1) ? 1.0 : effects.inlet_factor;
-    input.p2_kpa *= Measures(Signal::kP2) ? 1.0 : effects.outlet_factor;
+  if (stands_) {
+    // Before this window it was there already, so what is usual in it does not
+    // tell either.
+    Hide(window_.standing,
+         {0.0, physics_.p1.mean, physics_.p2.mean, physics_.t1.mean}, input);
   }
+  if (strength != 0.0 && fault != 0) {
+    Hide(fault, usual_, input);
+  }
+  // What is measured has moved already; what is not is the usual value still.
+  const FaultEffects effects =
+      EffectsOf(stands_ && ActsOnInputs(window_.standing),
+                ActsOnInputs(fault) ? fault : 0, strength);
+  input.p1_kpa *= Measures(Signal::kP1) ? 1.0 : effects.inlet_factor;
+  input.p2_kpa *= Measures(Signal::kP2) ? 1.0 : effects.outlet_factor;
   return input;
+}
+
+void Looker::Hide(int fault, const InputRow& instead, InputRow& input) const {
+  const auto hidden = FaultFactsOf(fault).hides;
+  if (hidden == Signal::kT1) {
+    input.t1_degc = instead.t1_degc;
+  } else if (hidden == Signal::kP1) {
+    input.p1_kpa = instead.p1_kpa;
+  } else if (hidden == Signal::kP2) {
+    input.p2_kpa = instead.p2_kpa;
+  }
+}
+
+// Of a fault, and of the standing one beside it where that `stands`.
+FaultEffects Looker::EffectsOf(bool stands, int fault, double strength) const {
+  FaultEffects effects = stands ? standing_ : FaultEffects{};
+  if (fault == kLowFlow) {
+    effects.flow_reading_factor *= 1.0 - strength;
+  } else if (fault != 0 && strength != 0.0) {
+    ApplyFault(fault, strength, effects);
+  }
+  return effects;
 }
 
 // The fault acts on an input that is measured, where it would be seen. Without
@@ -240,7 +272,9 @@ bool Looker::IsSeenInInputs(const Hypothesis& h) const {
 
 Trajectory Looker::Simulate(int fault, double strength, Course course,
                             double supply) {
-  if (ActsOnFlowAlone(fault) || (window_.at_position && fault != 0)) {
+  const bool reads_rod = !stands_ || standing_.position_reading_factor == 1.0;
+  if ((ActsOnFlowAlone(fault) && (reads_rod || fault == kLowFlow)) ||
+      (window_.at_position && fault != 0)) {
     return FlowOnly(fault, strength, course);
   }
   ValveSimulationConfig config;
@@ -259,14 +293,19 @@ Trajectory Looker::Simulate(int fault, double strength, Course course,
   config.resolution = false;
   // Half the time of 1, for an error of 0.02 % of X (record_fit.h).
   config.tolerance_scale = 10.0;
+  FaultSchedule schedule;
+  if (stands_ && ReachesValve(window_.standing)) {
+    schedule.fault = window_.standing;
+    schedule.final_strength = window_.standing_strength;
+    config.faults.push_back(schedule);
+  }
   if (ReachesValve(fault)) {
-    FaultSchedule schedule;
     schedule.fault = fault;
     schedule.start_s = course.start * config.period_s;
     schedule.final_strength = strength;
     schedule.development_s =
         course.growing ? (rows_ - 1 - course.start) * config.period_s : 0.0;
-    config.faults = {schedule};
+    config.faults.push_back(schedule);
   }
   ValveSimulation simulation(config);
   Trajectory answers;
@@ -283,16 +322,10 @@ Trajectory Looker::Simulate(int fault, double strength, Course course,
 Trajectory Looker::FlowOnly(int fault, double strength, Course course) const {
   Trajectory answers = healthy_;
   for (int k = course.start; k < rows_; ++k) {
-    FaultEffects effects;
     const double now = StrengthAt(k, strength, course);
-    if (fault == kLowFlow) {
-      effects.flow_reading_factor = 1.0 - now;
-    } else {
-      ApplyFault(fault, now, effects);
-    }
-    if (!ReachesValve(fault)) {
-      effects = {};
-    }
+    const FaultEffects effects =
+        EffectsOf(stands_ && ReachesValve(window_.standing),
+                  ReachesValve(fault) ? fault : 0, now);
     RecordAnswer& answer = answers[static_cast<std::size_t>(k)];
     answer.flow =
         FlowReading(valve_, effects, InputAt(k, fault, now), answer.x_pct);
@@ -329,12 +362,15 @@ ChannelFit Looker::FitChannel(const Trajectory& answers, bool flow,
     }
     const RecordAnswer& answer = answers[at];
     const RecordAnswer& without = healthy_[at];
+    const RecordAnswer& bare = bare_.empty() ? without : bare_[at];
     const double error =
         flow ? row.flow - answer.flow : row.x_pct - answer.x_pct;
     const double effect =
         flow ? answer.flow - without.flow : answer.x_pct - without.x_pct;
     errors.push_back(error / scatter.sd);
-    const double away = kEffectError * effect / scatter.sd;
+    const double stands =
+        flow ? without.flow - bare.flow : without.x_pct - bare.x_pct;
+    const double away = kEffectError * std::hypot(effect, stands) / scatter.sd;
     widths.push_back(1.0 + away * away);
   }
   const double correlation_time = CorrelationTime(scatter, errors.size());
@@ -508,8 +544,8 @@ std::vector<Hypothesis> Looker::Hypotheses() const {
   std::vector<Hypothesis> hypotheses;
   for (int fault = 1; fault <= kLastFault; ++fault) {
     const FaultFacts& facts = FaultFactsOf(fault);
-    if (facts.weak || !IsVisibleIn(fault, window_.signals) ||
-        !Exists(fault, valve_) ||
+    if (facts.weak || fault == window_.standing ||
+        !IsVisibleIn(fault, window_.signals) || !Exists(fault, valve_) ||
         (window_.at_position && ShowsInRodAlone(fault))) {
       continue;
     }
@@ -535,7 +571,8 @@ double Looker::ObservedStop() const {
   }
   const auto most = x.begin() + static_cast<std::ptrdiff_t>(x.size() * 49 / 50);
   std::nth_element(x.begin(), most, x.end());
-  return std::clamp(1.0 - 0.01 * *most, 0.0, 1.0);
+  const double read = 0.01 * *most / standing_.position_reading_factor;
+  return std::clamp(1.0 - read, 0.0, 1.0);
 }
 
 void Looker::Try(Hypothesis& h, double strength) {

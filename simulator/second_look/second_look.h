@@ -16,6 +16,10 @@ struct LookWindow {
   std::size_t detection{0};     ///< Row of the first abnormal sample; 0 if it
                                 ///< lies before the window.
   SignalMask signals{0};        ///< That were measured.
+  /// A fault that acts all the time: what is sought comes on top of it. 0:
+  /// none.
+  int standing{0};
+  double standing_strength{0.0};  ///< Signed [-].
   /// The command of the rows is the position that was read
   /// (PositionAsCommand): faults of which only the rod's way to it tells are no
   /// hypotheses.

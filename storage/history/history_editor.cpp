@@ -85,6 +85,8 @@ bool Replaces(const Shelf& shelf, const Shelf& before, std::int64_t now_ns) {
              : IsActive(before, now_ns);
 }
 
+// The label as it is stored: true, false, or a fault by its name in the
+// catalogue, whatever case or alias was typed.
 std::string CheckedLabel(std::string_view label) {
   if (label == "true" || label == "false") {
     return std::string(label);

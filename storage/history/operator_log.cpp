@@ -32,6 +32,10 @@ OperatorAction ActionOf(const Shelf& shelf) {
 OperatorLog::OperatorLog(const std::filesystem::path& path)
     : database_(path, HistorySchema(), Access::kReader) {}
 
+// Notes are only added, so the number of the last one is enough to go on from.
+// A shelf is told twice, when it begins and when it ends; what was told of each
+// is kept. The version is read before the rows: a commit between the two costs
+// another look, while in the other order it would be missed.
 std::vector<OperatorAction> OperatorLog::Next(std::int64_t since_ns) {
   if (database_.Refresh()) {
     Rewind();

@@ -12,12 +12,17 @@
 #include "storage/models/model_codec.h"
 #include "storage/models/sql.h"
 
+// The model sets of ModelStore. A set is one BLOB of model_codec.h, which alone
+// is loaded; the rows of its observers, channels and runs only show in SQL what
+// is in it. Valves and types are in valves.cpp, the loops of a plant in
+// plant_loops.cpp.
 namespace fdi::storage {
 namespace sql = models_sql;
 namespace {
 
 constexpr std::uintmax_t kMaxFileBytes = std::uintmax_t{64} << 20U;
 
+// A name needs no quotes in a shell, a file name or NAME@VERSION.
 bool IsName(std::string_view name) {
   return !name.empty() && name.size() <= 64 &&
          name.find_first_not_of(
@@ -97,6 +102,8 @@ ModelSummary ReadSummary(const Statement& row) {
   return summary;
 }
 
+// The parent is kept by name, version and hash, not by a reference to its row:
+// it need not be in this store.
 void InsertLineage(Database& database, std::int64_t model_set_id,
                    const Lineage& lineage) {
   const auto& parent = lineage.parent;
@@ -315,6 +322,9 @@ ModelSet ModelStore::ImportFile(const std::filesystem::path& path,
               activation);
 }
 
+// The row of a set; without a version, of the active one. The message of the
+// exception lists what is stored, because the mistake is mostly one of
+// spelling.
 std::int64_t ModelStore::RequireId(const ModelReference& reference) {
   const auto id = database_.QueryInt64(sql::model_set_id, reference.name,
                                        reference.version);

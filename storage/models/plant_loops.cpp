@@ -110,6 +110,7 @@ std::size_t ModelStore::TakeLoops(ModelStore& other) {
     StoreLoop(loop);
     transaction.Commit();
   }
+  // A type that is here already stays as it is, whatever the other store has.
   const std::vector<ValveType> here = ListTemplates();
   for (const ValveType& type : other.ListTemplates()) {
     if (std::ranges::find(here, type.name, &ValveType::name) == here.end()) {

@@ -58,7 +58,10 @@ constexpr std::array<std::string_view, 3> kStateNames = {"none", "provisional",
 constexpr std::array<std::string_view, 3> kKindNames = {"replaced", "repacked",
                                                         "recalibrated"};
 
-// Control characters are left out instead of escaped; UTF-8 stays as it is.
+// The figures of a baseline are JSON in two columns, so that SQL can read them
+// (queries.sql, json_numbers). storage/ has no library for JSON, and these few
+// lines write all that a baseline needs. Control characters are left out
+// instead of escaped; UTF-8 stays as it is.
 std::string JsonText(std::string_view text) {
   std::string quoted = "\"";
   for (const char c : text) {
@@ -144,6 +147,9 @@ void ModelStore::PutValve(const ValveEntry& entry) {
   transaction.Commit();
 }
 
+// In the transaction of the caller, as StoreBaseline(), StoreType() and
+// StoreLoop(), because transactions do not nest. By the generation a running
+// monitor sees that it has to look at its valves again (ChangeCounter).
 void ModelStore::StoreEntry(const ValveEntry& entry) {
   if (entry.pattern.empty() || !(entry.period_s > 0.0)) {
     throw ConfigError("valve \"" + entry.pattern +
@@ -180,6 +186,8 @@ ValveEntry ModelStore::RequireEntry(std::string_view pattern) {
   return ReadEntry(row);
 }
 
+// A new entry takes flow unit and period from the set that it will be judged
+// by.
 ValveEntry ModelStore::EntryOrNew(
     std::string_view pattern, const std::optional<ModelReference>& reference) {
   Statement row = database_.Prepare(Select("WHERE pattern = ?"));
@@ -220,6 +228,7 @@ std::optional<ValveEntry> ModelStore::FindValve(std::string_view valve_id) {
 
 std::optional<ModelReference> ModelStore::AssignedModelSet(
     std::string_view valve_id) {
+  // The entry and the active version of its set are as of one instant.
   const Snapshot snapshot(database_);
   Statement row =
       database_.Prepare(Select("WHERE (pattern = ?1 OR ?1 GLOB pattern)"
@@ -239,6 +248,8 @@ std::optional<ModelReference> ModelStore::AssignedModelSet(
   return reference;
 }
 
+// The hash of its content is all that a set has in common with its copy in
+// another store: each store numbers the versions of a name itself.
 std::optional<ModelReference> ModelStore::FindContent(std::uint64_t hash) {
   const std::vector<ModelSummary> sets = List();
   const auto found = std::ranges::find(sets, hash, &ModelSummary::content_hash);
@@ -365,6 +376,8 @@ void ModelStore::SetBaseline(std::string_view pattern,
   transaction.Commit();
 }
 
+// A baseline is of the epoch that the valve is in: figures that were taken
+// before somebody worked on it say nothing about the valve of now.
 void ModelStore::StoreBaseline(std::string_view pattern,
                                const BaselineRecord& record) {
   const ModelReference reference{record.model_set, record.version};

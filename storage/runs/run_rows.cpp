@@ -181,6 +181,8 @@ void InsertChunks(Database& database, std::int64_t run_id, std::int64_t first,
   }
 }
 
+// The cached statement outlives this call, so it is reset on every way out:
+// left open, it would keep a read transaction.
 std::vector<StoredSample> TakeTail(Database& database, std::int64_t run_id) {
   std::vector<StoredSample> samples;
   Statement& rows = database.Cached(sql::tail_of_run);

@@ -163,6 +163,10 @@ std::string_view RunStateName(RunState state) {
   return "interrupted";
 }
 
+// The text of a selector, with the first hex digits of an id, or `last`, and
+// seconds from the start of the run:
+//
+//     selector = id ["@" [from] ":" [to]]
 RunSelector ParseRunSelector(std::string_view text) {
   RunSelector selector;
   const std::size_t at = text.find('@');
@@ -306,6 +310,7 @@ void RunStore::LoadTable(std::string_view table, std::int64_t from,
   }
 }
 
+// In one transaction: of a file with gaps all runs are stored or none.
 std::vector<std::string> RunStore::Import(std::span<const SampleSeries> series,
                                           const NewRun& base) {
   std::vector<std::string> ids;

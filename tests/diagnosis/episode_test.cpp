@@ -25,8 +25,14 @@ class EpisodeTest : public ::testing::Test {
     episode_.emplace(std::make_shared<const FaultPlan>(plan_));
   }
 
+  Sample Read(std::uint64_t k) const {
+    Sample sample = PlantSample(k);
+    tests::AddF6(sample, f6_);
+    return sample;
+  }
+
   Findings Next() {
-    Sample sample = PlantSample(++k_);
+    const Sample sample = Read(++k_);
     bank_->Step(sample);
     verdict_.stamp_ns = sample.stamp_ns;
     verdict_.transition_count = 0;
@@ -43,7 +49,7 @@ class EpisodeTest : public ::testing::Test {
     for (int i = 0; i < samples; ++i) {
       Findings findings = Next();
       findings.stuck = faults;
-      episode_->Step(PlantSample(k_), *bank_, findings, verdict_);
+      episode_->Step(Read(k_), *bank_, findings, verdict_);
       if (verdict_.transition_count > 0) {
         last = verdict_.Transitions().back();
       }
@@ -59,7 +65,7 @@ class EpisodeTest : public ::testing::Test {
       findings.floor = floor;
       verdict_.normal_factor = normal;
       verdict_.fault_factors.fill(0.0);
-      episode_->Step(PlantSample(k_), *bank_, findings, verdict_);
+      episode_->Step(Read(k_), *bank_, findings, verdict_);
       if (verdict_.transition_count > 0) {
         last = verdict_.Transitions().back();
       }
@@ -71,6 +77,7 @@ class EpisodeTest : public ::testing::Test {
   std::optional<ObserverBank> bank_;
   std::optional<Episode> episode_;
   std::uint64_t k_{0};
+  double f6_{0.0};  // strength that acts
   Verdict verdict_;
 };
 
@@ -96,6 +103,83 @@ TEST_F(EpisodeTest, AnotherSetHasToHoldWithoutTheValveLookingNormal) {
   ASSERT_TRUE(other);
   EXPECT_EQ(other->kind, TransitionKind::kReisolated);
   EXPECT_EQ(other->faults, kF3);
+}
+
+// Of a set that allows for interpolation: an episode is long after 80 samples,
+// which are a day.
+ModelSet SlowPlant() {
+  ModelSet models = LinearPlant();
+  models.sample_period_s = 1080.0;
+  models.decision.reisolation_samples = 20;
+  models.decision.evidence_window = 20.0;
+  models.decision.interpolation_allowance = 0.04;
+  return models;
+}
+
+// The evidence tells nothing apart.
+ModelSet Blurred(ModelSet models) {
+  for (Observer& observer : models.observers) {
+    for (ChannelObserver& channel : observer.channels) {
+      channel.residual_sd = 1e4;
+    }
+  }
+  return models;
+}
+
+TEST_F(EpisodeTest, InALongEpisodeWhatIsAheadForAWhileDoesNotReplaceTheName) {
+  const ModelSet models = Blurred(SlowPlant());
+  Use(models);
+  Explained(kF6, 100);
+  ASSERT_EQ(verdict_.isolated, kF6);
+  EXPECT_FALSE(Explained(kF3, 30));
+  EXPECT_EQ(verdict_.isolated, kF6);
+  // For more than half of the second half.
+  Explained(kF3, 60);
+  EXPECT_EQ(verdict_.isolated, kF3 | kF6);
+  EXPECT_FALSE(Explained(kF6, 60));
+  EXPECT_FALSE(Explained(kF3, 60));
+  EXPECT_EQ(verdict_.isolated, kF3 | kF6);
+  // For all but the first third of the episode.
+  Explained(kF3, 800);
+  EXPECT_EQ(verdict_.isolated, kF3);
+}
+
+TEST_F(EpisodeTest, InAShortEpisodeAnotherNameReplacesTheOneThatStands) {
+  const ModelSet models = Blurred(SlowPlant());
+  Use(models);
+  Explained(kF6, 40);
+  ASSERT_EQ(verdict_.isolated, kF6);
+  Explained(kF3, 30);
+  EXPECT_EQ(verdict_.isolated, kF3);
+}
+
+TEST_F(EpisodeTest, ASetTooLargeLeavesTheNameOfALongEpisode) {
+  ModelSet models = SlowPlant();
+  for (const int fault : {10, 11, 13}) {
+    models.observers.push_back(tests::F6(1.0));
+    models.observers.back().fault = fault;
+    models.faults.push_back(fault);
+  }
+  models.floor.emplace();
+  AddFindings(models);
+  models = Blurred(models);
+  Use(models);
+  Explained(kF6, 100);
+  ASSERT_EQ(verdict_.isolated, kF6);
+  EXPECT_FALSE(Explained(0b111111, 50));
+  EXPECT_EQ(verdict_.isolated, kF6);
+}
+
+TEST_F(EpisodeTest, WhatTheEvidenceRefutesLeavesTheNameOfALongEpisode) {
+  f6_ = 1.0;
+  const ModelSet models = SlowPlant();
+  Use(models);
+  Explained(kF3 | kF6, 60);
+  ASSERT_EQ(verdict_.isolated, kF3 | kF6);
+  Explained(kF3 | kF6, 60);
+  EXPECT_EQ(verdict_.isolated, kF6);
+  // Whatever is ahead for a while.
+  EXPECT_FALSE(Explained(kF3, 30));
 }
 
 TEST_F(EpisodeTest, ANameThatIsGivenUpSaysWhy) {
@@ -159,7 +243,7 @@ TEST_F(EpisodeTest, NothingExplainsItBeforeEvidenceIsGathered) {
   Findings findings = Next();
   findings.settled = false;
   findings.floor = FindingsOf(models) & ~(FindingsOf(models) - 1);
-  episode_->Step(PlantSample(k_), *bank_, findings, verdict_);
+  episode_->Step(Read(k_), *bank_, findings, verdict_);
   ASSERT_EQ(verdict_.state, State::kIsolated);
   Next();
   verdict_.fault_factors[2] = 1.0;

@@ -84,8 +84,14 @@ double None(int /*k*/) {
   return 0.0;
 }
 
-TEST(StandingEffectTest, EffectsOnTheFlowMultiplyAndOthersAddUp) {
-  const auto models = std::make_shared<const ModelSet>(LinearPlant());
+TEST(StandingEffectTest, EffectsOnRodAndFlowMultiply) {
+  ModelSet plant = LinearPlant();
+  for (Observer& observer : plant.observers) {
+    if (observer.fault == 3) {
+      observer.channels[0] = LinearModel(Signal::kX, 0.8, 0.0);
+    }
+  }
+  const auto models = std::make_shared<const ModelSet>(plant);
   const auto observers = std::make_shared<const ObserverPlan>(*models);
   const FaultPlan plan(observers);
   ObserverBank bank(observers);
@@ -105,6 +111,7 @@ TEST(StandingEffectTest, EffectsOnTheFlowMultiplyAndOthersAddUp) {
     EXPECT_NEAR(composed.prediction(0, 1), f, 1e-9);
     EXPECT_NEAR(composed.residual(0, 1), 50.0 - f, 1e-9);
     EXPECT_NEAR(composed.prediction(4, 1), 70.0 * f / 50.0, 1e-9) << "f3";
+    EXPECT_NEAR(composed.prediction(4, 0), 40.0 * x / 50.0, 1e-9) << "f3";
     EXPECT_NEAR(composed.prediction(2, 0), 30.0, 1e-9)
         << "f1 beside f6 takes as much, and beside itself is alone";
     EXPECT_EQ(composed.extrapolation(0, 1) > 0.0, fault == 2)

@@ -61,7 +61,7 @@ class EpisodeNameTest : public testing::Test {
     v.state = !v.detected     ? State::kNormal
               : isolated != 0 ? State::kIsolated
                               : State::kDetected;
-    EpisodeName::Inputs inputs{v, isolated, look_, can_look_};
+    EpisodeName::Inputs inputs{v, isolated, look_, can_look_, on_top_};
     if (remembered_) {
       inputs.remembered = *remembered_;
     }
@@ -107,6 +107,7 @@ class EpisodeNameTest : public testing::Test {
   EpisodeName name_{models_, Severities()};
   Verdict engine_;
   std::optional<EpisodeName::Look> look_;
+  std::optional<EpisodeName::Look> on_top_;
   std::optional<FaultSet> remembered_;
   bool can_look_{false};
   std::vector<Kind> kinds_;
@@ -278,6 +279,27 @@ TEST_F(EpisodeNameTest, ASecondFaultIsAnnouncedAndNoLookAtBothRenames) {
   EXPECT_FALSE(last_.second.open);
   EXPECT_EQ(name_.beside().faults, kF7);
   EXPECT_EQ(name_.beside().strength, 0.3);
+}
+
+TEST_F(EpisodeNameTest, ALookAtWhatIsOnTopNamesIt) {
+  Step(0, {Kind::kDetected});
+  Step(kF1, {Kind::kIsolated});
+  engine_.second.open = true;
+  engine_.second.standing = kF1;
+  Step(kF1);
+  EXPECT_EQ(last_.second.faults, 0U) << "more than one fault";
+  kinds_.clear();
+  on_top_ = EpisodeName::Look{{{1, {0.3, 0.2, 0.4}}}, false};
+  EXPECT_EQ(Step(kF1).isolated, kF1);
+  EXPECT_THAT(kinds_, ElementsAre(Kind::kSecond));
+  EXPECT_EQ(last_.second.faults, kF7);
+  EXPECT_EQ(last_.second.strength, 0.3);
+  // None that it knows fits on top of f1, whatever the observers say.
+  engine_.second.faults = kF7;
+  on_top_ = EpisodeName::Look{{}, true};
+  EXPECT_EQ(Step(kF1).second.faults, 0U);
+  engine_.second.open = false;
+  EXPECT_FALSE(Step(kF1).second.open) << "it is the engine that sees it";
 }
 
 TEST_F(EpisodeNameTest, TheGravestOfASetCountsAtItsOwnStrength) {

@@ -14,7 +14,8 @@ namespace {
 
 // y = 2 exp(0.5 t) with noise 0.1 and each tenth row off by 5; a third entry
 // that nothing depends on.
-TEST(RobustLeastSquaresTest, ResistsOutliersAndKnowsWhatItCannotTell) {
+RobustFit FitExponential(const Eigen::Vector3d& start, int iterations,
+                         double damping, const PointBounds& bounds) {
   constexpr Eigen::Index kRows = 400;
   NormalSource noise(1, 1);
   Eigen::VectorXd y(kRows);
@@ -33,14 +34,22 @@ TEST(RobustLeastSquaresTest, ResistsOutliersAndKnowsWhatItCannotTell) {
     }
     return result;
   };
-  const PointBounds bounds{
-      Eigen::Vector3d(0.1, -1.0, -1.0), Eigen::Vector3d(9.0, 2.0, 1.0),
-      Eigen::Vector3d(1.0, 0.0, 0.3), Eigen::Vector3d(5.0, 5.0, 0.5)};
   RobustFitOptions options;
-  options.max_iterations = 20;
+  options.max_iterations = iterations;
   options.least_scale = Eigen::VectorXd::Constant(1, 0.01);
+  options.damping = damping;
+  return FitRobustly(residuals, start, bounds, options);
+}
+
+const PointBounds kExponentialBounds{
+    Eigen::Vector3d(0.1, -1.0, -1.0), Eigen::Vector3d(9.0, 2.0, 1.0),
+    Eigen::Vector3d(1.0, 0.0, 0.3), Eigen::Vector3d(5.0, 5.0, 0.5)};
+
+TEST(RobustLeastSquaresTest, ResistsOutliersAndKnowsWhatItCannotTell) {
+  const PointBounds& bounds = kExponentialBounds;
   const RobustFit fit =
-      FitRobustly(residuals, Eigen::Vector3d(1.0, 0.0, 0.3), bounds, options);
+      FitExponential(Eigen::Vector3d(1.0, 0.0, 0.3), 20, 1e-2, bounds);
+  EXPECT_TRUE(fit.settled);
   EXPECT_NEAR(fit.point[0], 2.0, 0.04);
   EXPECT_NEAR(fit.point[1], 0.5, 0.02);
   EXPECT_NEAR(fit.point[2], 0.3, 1e-9);
@@ -49,6 +58,20 @@ TEST(RobustLeastSquaresTest, ResistsOutliersAndKnowsWhatItCannotTell) {
   EXPECT_LT(sd[0], 0.03);
   EXPECT_LT(sd[1], 0.02);
   EXPECT_NEAR(sd[2], 0.5, 1e-6);
+}
+
+// Bit for bit, so that a fit may be looked at before it goes on.
+TEST(RobustLeastSquaresTest, GoesOnWhereItEnded) {
+  const Eigen::Vector3d start(1.0, 0.0, 0.3);
+  const RobustFit whole = FitExponential(start, 4, 1e-2, kExponentialBounds);
+  const RobustFit first = FitExponential(start, 1, 1e-2, kExponentialBounds);
+  ASSERT_FALSE(first.settled);
+  ASSERT_NE(first.point, whole.point);
+  const RobustFit second =
+      FitExponential(first.point, 3, first.damping, kExponentialBounds);
+  EXPECT_EQ(second.point, whole.point);
+  EXPECT_EQ(second.damping, whole.damping);
+  EXPECT_EQ(second.residuals, whole.residuals);
 }
 
 // F is that of a valve 3 times as large.

@@ -43,6 +43,51 @@ INSTANTIATE_TEST_SUITE_P(
                       std::pair{13, -0.2}, std::pair{16, 0.7},
                       std::pair{16, 0.78}, std::pair{19, 0.25}));
 
+// A fault that has stood since before the window.
+LookWindow OnTopOf(const Explanation& standing,
+                   std::vector<FaultSchedule> faults) {
+  FaultSchedule first = Abrupt(standing.fault, standing.strength);
+  first.start_s = 0.0;
+  faults.push_back(first);
+  LookWindow window = Window(faults);
+  window.standing = standing.fault;
+  window.standing_strength = standing.strength;
+  return window;
+}
+
+class OnTopTest
+    : public ::testing::TestWithParam<std::pair<Explanation, Explanation>> {};
+
+TEST_P(OnTopTest, IsNamedWithItsStrength) {
+  const auto& [standing, second] = GetParam();
+  const SecondLook look = RunSecondLook(
+      Physics(), OnTopOf(standing, {Abrupt(second.fault, second.strength)}));
+  const Explanation& best = look.ranked.front();
+  EXPECT_EQ(best.fault, second.fault);
+  EXPECT_NEAR(best.strength, second.strength, 0.05);
+  EXPECT_LT(look.misfit, 1.5);
+  EXPECT_EQ(AnswerOf(look).outcome, LookOutcome::kNamed);
+  EXPECT_EQ(
+      std::ranges::count(look.ranked, standing.fault, &Explanation::fault), 0);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    SecondLook, OnTopTest,
+    ::testing::Values(std::pair{Explanation{13, 0.2}, Explanation{1, 0.5}},
+                      std::pair{Explanation{1, 0.4}, Explanation{19, -0.3}}));
+
+// Of rod, readings and an input that is read wrong.
+TEST(SecondLookTest, AStandingFaultByItselfIsWhatIsExpected) {
+  for (const Explanation& standing :
+       {Explanation{1, 0.4}, Explanation{13, 0.2}, Explanation{19, -0.3},
+        Explanation{22, 0.1}}) {
+    LookWindow window = OnTopOf(standing, {});
+    EXPECT_LT(MisfitWithoutFault(Physics(), window), 1.5) << standing.fault;
+    window.standing = 0;
+    EXPECT_GT(MisfitWithoutFault(Physics(), window), 3.0) << standing.fault;
+  }
+}
+
 TEST(SecondLookTest, FindsAGrowingFault) {
   FaultSchedule growing = Abrupt(13, 0.4);
   growing.start_s = 60.0;
@@ -695,6 +740,47 @@ TEST(EpisodeLooksTest, LooksOftenInFiveMinutesFromTwoMinutesBefore) {
   EXPECT_EQ(tasks[1].window.detection, 120U);
   EXPECT_EQ(tasks[1].window.rows.size(), 161U);
   EXPECT_EQ(tasks[3].stamp_ns, 500 * kSecond);
+}
+
+// While something is on top, a look at the episode would see both.
+TEST(EpisodeLooksTest, WhatIsOnTopIsLookedAtInFiveMinutes) {
+  EpisodeLooks looks(Physics());
+  std::vector<std::pair<std::int64_t, LookOccasion>> due;
+  for (int k = 0; k < 1600; ++k) {
+    Sample sample;
+    sample.stamp_ns = k * kSecond;
+    for (const Signal signal : {Signal::kCv, Signal::kX, Signal::kF}) {
+      sample.Set(signal, 50.0 + k % 3);
+    }
+    Verdict verdict;
+    if (k == 201) {
+      verdict.transitions[0] = {TransitionKind::kDetected, 200 * kSecond,
+                                200 * kSecond};
+      verdict.transition_count = 1;
+    }
+    verdict.second.open = k >= 850;
+    verdict.second.detection_stamp_ns = 810 * kSecond;
+    verdict.second.standing_strength = -0.3;
+    if (const auto task = looks.Step(sample, verdict)) {
+      due.emplace_back(k, task->occasion);
+      if (task->occasion == LookOccasion::kSecond) {
+        EXPECT_EQ(task->detection_stamp_ns, 810 * kSecond);
+        EXPECT_NEAR(static_cast<double>(task->window.detection), 120.0, 1.0);
+        EXPECT_EQ(task->window.standing_strength, -0.3);
+        EXPECT_FALSE(task->early() || task->late());
+      }
+    }
+  }
+  using enum LookOccasion;
+  EXPECT_EQ(due, (std::vector<std::pair<std::int64_t, LookOccasion>>{
+                     {220, kEpisode},
+                     {240, kEpisode},
+                     {350, kEpisode},
+                     {500, kEpisode},
+                     {800, kEpisode},
+                     {850, kSecond},
+                     {960, kSecond},
+                     {1110, kSecond}}));
 }
 
 TEST(EpisodeLooksTest, ThenAtTwiceTheAgeEach) {

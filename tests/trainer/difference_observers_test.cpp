@@ -105,6 +105,33 @@ TEST(DifferenceObserversTest, AModelThatDoesNotForgetErrsFromAnyPast) {
   EXPECT_LT(FreeRunError(WithMemory(0.5), {stretch}), 1.5e2);
 }
 
+// Beside x(k) = 0.5 x(k-1) + 0.5 CV there is a rule for positions above 120
+// that holds them where they are: from its upper limit the model never comes
+// back.
+TEST(DifferenceObserversTest, AModelThatMayStayAtItsLimitIsNone) {
+  Stretch stretch{"r", {}};
+  for (int k = 0; k < 300; ++k) {
+    Sample sample;
+    sample.Set(Signal::kCv, 50.0);
+    sample.Set(Signal::kX, 50.0);
+    stretch.samples.push_back(sample);
+  }
+  TsModel model = WithMemory(0.5);
+  model.output_max = 150.0;
+  EXPECT_TRUE(ForgetsItsPast(model, {stretch}));
+
+  model.rules[0].antecedents[0] = {-1e6, -1e6, 115.0, 120.0};
+  TsRule latch = model.rules[0];
+  latch.antecedents[0] = {115.0, 120.0, 1e6, 1e6};
+  latch.slopes = {1.0, 0.0};
+  model.rules.push_back(latch);
+  EXPECT_FALSE(ForgetsItsPast(model, {stretch}));
+  EXPECT_LT(MeanSquare(RunResiduals(model, {stretch}, 30)), 1e-9);
+  // Too short to tell.
+  stretch.samples.pop_back();
+  EXPECT_TRUE(ForgetsItsPast(model, {stretch}));
+}
+
 // The command leaves its usual range once, for eight samples: models of the
 // other three quarters know nothing of how the flow bends there.
 TEST(DifferenceObserversTest, OneExcursionOfTheCommandDoesNotSetTheLimits) {

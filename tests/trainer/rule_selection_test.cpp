@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/trainer/sampled_function.h"
+#include "trainer/cluster_antecedents.h"
 #include "trainer/takagi_sugeno_fit.h"
 
 namespace fdi::trainer {
@@ -51,6 +52,33 @@ TEST(SelectRulesTest, BothKindsOfAntecedentsAreTriedWithBothMethods) {
   EXPECT_EQ(selection.tried[2].method, ConsequentMethod::kLocal);
   EXPECT_EQ(selection.tried[2].antecedents, AntecedentKind::kProductSpace);
   EXPECT_FALSE(selection.rules.front().center.empty());
+}
+
+// Rules that are told apart by the first column alone. Of the second nothing
+// depends but the consequents, so that its clusters serve again; other targets
+// have others.
+TEST(SelectRulesTest, KnownClustersServeWhereTheyAreTheSame) {
+  RuleSelectionOptions options;
+  options.counts = {3};
+  options.fit.antecedents = {0};
+  const RegressionData data = Sampled(250, Hills);
+  RegressionData other_column = data;
+  other_column.x.col(1) = data.x.col(1).reverse();
+  RegressionData other_targets = data;
+  other_targets.y = data.y.cwiseAbs2();
+  KnownClusters known;
+  for (const RegressionData& rows : {data, other_column, other_targets, data}) {
+    const auto fresh = SelectRules(rows, options).rules;
+    RuleSelectionOptions shared = options;
+    shared.known = &known;
+    EXPECT_EQ(Predict(SelectRules(rows, shared).rules, rows.x),
+              Predict(fresh, rows.x));
+  }
+  TakagiSugenoOptions three = options.fit;
+  three.num_rules = 3;
+  const double* place = known.Of(data, three).z.data();
+  EXPECT_EQ(known.Of(other_column, three).z.data(), place);
+  EXPECT_NE(known.Of(other_targets, three).z.data(), place);
 }
 
 TEST(SelectRulesTest, CountsWithoutEnoughRowsAreLeftOut) {

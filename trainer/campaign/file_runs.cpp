@@ -109,11 +109,11 @@ std::vector<path> MatchingFiles(const std::string& pattern,
       files.push_back(entry.path());
     }
   }
-  // An order that does not depend on the file system: runs of a campaign are
-  // numbered by it.
   if (files.empty()) {
     throw ConfigError("no file is called " + absolute.string());
   }
+  // An order that does not depend on the file system: runs of a campaign are
+  // numbered by it.
   std::sort(files.begin(), files.end());
   return files;
 }

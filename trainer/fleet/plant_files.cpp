@@ -7,6 +7,11 @@
 #include "base/error.h"
 #include "trainer/campaign/file_runs.h"
 
+// `mutex_` guards the map, and `loading` of each file what was read of it, so
+// that files are read at the same time. Entries are never erased, and
+// references to them stay valid. A thread takes `loading` under `mutex_`, never
+// the other way round: Open() and TagsOf() let go of the file before they make
+// room.
 namespace fdi::trainer {
 namespace {
 
@@ -22,6 +27,7 @@ PlantFiles::Shelved& PlantFiles::At(const std::filesystem::path& path) {
   return shelved;
 }
 
+// A file that could not be read is not tried again for the next row.
 void PlantFiles::Load(const std::filesystem::path& path, Shelved& shelved) {
   if (!shelved.error.empty()) {
     throw DataError(shelved.error);

@@ -16,6 +16,9 @@
 #include "trainer/campaign/file_runs.h"
 #include "trainer/campaign/run_input.h"
 
+// From the columns of a row to what can be judged: the runs that onboarding
+// takes, or the verdict of the audit. Messages say what was seen in the record
+// and what to type in the row.
 namespace fdi::trainer {
 namespace {
 
@@ -165,6 +168,9 @@ std::vector<double> SeriesOf(std::span<const storage::StoredSample> part,
   return values;
 }
 
+// Refuses a record in which op or the answer is not what the row says it is.
+// The audit would have a verdict on it all the same ("no response", "frozen"),
+// and somebody would look at the valve instead of at the table.
 void CheckLoop(const loop::Window& window, const PlantJob& job) {
   const auto [low, high] = std::ranges::minmax_element(window.op);
   if (!loop::IsPercent(window.op)) {
@@ -198,6 +204,8 @@ std::string Verdict(const loop::Audit& audit) {
 
 }  // namespace
 
+// The plant's own words of the mode are replaced in the text, so that whatever
+// reads it need only know AUTO and MANUAL.
 std::vector<RowText> TextsOf(const PlantJob& job, PlantFiles& shelf) {
   std::map<std::string, std::string> words;
   for (const std::string& word : job.row.auto_words) {
@@ -229,7 +237,9 @@ bool WantsModels(const PlantJob& job) {
 
 std::uint64_t InputHash(const PlantJob& job, const std::vector<RowText>& texts,
                         const std::string& kind) {
-  // 1: the number of this form of input, and of the method behind it.
+  // 1: the number of this form of input, and of the method behind it. With a
+  // higher one every row of every plant is done again. Each part ends with a
+  // line end, so that text which moves from one cell to the next is a change.
   std::string input = "1\n" + kind + '\n' + job.row.service + '\n' +
                       job.row.from + '\n' + job.row.to + '\n' +
                       (job.row.sense == Sense::kOpening ? "opening" : "") +

@@ -20,6 +20,16 @@
 #include "trainer/onboarding/record_checks.h"
 #include "trainer/parallel_for.h"
 
+// The rows of a plant are tasks of one list, which all threads work off. Rows
+// of one kind (type, signals, unit of the flow) wait until one of them has been
+// onboarded in full, which takes a minute or two and makes their type; then
+// each takes seconds. What becomes of a row is stored at once, so a run that is
+// stopped loses only the rows that were in work.
+//
+// A kind is written by the one task that makes its type. `ready`, set
+// afterwards under the mutex of the tasks, hands it to those that Next() lets
+// go, which only read it. The mutex of the tasks and that of the store are
+// never held together.
 namespace fdi::trainer {
 namespace {
 
@@ -32,7 +42,8 @@ constexpr double kFirstCost = 12.0;
 constexpr double kTransferCost = 1.0;
 constexpr double kDataOnlyCost = 0.05;
 
-// Rows of one type, with the same signals and units.
+// Rows of one type, with the same signals and units: the fault observers of one
+// of them serve the others (docs/plant.md, "What happens to a row").
 struct Kind {
   std::string text;  ///< Of the type and the signals, for InputHash().
   std::string name;  ///< That its fitted type is stored as.
@@ -55,6 +66,8 @@ std::string Storable(std::string name) {
   return name;
 }
 
+// What rows of one kind have in common beside the type: the signals that their
+// models read, and the unit that their flow is stated in.
 std::string SignalsOf(const PlantJob& job) {
   std::string text;
   for (const LoopTag tag :
@@ -71,6 +84,8 @@ std::string SignalsOf(const PlantJob& job) {
 }
 
 // What identifies the kind beside the type's name, which two files may share.
+// The stem is cut so that the name, at most 59 bytes, is one that models.db
+// takes.
 std::string KindName(const std::string& type, const std::string& text) {
   const std::string hash =
       storage::HashHex(storage::Sha256Start(std::as_bytes(std::span(text))));
@@ -98,8 +113,12 @@ class Kinds {
   std::map<std::string, Kind>& all() { return kinds_; }
 
  private:
+  // A type that cannot be found is an error of every row that states it. A type
+  // that an earlier run has fitted for this kind is taken up instead of made
+  // anew.
   void Add(std::size_t i, const PlantJob& job, storage::ModelStore* store,
            const PlantSettings& settings) {
+    // Looked up by the words of the table, before anything is read and parsed.
     const std::string key = job.row.type + '\n' + SignalsOf(job);
     if (const auto found = kinds_.find(key); found != kinds_.end()) {
       found->second.rows.push_back(i);
@@ -144,6 +163,8 @@ class Kinds {
 
 // Which rows are of the shard. Whole kinds go to the shard with the least to do
 // so far, the largest first; without enough kinds rows are dealt one by one.
+// Every shard finds the same division from the same table and files, without
+// knowing of the others.
 std::vector<bool> RowsOfShard(std::size_t count, Kinds& kinds,
                               const PlantSettings& settings) {
   std::vector<bool> mine(count, settings.shards == 1);
@@ -273,6 +294,9 @@ class PlantRun {
     });
   }
 
+  // A row is done again if InputHash() has changed: a cell that tells how to
+  // read or judge its record, the record itself, or its kind. Grade and group
+  // are not part of that; a change of them is stored without a new judgement.
   void FindChange(std::size_t i) {
     const PlantJob& job = jobs_[i];
     PlantOutcome& outcome = outcomes_[i];
@@ -355,6 +379,9 @@ class PlantRun {
     return nullptr;
   }
 
+  // A task that fails leaves others waiting for a type that will never be
+  // ready. So they are woken by `failed_` before the exception goes on to
+  // ParallelFor().
   void Work() {
     try {
       while (Task* task = Next()) {
@@ -386,7 +413,8 @@ class PlantRun {
   }
 
   // Onboards the rows of the kind one after the other until one can be: also
-  // one of another shard, so that every shard makes the same type.
+  // one of another shard, so that every shard makes the same type. If none can
+  // be, those to be done have been refused, and `ready` only ends the wait.
   void MakeType(Kind& kind) {
     for (const std::size_t row : kind.rows) {
       {
@@ -431,6 +459,9 @@ class PlantRun {
     }
   }
 
+  // With the set of its type a valve only takes over observers; where it is not
+  // like its type that throws DataError, and Finish() onboards it in full. A
+  // stored type has been fitted already.
   Onboarding OnboardWith(std::size_t row, const std::vector<TrainingRun>& runs,
                          const FoundType& type, const ModelSet* of_type) {
     OnboardingOptions options = settings_.onboarding;
@@ -447,6 +478,7 @@ class PlantRun {
                    [this](double, std::string_view) { StopIfAsked(); });
   }
 
+  // Onboards a row whose type is ready, or audits one that wants no models.
   void Finish(std::size_t row) {
     const auto start = std::chrono::steady_clock::now();
     const PlantJob& job = jobs_[row];
@@ -481,6 +513,9 @@ class PlantRun {
     }
   }
 
+  // Stores the model set of a row. A row that was onboarded only to make the
+  // type, because it is another shard's or has not changed, keeps its entry and
+  // outcome.
   void Keep(std::size_t row, const Onboarding& onboarding,
             const std::string& made, const std::string& type_name,
             std::chrono::steady_clock::time_point start) {

@@ -37,6 +37,7 @@ FoundType ParseType(const std::string& text, const std::string& name) {
 
 }  // namespace
 
+// A stored type comes before a shipped one of the same name.
 FoundType FindType(const std::string& name, storage::ModelStore* store,
                    const std::filesystem::path& folder) {
   const std::vector<storage::ValveType> types =

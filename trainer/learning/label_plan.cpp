@@ -14,6 +14,10 @@
 #include "trainer/campaign/run_input.h"
 #include "trainer/scoring/detectors.h"
 
+// From labels to what is learnt: which episodes can be used and as which fault,
+// which runs are trained on beside them, and what the new set descends from
+// (docs/learning.md). MakeLabelPlan() only reads, so that a dry run can show
+// the plan; StoreEvidence() is the one function here that writes.
 namespace fdi::trainer {
 namespace {
 
@@ -371,6 +375,10 @@ void RequireTrainable(const LabelPlan& plan, bool drop_missing,
   }
 }
 
+// The samples of an episode become an imported run before the training, because
+// a set names the runs that it was made from, and its successor is trained on
+// them again. A repeated command finds the runs of the first one
+// (IsEvidenceOf).
 int StoreEvidence(LabelPlan& plan, const storage::DataDirectory& directory,
                   const std::string& software) {
   storage::RunStore store(directory.runs(), storage::Access::kOccasionalWriter);
@@ -404,6 +412,8 @@ int StoreEvidence(LabelPlan& plan, const storage::DataDirectory& directory,
   return stored;
 }
 
+// Episodes of the parent are handed down as long as their runs are used, unless
+// the same episode is learnt from anew.
 storage::Lineage LineageOf(const LabelPlan& plan) {
   storage::Lineage lineage;
   lineage.parent = storage::ParentSet{plan.parent->name, plan.parent->version,
@@ -420,6 +430,8 @@ storage::Lineage LineageOf(const LabelPlan& plan) {
   return lineage;
 }
 
+// A signal that some runs lack is taken from all of them. If the parent needs
+// one of these, nothing is changed, and the training itself refuses the runs.
 void RestrictToCommonSignals(const ModelSet& parent,
                              std::vector<TrainingRun>& runs) {
   auto common = static_cast<SignalMask>(~SignalMask{0});

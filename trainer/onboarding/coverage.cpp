@@ -55,7 +55,8 @@ struct HealthyScore {
   double judged{1.0};             // Share of the samples after the first LIVE.
 };
 
-HealthyScore ScoreHealthy(const ScoredPart& part) {
+HealthyScore ScoreHealthy(const ScoredPart& part,
+                          const std::shared_ptr<const EnginePlan>& plan) {
   HealthyScore score;
   double live = 0.0;
   double settled = 0.0;
@@ -66,7 +67,7 @@ HealthyScore ScoreHealthy(const ScoredPart& part) {
   const double from_s =
       part.models->sample_period_s * static_cast<double>(kLeadIn);
   for (const Indication& now :
-       ScoreRun(part.models, RunWith({}, part.healthy.samples, part), count)) {
+       ScoreRun(plan, RunWith({}, part.healthy.samples, part), count)) {
     if (now.detected && !score.alarm_s) {
       score.alarm_s = now.time_s - from_s;
     }
@@ -166,9 +167,11 @@ CoverageTable ScoreCoverage(const std::vector<FaultCondition>& faults,
   table.parts = static_cast<int>(parts.size());
   std::size_t shortest = parts.front().healthy.samples.size();
   std::vector<HealthyScore> healthy;
+  std::vector<std::shared_ptr<const EnginePlan>> plans;
   for (const ScoredPart& part : parts) {
+    plans.push_back(std::make_shared<const EnginePlan>(part.models));
     shortest = std::min(shortest, part.healthy.samples.size());
-    healthy.push_back(ScoreHealthy(part));
+    healthy.push_back(ScoreHealthy(part, plans.back()));
     table.alarmed += healthy.back().alarm_s ? 1 : 0;
     table.judged = std::min(table.judged, healthy.back().judged);
   }
@@ -180,8 +183,7 @@ CoverageTable ScoreCoverage(const std::vector<FaultCondition>& faults,
     scores[f].fault = faults[f];
     for (std::size_t p = 0; p < parts.size(); ++p) {
       const TrainingRun run = RunWith(faults[f], parts[p].faulty[f], parts[p]);
-      AddPart(ComputeIndices(ScoreRun(parts[p].models, run)), healthy[p],
-              scores[f]);
+      AddPart(ComputeIndices(ScoreRun(plans[p], run)), healthy[p], scores[f]);
     }
   });
   // Every turn takes out the scores of one fault in one direction. The order of

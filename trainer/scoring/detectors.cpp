@@ -38,13 +38,15 @@ class RunNames {
 
   NamedVerdict Step(const Sample& sample, const Verdict& engine) {
     monitor::EpisodeName::Inputs inputs{
-        engine, engine.isolated, {}, looks_.has_value()};
+        engine, engine.isolated, {}, looks_.has_value(), {}};
     if (looks_) {
       TakeLook(sample, engine);
       if (engine.detected && !OutOfOrder(engine.intake)) {
         inputs.look =
             monitor::LookThatCounts(engine, *models_, looks_->Answer());
         inputs.remembered = looks_->Observed(*models_, engine.isolated);
+        inputs.on_top =
+            monitor::SecondThatCounts(engine, *models_, looks_->SecondAnswer());
       }
     }
     const Verdict& named = name_->Step(inputs);

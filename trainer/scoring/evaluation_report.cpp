@@ -11,6 +11,9 @@
 #include "report/text_table.h"
 #include "trainer/statistics.h"
 
+// An evaluation as JSON, and the columns that show it. The terminal, --json,
+// --csv and the page of report_page.cpp are made from the same document, so
+// that they cannot disagree. docs/evaluation.md defines the indices.
 namespace fdi::trainer {
 namespace {
 
@@ -53,6 +56,7 @@ constexpr std::array<IndexField, 12> kIndexFields{{
      "accuracy of the final set: 1/n if the fault is one of n, else 0"},
 }};
 
+// Of a run without truth, fault and strength are null, which is not "normal".
 Json RunJson(const EvaluatedRun& run) {
   Json json{{"run_id", run.indices.run_id},
             {"fault", run.has_truth ? Json(TruthText(run)) : Json()},
@@ -111,6 +115,8 @@ Json AnswersJson(const EvaluationFigures& figures) {
   return json;
 }
 
+// The counts of a row have two more columns than there are sets: "unknown" and
+// "no alarm".
 Json ConfusionJson(const ConfusionMatrix& matrix) {
   Json json = Json::object();
   for (std::size_t r = 0; r < matrix.rows.size(); ++r) {
@@ -256,6 +262,8 @@ std::vector<report::Column> RunColumns() {
   return columns;
 }
 
+// What is right stands on the diagonal; of a run without fault it is "no
+// alarm".
 std::vector<report::Column> ConfusionColumns(const Json& confusion,
                                              const std::string& heading) {
   std::vector<report::Column> columns{{.heading = heading, .key = "name"}};
@@ -402,6 +410,8 @@ void VectorsCsv::Add(const std::string& run, const Verdict& verdict) {
                                  std::string(StateName(verdict.state))};
   const auto add = [&cells](double value) {
     std::array<char, 40> text{};
+    // In hexadecimal, which keeps every bit: two engines that ought to agree
+    // can then be compared by the text of their files.
     std::snprintf(text.data(), text.size(), "%a", value);
     cells.emplace_back(text.data());
   };

@@ -231,6 +231,8 @@ class ReportPage::RunPicture {
       figure.marks.push_back(
           {fault_start_s, TruthText(run), plot::ink::kBlack});
     }
+    // A page has a picture of every run: it is drawn more coarsely until it is
+    // small enough.
     std::string svg;
     for (figure.groups = kMaxGroups; figure.groups >= kMinGroups;
          figure.groups = figure.groups * 3 / 4) {
