@@ -187,7 +187,7 @@ const FaultText& FaultTexts::Of(int fault) const {
 // Of several faults that are one answer, the words have the names and
 // disciplines of all, the gravest class and severity, and the check of the
 // first. A priority that was stored with the episode says the severity better
-// than the catalogue of now.
+// than today's catalogue.
 FaultWords FaultTexts::Words(std::string_view answer, double strength,
                              std::optional<std::int64_t> priority) const {
   FaultWords words;

@@ -1,15 +1,13 @@
 #include "simulator/valve_identification.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
-#include <functional>
-#include <future>
 #include <limits>
 #include <numeric>
 #include <optional>
 
 #include "base/error.h"
+#include "base/parallel_for.h"
 #include "simulator/control_valve.h"
 #include "simulator/require_range.h"
 #include "simulator/robust_least_squares.h"
@@ -100,28 +98,6 @@ using Answers = std::vector<std::vector<RecordAnswer>>;  // By segment.
 constexpr double kFine = 1.0;
 constexpr double kCoarse = 10.0;
 
-// Calls task(i) for all i below `count`, from `threads` threads.
-void InParallel(std::size_t count, int threads,
-                const std::function<void(std::size_t)>& task) {
-  std::atomic<std::size_t> next{0};
-  const auto work = [&] {
-    for (std::size_t i = next++; i < count; i = next++) {
-      task(i);
-    }
-  };
-  // Destroyed first: if work() throws here, these futures of std::async() wait
-  // for the threads before what they use is gone.
-  std::vector<std::future<void>> helpers;
-  for (std::size_t t = 1;
-       t < std::min(static_cast<std::size_t>(threads), count); ++t) {
-    helpers.push_back(std::async(std::launch::async, work));
-  }
-  work();
-  for (std::future<void>& helper : helpers) {
-    helper.get();
-  }
-}
-
 // Simulates all candidates on all segments with `threads` threads. Each pair
 // has a place of its own for its answers, which need no lock and do not depend
 // on the number of threads.
@@ -129,7 +105,9 @@ std::vector<Answers> Simulate(const std::vector<ValveCandidate>& candidates,
                               const std::vector<RecordSegment>& segments,
                               double tolerance_scale, int threads) {
   std::vector<Answers> motions(candidates.size(), Answers(segments.size()));
-  InParallel(candidates.size() * segments.size(), threads, [&](std::size_t i) {
+  const std::size_t pairs = candidates.size() * segments.size();
+  ParallelFor(static_cast<int>(pairs), threads, [&](int pair) {
+    const auto i = static_cast<std::size_t>(pair);
     const ValveCandidate& candidate = candidates[i / segments.size()];
     const RecordSegment& segment = segments[i % segments.size()];
     motions[i / segments.size()][i % segments.size()] =
@@ -769,8 +747,8 @@ void Identification::FitBriefly(std::vector<Hypothesis>& hypotheses) const {
     const int threads = std::max(
         1, options_.threads /
                static_cast<int>(std::max(open.size(), std::size_t{1})));
-    InParallel(open.size(), options_.threads, [&](std::size_t i) {
-      Hypothesis& h = *open[i];
+    ParallelFor(static_cast<int>(open.size()), options_.threads, [&](int i) {
+      Hypothesis& h = *open[static_cast<std::size_t>(i)];
       h.fit = Fit(h, {segments_.front()},
                   {iterations, kCoarse, threads, h.fit.damping});
       h.point = h.fit.point;

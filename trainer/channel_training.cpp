@@ -169,6 +169,7 @@ TsModel FitRows(const ChannelPlan& plan,
     if (plan.from_any_past && IsFreeRunning(model)) {
       const double error = FreeRunError(model, condition.validation);
       if (!std::isnan(error)) {
+        // One that does not is worse than any that does.
         const double range = model.output_max - model.output_min;
         return ForgetsItsPast(model, condition.training)
                    ? error

@@ -6,12 +6,12 @@
 #include <limits>
 
 #include "base/error.h"
+#include "base/parallel_for.h"
 #include "diagnosis/fault_catalogue.h"
 #include "trainer/calibration.h"
 #include "trainer/channel_training.h"
 #include "trainer/model_set_description.h"
 #include "trainer/observer_calibration.h"
-#include "trainer/parallel_for.h"
 #include "trainer/regression.h"
 #include "trainer/statistics.h"
 #include "trainer/training.h"

@@ -9,13 +9,13 @@
 #include <numeric>
 #include <utility>
 
+#include "base/parallel_for.h"
 #include "diagnosis/fault_bank.h"
 #include "diagnosis/fault_catalogue.h"
 #include "diagnosis/fit_window.h"
 #include "diagnosis/observer_bank.h"
 #include "diagnosis/residual_windows.h"
 #include "diagnosis/student.h"
-#include "trainer/parallel_for.h"
 #include "trainer/regression.h"
 #include "trainer/statistics.h"
 

@@ -3,11 +3,11 @@
 #include <atomic>
 
 #include "base/error.h"
+#include "base/parallel_for.h"
 #include "trainer/calibration.h"
 #include "trainer/model_set_description.h"
 #include "trainer/observer_adaptation.h"
 #include "trainer/observer_calibration.h"
-#include "trainer/parallel_for.h"
 
 namespace fdi::trainer {
 namespace {

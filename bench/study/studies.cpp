@@ -5,6 +5,7 @@
 
 #include "base/error.h"
 #include "base/mutex.h"
+#include "base/parallel_for.h"
 #include "bench/study/study_detectors.h"
 #include "diagnosis/fault_catalogue.h"
 #include "report/progress.h"
@@ -13,7 +14,6 @@
 #include "trainer/campaign/campaign_runs.h"
 #include "trainer/campaign/file_runs.h"
 #include "trainer/campaign/run_input.h"
-#include "trainer/parallel_for.h"
 #include "trainer/scoring/evaluation_report.h"
 #include "trainer/statistics.h"
 

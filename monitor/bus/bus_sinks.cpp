@@ -58,8 +58,8 @@ void BusDecisionSink::Fill(const std::string& valve_id, const ModelSet* models,
   message.verdict = verdict;
 }
 
-// While nobody reads, vectors are not even filled in. Who comes then gets the
-// last one of each valve first; `skipped_` stands until that is done
+// While nobody reads, vectors are not even filled in. Whoever comes then gets
+// the last one of each valve first; `skipped_` stands until that is done
 // (LastValuesDue).
 bool BusDecisionSink::ToLive() {
   skipped_ = skipped_ || live_.matched() == 0;

@@ -129,7 +129,7 @@ void TopBoard::Hear(const idl::Reception& reception) {
   least = std::min(least, delay_ns);
 }
 
-// DDS hands the last vector of a valve to who comes late, so its arrival says
+// DDS hands the last vector of a valve to late joiners, so its arrival says
 // little. The smallest delay of a participant is the difference of both clocks
 // and the quickest way; what a vector took beyond that, it has waited.
 bool TopBoard::IsSilent(const LatestVector& latest,

@@ -153,9 +153,9 @@ const std::vector<std::string>& EpisodeKeys() {
   return keys;
 }
 
-// An episode is stored with the name that its fault had in the catalogue of
-// then. That name is shown, unless the user states a catalogue or it was stored
-// without one.
+// An episode is stored with the name that its fault had in the catalogue at
+// that time. That name is shown, unless the user states a catalogue or it was
+// stored without one.
 void NameFaults(std::vector<Episode>& episodes, const Context& context) {
   std::optional<report::FaultTexts> texts;
   for (Episode& episode : episodes) {

@@ -664,6 +664,23 @@ TEST(LookAnswerTest, OfWhatChangedUnreadAMeterOrTheLineIsTheName) {
             (std::vector{17, 19}));
 }
 
+// CV, X and F of a valve that moves a little.
+Sample LivelySample(int k, std::int64_t stamp_ns) {
+  Sample sample;
+  sample.stamp_ns = stamp_ns;
+  for (const Signal signal : {Signal::kCv, Signal::kX, Signal::kF}) {
+    sample.Set(signal, 50.0 + k % 3);
+  }
+  return sample;
+}
+
+Verdict DetectedAt(std::int64_t stamp_ns) {
+  Verdict verdict;
+  verdict.transitions[0] = {TransitionKind::kDetected, stamp_ns, stamp_ns};
+  verdict.transition_count = 1;
+  return verdict;
+}
+
 // The flow of a valve without X is `share` of the usual from `from` on; rows
 // `gap` to `from` are not read.
 std::optional<LookTask> LookAfter(int gap, int from, double share) {
@@ -678,12 +695,7 @@ std::optional<LookTask> LookAfter(int gap, int from, double share) {
     sample.Set(Signal::kF, k < from ? 17.0 : 17.0 * share);
     sample.present =
         static_cast<SignalMask>(MaskOf(Signal::kCv) | MaskOf(Signal::kF));
-    Verdict verdict;
-    if (k == from + 2) {
-      verdict.transitions[0] = {TransitionKind::kDetected, sample.stamp_ns,
-                                sample.stamp_ns};
-      verdict.transition_count = 1;
-    }
+    Verdict verdict = k == from + 2 ? DetectedAt(sample.stamp_ns) : Verdict{};
     if (auto task = looks.Step(sample, verdict)) {
       return task;
     }
@@ -709,20 +721,12 @@ std::vector<LookTask> Follow(int samples, int first,
   EpisodeLooks looks(Physics());
   std::vector<LookTask> tasks;
   for (int k = 0; k < samples; ++k) {
-    Sample sample;
-    sample.stamp_ns = k * kSecond;
-    for (const Signal signal : {Signal::kCv, Signal::kX, Signal::kF}) {
-      sample.Set(signal, 50.0 + k % 3);
-    }
-    Verdict verdict;
+    Sample sample = LivelySample(k, k * kSecond);
     if (k % 2 == 0 && quality == SignalQuality::kUncertain) {
       sample.quality.fill(quality);
     }
-    if (k == first + 1) {
-      verdict.transitions[0] = {TransitionKind::kDetected, first * kSecond,
-                                first * kSecond};
-      verdict.transition_count = 1;
-    }
+    const Verdict verdict =
+        k == first + 1 ? DetectedAt(first * kSecond) : Verdict{};
     if (auto task = looks.Step(sample, verdict)) {
       tasks.push_back(std::move(*task));
     }
@@ -747,17 +751,8 @@ TEST(EpisodeLooksTest, WhatIsOnTopIsLookedAtInFiveMinutes) {
   EpisodeLooks looks(Physics());
   std::vector<std::pair<std::int64_t, LookOccasion>> due;
   for (int k = 0; k < 1600; ++k) {
-    Sample sample;
-    sample.stamp_ns = k * kSecond;
-    for (const Signal signal : {Signal::kCv, Signal::kX, Signal::kF}) {
-      sample.Set(signal, 50.0 + k % 3);
-    }
-    Verdict verdict;
-    if (k == 201) {
-      verdict.transitions[0] = {TransitionKind::kDetected, 200 * kSecond,
-                                200 * kSecond};
-      verdict.transition_count = 1;
-    }
+    Sample sample = LivelySample(k, k * kSecond);
+    Verdict verdict = k == 201 ? DetectedAt(200 * kSecond) : Verdict{};
     verdict.second.open = k >= 850;
     verdict.second.detection_stamp_ns = 810 * kSecond;
     verdict.second.standing_strength = -0.3;
@@ -876,17 +871,8 @@ TEST(EpisodeLooksTest, SlowDataAreLookedAtLaterAndNotMoreOften) {
   EpisodeLooks looks(slow);
   std::vector<std::pair<int, bool>> due;  // Row, and whether it is early.
   for (int k = 0; k < 700; ++k) {
-    Sample sample;
-    sample.stamp_ns = 60 * k * kSecond;
-    for (const Signal signal : {Signal::kCv, Signal::kX, Signal::kF}) {
-      sample.Set(signal, 50.0 + k % 3);
-    }
-    Verdict verdict;
-    if (k == 201) {
-      verdict.transitions[0] = {TransitionKind::kDetected, 60 * 200 * kSecond,
-                                60 * 200 * kSecond};
-      verdict.transition_count = 1;
-    }
+    Sample sample = LivelySample(k, 60 * k * kSecond);
+    Verdict verdict = k == 201 ? DetectedAt(60 * 200 * kSecond) : Verdict{};
     if (const auto task = looks.Step(sample, verdict)) {
       due.emplace_back(k, task->early());
       EXPECT_FALSE(task->late());
@@ -902,17 +888,8 @@ TEST(EpisodeLooksTest, BehindAGapALookDoesNotWait) {
   EpisodeLooks looks(Physics());
   std::vector<int> due;
   for (int k = 0; k < 1500; ++k) {
-    Sample sample;
-    sample.stamp_ns = (k < 900 ? k : k + 60) * kSecond;
-    for (const Signal signal : {Signal::kCv, Signal::kX, Signal::kF}) {
-      sample.Set(signal, 50.0 + k % 3);
-    }
-    Verdict verdict;
-    if (k == 201) {
-      verdict.transitions[0] = {TransitionKind::kDetected, 200 * kSecond,
-                                200 * kSecond};
-      verdict.transition_count = 1;
-    }
+    Sample sample = LivelySample(k, (k < 900 ? k : k + 60) * kSecond);
+    Verdict verdict = k == 201 ? DetectedAt(200 * kSecond) : Verdict{};
     if (const auto task = looks.Step(sample, verdict)) {
       due.push_back(k);
       EXPECT_TRUE(k < 900 || task->window.detection == 0U);

@@ -9,6 +9,7 @@
 
 #include "base/error.h"
 #include "base/mutex.h"
+#include "base/parallel_for.h"
 #include "base/time_text.h"
 #include "import/csv.h"
 #include "report/progress.h"
@@ -16,7 +17,6 @@
 #include "storage/runs/run_recorder.h"
 #include "storage/runs/runs.h"
 #include "trainer/campaign/run_input.h"
-#include "trainer/parallel_for.h"
 
 namespace fdi::trainer {
 namespace {

@@ -12,13 +12,13 @@
 
 #include "base/error.h"
 #include "base/mutex.h"
+#include "base/parallel_for.h"
 #include "diagnosis/fault_catalogue.h"
 #include "storage/models/model_codec.h"
 #include "trainer/campaign/campaign_runs.h"
 #include "trainer/fleet/plant_record.h"
 #include "trainer/fleet/valve_types.h"
 #include "trainer/onboarding/record_checks.h"
-#include "trainer/parallel_for.h"
 
 // The rows of a plant are tasks of one list, which all threads work off. Rows
 // of one kind (type, signals, unit of the flow) wait until one of them has been

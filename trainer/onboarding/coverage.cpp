@@ -6,9 +6,9 @@
 #include <utility>
 
 #include "base/error.h"
+#include "base/parallel_for.h"
 #include "diagnosis/fault_catalogue.h"
 #include "trainer/evaluation.h"
-#include "trainer/parallel_for.h"
 
 namespace fdi::trainer {
 namespace {

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "base/error.h"
+#include "base/parallel_for.h"
 #include "diagnosis/fault_catalogue.h"
 #include "simulator/fault_effects.h"
 #include "simulator/record_fit.h"
@@ -17,7 +18,6 @@
 #include "simulator/valve_equations.h"
 #include "trainer/onboarding/lost_command.h"
 #include "trainer/onboarding/record_checks.h"
-#include "trainer/parallel_for.h"
 #include "trainer/statistics.h"
 
 namespace fdi::trainer {

@@ -2,13 +2,13 @@
 
 #include <vector>
 
+#include "base/parallel_for.h"
 #include "diagnosis/fault_catalogue.h"
 #include "diagnosis/quality_count.h"
 #include "monitor/names/episode_names.h"
 #include "simulator/second_look/episode_looks.h"
 #include "simulator/second_look/valve_physics.h"
 #include "trainer/campaign/run_input.h"
-#include "trainer/parallel_for.h"
 #include "trainer/scoring/rescore.h"
 
 namespace fdi::trainer {

@@ -1,4 +1,4 @@
-#include "trainer/parallel_for.h"
+#include "base/parallel_for.h"
 
 #include <array>
 #include <atomic>
@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-namespace fdi::trainer {
+namespace fdi {
 namespace {
 
 TEST(ParallelForTest, EveryTaskRunsOnceAndItsResultIsSeen) {
@@ -33,4 +33,4 @@ TEST(ParallelForTest, AFailureIsThrownOnceAllThreadsHaveEnded) {
 }
 
 }  // namespace
-}  // namespace fdi::trainer
+}  // namespace fdi

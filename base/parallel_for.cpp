@@ -1,4 +1,4 @@
-#include "trainer/parallel_for.h"
+#include "base/parallel_for.h"
 
 #include <algorithm>
 #include <atomic>
@@ -8,7 +8,7 @@
 
 #include "base/mutex.h"
 
-namespace fdi::trainer {
+namespace fdi {
 
 // Tasks are taken one by one from a counter, not dealt out in blocks, because
 // they differ widely in length. Their order is not determined: each has to
@@ -46,4 +46,4 @@ void ParallelFor(int count, int threads, const std::function<void(int)>& task) {
   }
 }
 
-}  // namespace fdi::trainer
+}  // namespace fdi
