@@ -19,8 +19,10 @@ struct OperatorAction {
   std::string who;
   std::string comment;
   std::string origin;
-  std::int64_t until_ns{0};  ///< For kShelve, like the rest.
-  std::int64_t ended_ns{0};  ///< End, if unshelved early; else 0.
+  /// End of a kShelve. For kAck: the stamp of the newest event that it covers;
+  /// 0: not known.
+  std::int64_t until_ns{0};
+  std::int64_t ended_ns{0};  ///< Of kShelve: end, if unshelved early; else 0.
   std::string ended_by;
   std::string ended_origin;
 };

@@ -14,7 +14,9 @@ using std::chrono::milliseconds;
 
 constexpr milliseconds kPeriod{200};
 constexpr std::int64_t kMaxActionAgeNs = 30LL * 86'400'000'000'000;
-// An event that the other monitor missed is adopted within seconds.
+// Both monitors record an event at about the same time, in rare cases with the
+// stamp of another sample. One that a monitor missed is adopted within seconds.
+constexpr std::chrono::seconds kEventTimeout{10};
 constexpr std::chrono::seconds kEpisodeTimeout{60};
 constexpr std::size_t kMaxReceivedActions = 10'000;
 
@@ -87,15 +89,18 @@ void OperatorSync::ApplyReceived() {
   const auto now = std::chrono::steady_clock::now();
   for (std::size_t waiting = received_.size(); waiting > 0; --waiting) {
     const Received& received = received_.front();
+    const auto waited = now - received.since;
     bool keep = false;
     try {
-      if (history_.Adopt(received.action)) {
+      if (waited < kEventTimeout && !history_.HasEventsOf(received.action)) {
+        keep = true;
+      } else if (history_.Adopt(received.action)) {
         log_.Line(LogLevel::kInfo, "operator_action_adopted from=" +
                                        LogValue(received.action.monitor) +
                                        " who=" + LogValue(received.action.who));
       }
     } catch (const NotFoundError&) {
-      keep = now - received.since < kEpisodeTimeout;
+      keep = waited < kEpisodeTimeout;
     } catch (const ConfigError& error) {  // Not a valid action.
       ReportRefusal(error);
     }

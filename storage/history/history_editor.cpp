@@ -164,7 +164,7 @@ std::uint64_t HistoryEditor::Acknowledge(std::string_view id,
   const std::uint64_t episode_id = ResolveEpisode(database_, id);
   const std::string episode = EpisodeIdText(episode_id);
   database_.Run(sql::acknowledge, checked.who, checked.now_ns, episode);
-  database_.Run(sql::end_by_hand, episode, checked.now_ns);
+  database_.Run(sql::end_by_hand, episode, checked.now_ns, 0);
   AddNote(database_, episode, "ACK", std::nullopt, checked);
   transaction.Commit();
   return episode_id;
@@ -182,6 +182,14 @@ std::uint64_t HistoryEditor::Label(std::string_view id, std::string_view label,
   AddNote(database_, episode, "LABEL", value, checked);
   transaction.Commit();
   return episode_id;
+}
+
+bool HistoryEditor::HasEventsOf(const OperatorAction& action) {
+  database_.Refresh();
+  return action.kind != OperatorActionKind::kAck ||
+         database_.QueryInt64(sql::has_events_to,
+                              EpisodeIdText(action.episode_id),
+                              action.until_ns) == 1;
 }
 
 bool HistoryEditor::Adopt(const OperatorAction& action) {
@@ -205,8 +213,9 @@ bool HistoryEditor::AdoptNote(const OperatorAction& action) {
   if (fresh && label) {
     database_.Run(sql::adopt_label, value, episode, action.stamp_ns);
   } else if (fresh) {
-    database_.Run(sql::adopt_ack, note.who, action.stamp_ns, episode);
-    database_.Run(sql::end_by_hand, episode, action.stamp_ns);
+    database_.Run(sql::adopt_ack, note.who, action.stamp_ns, episode,
+                  action.until_ns);
+    database_.Run(sql::end_by_hand, episode, action.stamp_ns, action.until_ns);
   }
   transaction.Commit();
   return fresh;

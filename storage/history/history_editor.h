@@ -73,6 +73,10 @@ class HistoryEditor {
   ///   says what no action of this class would.
   bool Adopt(const OperatorAction& action);
 
+  /// @returns whether the history has the events that an acknowledgement
+  /// covers. If it is adopted before, the next of them may undo it.
+  bool HasEventsOf(const OperatorAction& action);
+
  private:
   bool AdoptNote(const OperatorAction& action);
   bool AdoptShelf(const OperatorAction& action);

@@ -59,6 +59,9 @@ std::vector<OperatorAction> OperatorLog::Next(std::int64_t since_ns) {
     action.who = row.Text(4);
     action.comment = row.Text(5);
     action.origin = row.Text(6);
+    if (action.kind == OperatorActionKind::kAck) {
+      action.until_ns = row.OptionalInt64(7).value_or(0);
+    }
   }
   row.Reset();
   last_event_ = last;

@@ -142,12 +142,14 @@ WHERE valve_id = ? AND unconfirmed_ns IS NOT NULL AND episode_id <> ?
 -- name: confirm_normal
 UPDATE episode SET cleared_ns = max(?1, ended_ns), unconfirmed_ns = NULL
 WHERE valve_id = ?2 AND unconfirmed_ns IS NOT NULL
--- Somebody acknowledged it at ?2, knowing of its end.
+-- Somebody acknowledged it at ?2, or on the other monitor of a pair with the
+-- events up to the sample of ?3, knowing of its end.
 -- name: end_by_hand
 UPDATE episode SET unconfirmed_ns = NULL
-WHERE episode_id = ?1 AND unconfirmed_ns IS NOT NULL AND ?2 >= coalesce(
-  (SELECT max(recorded_ns) FROM episode_event
-   WHERE episode_id = ?1 AND kind = 'CLOSED'), 0)
+WHERE episode_id = ?1 AND unconfirmed_ns IS NOT NULL AND NOT EXISTS (
+  SELECT 1 FROM episode_event
+  WHERE episode_id = ?1 AND kind = 'CLOSED' AND recorded_ns > ?2
+    AND stamp_ns > ?3)
 -- name: raise_peak
 UPDATE episode SET peak_factor = max(peak_factor, ?1)
 WHERE episode_id = ?2 AND peak_factor < ?1
@@ -191,11 +193,20 @@ ON CONFLICT (episode_id, kind, stamp_ns) DO NOTHING
 -- name: acknowledge
 UPDATE episode SET acked_by = ?, acked_ns = ?
 WHERE episode_id = ? AND acked_by IS NULL
--- Not one from before the priority rose.
+-- Not one from before the priority rose: by the clocks, unless no event is
+-- newer than those that were seen there, up to the sample of ?4.
 -- name: adopt_ack
 UPDATE episode SET acked_by = ?1, acked_ns = ?2
 WHERE episode_id = ?3 AND (acked_ns IS NULL OR acked_ns > ?2)
-  AND (raised_ns IS NULL OR raised_ns < ?2)
+  AND (raised_ns IS NULL OR raised_ns < ?2 OR NOT EXISTS (
+    SELECT 1 FROM episode_event
+    WHERE episode_id = ?3 AND kind NOT IN ('ACK', 'LABEL', 'RESUMED')
+      AND stamp_ns > ?4))
+-- name: has_events_to
+SELECT EXISTS (
+  SELECT 1 FROM episode_event
+  WHERE episode_id = ? AND kind NOT IN ('ACK', 'LABEL', 'RESUMED')
+    AND stamp_ns >= ?)
 -- name: adopt_label
 UPDATE episode SET label = ?1
 WHERE episode_id = ?2 AND NOT EXISTS (
@@ -204,8 +215,11 @@ WHERE episode_id = ?2 AND NOT EXISTS (
 -- name: last_event
 SELECT coalesce(max(event_id), 0) FROM episode_event
 -- name: notes
-SELECT episode_id, kind, stamp_ns, value, who, comment, origin
-FROM episode_event
+SELECT episode_id, kind, stamp_ns, value, who, comment, origin,
+  (SELECT max(e.stamp_ns) FROM episode_event e
+   WHERE e.episode_id = n.episode_id AND e.event_id < n.event_id
+     AND e.kind NOT IN ('ACK', 'LABEL', 'RESUMED'))
+FROM episode_event n
 WHERE event_id > ? AND event_id <= ? AND recorded_ns >= ?
   AND kind IN ('ACK', 'LABEL')
 ORDER BY event_id

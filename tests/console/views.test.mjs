@@ -728,6 +728,36 @@ async function checkReadable(page, where, colours = true) {
   assert.deepEqual(wide, [], where);
 }
 
+test('a click counts though the list is made anew while it is pressed',
+    async () => {
+      const rows = ['1', '2'].map((n) => alarm(`000000000000000${n}`, `V${n}`,
+          'f19', {state: 'ISOLATED'}));
+      monitor.reset([], rows);
+      Object.assign(monitor.answers.status,
+          {write: true, user: 'anna', role: 'engineer'});
+      const page = await openShared(browser, address, '#/alarms');
+      const press = async (name) => {
+        const box = await page.getByRole('button', {name, exact: true})
+            .boundingBox();
+        await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
+        await page.mouse.down();
+      };
+
+      await press('Shelve V2');
+      await monitor.push('alarm', {...rows[0], label: 'f18'});
+      await page.evaluate(() => new Promise((done) => setTimeout(done, 200)));
+      await page.mouse.up();
+      await page.getByRole('dialog').waitFor({timeout: 5000});
+      await page.keyboard.press('Escape');
+
+      // Nor does a press that never ends hold the list up.
+      await press('Shelve V2');
+      await monitor.push('alarm', alarm('0000000000000003', 'V3', 'f18'));
+      await page.locator('tr', {hasText: 'V3'}).waitFor({timeout: 5000});
+      await page.mouse.up();
+      await close(page);
+    });
+
 test('every kind of tile can be read, at any size, light and dark',
     async () => {
       const episode = '0000000000000001';

@@ -382,6 +382,74 @@ TEST_F(HistoryEditorTest, TwoHistoriesThatAdoptFromEachOtherShowTheSame) {
   }
 }
 
+// Two monitors of a pair, of which one records an episode half a minute later.
+class LateHistoryTest : public HistoryEditorTest {
+ protected:
+  void Record(TransitionKind kind, double after_s, double here_s,
+              EndReason reason = EndReason::kNone) {
+    FaultEvent event = Event(kind, after_s, 0b10, 0.9, reason, "pair");
+    event.transition.severity =
+        kind == TransitionKind::kDetected ? Severity::kLow : Severity::kHigh;
+    const auto at = [&](double s) {
+      return kDetected + static_cast<std::int64_t>((after_s + s) * 1e9);
+    };
+    writer_.Record(event, at(here_s));
+    late_.push_back({event, at(here_s + 30.0)});
+  }
+  // Anna acknowledges here all that is recorded so far.
+  OperatorAction Acknowledged(double after_s) {
+    editor_.Acknowledge(
+        IdText("pair"),
+        By("anna", kDetected + static_cast<std::int64_t>(after_s * 1e9)));
+    return OperatorLog(path_).Next(0).back();
+  }
+  void RecordThere(std::size_t count) {
+    for (; count > 0; --count) {
+      there_.Record(late_.front().first, late_.front().second);
+      late_.erase(late_.begin());
+    }
+  }
+  Episode There() { return HistoryReader(path()).Show(IdText("pair")); }
+  std::filesystem::path path() const { return directory_.path() / "there.db"; }
+
+  HistoryWriter there_{path()};
+  HistoryEditor editor_there_{path()};
+  std::vector<std::pair<FaultEvent, std::int64_t>> late_;
+};
+
+TEST_F(LateHistoryTest, AnAcknowledgementWaitsForWhatItCovers) {
+  Record(TransitionKind::kDetected, 0, 1);
+  Record(TransitionKind::kIsolated, 20, 1);
+  const OperatorAction seen = Acknowledged(22);
+  EXPECT_FALSE(editor_there_.HasEventsOf(seen));
+  RecordThere(1);
+  EXPECT_FALSE(editor_there_.HasEventsOf(seen));
+  RecordThere(1);
+  ASSERT_TRUE(editor_there_.HasEventsOf(seen));
+  EXPECT_TRUE(editor_there_.Adopt(seen));
+  EXPECT_EQ(There().acked_by, "anna");
+}
+
+TEST_F(LateHistoryTest, APriorityThatRoseAfterItIsNotCovered) {
+  Record(TransitionKind::kDetected, 0, 1);
+  const OperatorAction seen = Acknowledged(19);
+  Record(TransitionKind::kIsolated, 20, 1);
+  RecordThere(2);
+  ASSERT_TRUE(editor_there_.HasEventsOf(seen));
+  EXPECT_TRUE(editor_there_.Adopt(seen));
+  EXPECT_EQ(There().acked_by, std::nullopt);
+}
+
+TEST_F(LateHistoryTest, AnEndThatWasSeenIsKnownThereToo) {
+  Record(TransitionKind::kDetected, 0, 1);
+  Record(TransitionKind::kClosed, 120, 1, EndReason::kStaleTimeout);
+  const OperatorAction seen = Acknowledged(122);
+  RecordThere(2);
+  EXPECT_TRUE(There().unconfirmed_ns);
+  EXPECT_TRUE(editor_there_.Adopt(seen));
+  EXPECT_FALSE(There().unconfirmed_ns);
+}
+
 // Of version 2: the column is younger.
 TEST_F(HistoryEditorTest, AdoptsANoteWithoutAnOrigin) {
   OperatorAction action;

@@ -63,7 +63,42 @@ export function errorNote(error) {
   return h('p', {class: 'note', role: 'alert'}, error.message);
 }
 
+// A browser makes a click of a press only if what was pressed is still there
+// when the pointer is released. The end of some presses is never told.
+const kLongestPressMs = 1000;
+let pressed = null;
+let pressEnd = 0;
+const waiting = new Map();
+
+export const isPressed = () => pressed !== null;
+
+function endPress() {
+  pressed = null;
+  const all = [...waiting];
+  waiting.clear();
+  for (const [node, children] of all) replace(node, children);
+}
+
+function endPressAfter(ms) {
+  clearTimeout(pressEnd);
+  pressEnd = setTimeout(endPress, ms);
+}
+
+addEventListener('pointerdown', ({target}) => {
+  pressed = target;
+  endPressAfter(kLongestPressMs);
+}, {capture: true, passive: true});
+for (const end of ['pointerup', 'pointercancel']) {
+  addEventListener(end, () => endPressAfter(0), {capture: true, passive: true});
+}
+
+/** Gives `node` new children; while one of the old is pressed, after that. */
 export function replace(node, ...children) {
+  if (pressed !== null && node.contains(pressed)) {
+    waiting.set(node, children);
+    return;
+  }
+  waiting.delete(node);
   node.replaceChildren();
   append(node, children);
 }

@@ -1,5 +1,6 @@
 // What all views share: an element, a title, and an end.
 
+import {isPressed} from '../dom.js';
 import {onKey} from '../shortcuts.js';
 
 /** Listeners, timers and keys of a view go with it. */
@@ -38,12 +39,16 @@ export class View {
   }
 }
 
-/** A function that calls `action` with the next frame, once however often. */
+/**
+ * A function that calls `action` with the next frame, once however often; not
+ * while something is pressed, which would be gone before its click.
+ */
 export function oncePerFrame(view, action) {
   let frame = 0;
   view.atEnd(() => cancelAnimationFrame(frame));
-  return () => frame ||= requestAnimationFrame(() => {
-    frame = 0;
-    action();
-  });
+  const run = () => {
+    frame = isPressed() ? requestAnimationFrame(run) : 0;
+    if (frame === 0) action();
+  };
+  return () => frame ||= requestAnimationFrame(run);
 }
