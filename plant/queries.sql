@@ -293,8 +293,12 @@ SELECT * FROM (
     e.session_id, e.fault_bits, e.strength, e.unknown_kind, e.layer,
     e.flow_unit, e.channels, e.faults, e.lowest, e.highest, e.worst_strength,
     e.priority, e.unconfirmed_ns, plain_name(e.monitor_id, e.fault),
-    ack_comment(e.monitor_id, e.episode_id, e.acked_by, e.acked_ns), e.host,
-    e.monitor
+    ack_comment(e.monitor_id, e.episode_id, e.acked_by, e.acked_ns),
+    (SELECT nullif(s.value, 'none') FROM episode_event s
+     WHERE (s.episode_id, s.monitor_id) = (e.episode_id, e.monitor_id)
+       AND s.kind = 'SECOND'
+     ORDER BY s.stamp_ns DESC LIMIT 1),
+    e.host, e.monitor
   FROM episode e
   WHERE {episodes}
   ORDER BY utc(e.detected_ns) DESC, e.valve_id DESC LIMIT {limit}) l

@@ -35,6 +35,7 @@ void AddTo(ValveAlarm& valve, const Alarm& alarm,
     valve.by_audit = !e.ended_ns && e.layer == LayerName(Layer::kAudit);
     valve.certainty = storage::CertaintyOf(e);
     valve.look_alikes = storage::LookAlikesOf(e);
+    valve.second = e.second;
   }
 }
 

@@ -48,6 +48,7 @@ struct ValveAlarm {
   bool by_audit{false};
   Certainty certainty{Certainty::kNotYet};
   std::vector<std::string> look_alikes{};
+  std::optional<std::string> second{};  ///< Episode::second.
 
   bool operator==(const ValveAlarm&) const = default;
 };

@@ -144,12 +144,12 @@ std::string Hex(std::uint64_t value) {
 
 const std::vector<std::string>& EpisodeKeys() {
   static const std::vector<std::string> keys = {
-      "episode_id",       "valve_id",  "detected_utc", "isolated_utc",
-      "cleared_utc",      "fault",     "peak_factor",  "model_set",
-      "end_reason",       "label",     "acked_by",     "strength",
-      "worst_strength",   "severity",  "priority",     "unconfirmed_utc",
-      "fault_name",       "acked_utc", "ack_comment",  "alarm_state",
-      "shelved_until_utc"};
+      "episode_id",        "valve_id",  "detected_utc", "isolated_utc",
+      "cleared_utc",       "fault",     "peak_factor",  "model_set",
+      "end_reason",        "label",     "acked_by",     "strength",
+      "worst_strength",    "severity",  "priority",     "unconfirmed_utc",
+      "fault_name",        "acked_utc", "ack_comment",  "alarm_state",
+      "shelved_until_utc", "second"};
   return keys;
 }
 
@@ -203,7 +203,8 @@ Json EpisodeJson(const Alarm& alarm) {
       {"ack_comment", TextJson(episode.ack_comment)},
       {"alarm_state", AlarmStateName(alarm.state)},
       {"shelved_until_utc",
-       alarm.shelf ? TimeJson(alarm.shelf->until_ns) : Json()}};
+       alarm.shelf ? TimeJson(alarm.shelf->until_ns) : Json()},
+      {"second", TextJson(episode.second)}};
 }
 
 Json ShelfJson(const Shelf& shelf) {

@@ -71,6 +71,15 @@ std::string WallClock(const Json& time, bool utc) {
   return text + (utc ? "Z" : "");
 }
 
+// "f19", or "f19 and f1" with what came on top.
+std::string FaultText(const Json& row) {
+  const auto name = [](const Json& fault) {
+    return fault.is_null() ? "-" : fault.get<std::string>();
+  };
+  return name(row["fault"]) +
+         (row["second"].is_null() ? "" : " and " + name(row["second"]));
+}
+
 Report ListEpisodes(const HistoryOptions& options, const Context& context) {
   const auto history = OpenHistory(options.plant, context);
   auto episodes = history->List(options.filter.Filter(context));
@@ -99,7 +108,7 @@ Report ListEpisodes(const HistoryOptions& options, const Context& context) {
                  }),
       alarm,
       {"severity", "severity", Format::kPlain, 0, 1},
-      {"fault", "fault", Format::kPlain, 0, 4},
+      TextColumn("fault", FaultText, 4),
       {"meaning", "fault_name", Format::kPlain, 0, 0, kLeastName},
       {"how sure", "certainty", Format::kPlain, 0, 3},
       {"now", "strength", Format::kPercent, 0, 2},

@@ -83,6 +83,8 @@ struct Episode {
   /// or where no monitor has said so.
   std::optional<std::string> fault_name;
   std::optional<std::string> ack_comment;
+  /// What came on top of the fault: names joined by |, or "unknown".
+  std::optional<std::string> second;
 };
 
 /// Whether its faults have a name, and with it a strength.
@@ -167,7 +169,7 @@ FDI_FIELDS(fdi::storage::Episode, episode_id, valve_id, detected_utc,
            cleared_ns, ended_ns, acked_ns, trace_end_ns, session_id, fault_bits,
            strength, unknown_kind, layer, flow_unit, channels, faults, lowest,
            highest, worst_strength, priority, unconfirmed_ns, fault_name,
-           ack_comment)
+           ack_comment, second)
 
 FDI_FIELDS(fdi::storage::MonitorSession, session_id, start_ns, alive_ns,
            stop_ns, clean, software, config)

@@ -12,7 +12,10 @@ SELECT v.episode_id, v.valve_id, v.detected_utc, v.isolated_utc,
    WHERE t.episode_id = e.episode_id), e.session_id, e.fault_bits, e.strength,
   e.unknown_kind, e.layer, e.flow_unit, e.channels, e.faults, e.lowest,
   e.highest, e.worst_strength, e.priority, e.unconfirmed_ns, v.fault_name,
-  v.ack_comment
+  v.ack_comment,
+  (SELECT nullif(s.value, 'none') FROM episode_event s
+   WHERE s.episode_id = e.episode_id AND s.kind = 'SECOND'
+   ORDER BY s.stamp_ns DESC LIMIT 1)
 FROM episode e CROSS JOIN fault_history v USING (episode_id)
 WHERE
 -- name: newest_episode

@@ -728,6 +728,25 @@ async function checkReadable(page, where, colours = true) {
   assert.deepEqual(wide, [], where);
 }
 
+test('what came on top of a fault is named wherever the fault is', async () => {
+  const episode = '0000000000000001';
+  monitor.reset([tile('V', 'ISOLATED', ['f19'], {episode, second: 'f1'}),
+    tile('W', 'ISOLATED', ['f6'], {second: 'unknown'})],
+  [alarm(episode, 'V', 'f19', {second: 'f1'})]);
+  monitor.answers.status.write = true;
+  const page = await openShared(browser, address, '#/');
+  await page.locator('.tile', {hasText: 'V'}).getByText(/, and f1$/).waitFor();
+  await page.locator('.tile', {hasText: 'W'})
+      .getByText(/, and a second fault without a name$/).waitFor();
+
+  await page.goto(`${address}/#/alarms`);
+  await page.locator('.fault', {hasText: /, and f1/}).waitFor();
+  await page.getByRole('button', {name: 'Acknowledge V'}).click();
+
+  await page.getByRole('dialog').getByText(/^V: .*, and f1$/).waitFor();
+  await close(page);
+});
+
 test('a click counts though the list is made anew while it is pressed',
     async () => {
       const rows = ['1', '2'].map((n) => alarm(`000000000000000${n}`, `V${n}`,

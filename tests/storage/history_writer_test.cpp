@@ -430,10 +430,12 @@ TEST_F(GrowingAlarmTest, ASecondFaultHasToBeAcknowledgedAndItsEndHasNot) {
     return events.back().kind + " " + events.back().value;
   };
   EXPECT_EQ(latest(), "SECOND f19");
+  EXPECT_EQ(Shown().second, "f19");
   event.transition.stamp_ns += kSecond;
   event.transition.second.faults = 0;
   EXPECT_TRUE(writer_.Record(event, kDetected + 7201 * kSecond));
   EXPECT_EQ(latest(), "SECOND unknown");
+  EXPECT_EQ(Shown().second, "unknown");
   EXPECT_EQ(writer_.UnsentEvents().back().transition.kind, Kind::kSecond);
   EXPECT_EQ(OnTheBus(Kind::kSecond), Kind::kReisolated);
   editor_.Acknowledge("last", By("anna", kDetected + 7201 * kSecond));
@@ -441,6 +443,7 @@ TEST_F(GrowingAlarmTest, ASecondFaultHasToBeAcknowledgedAndItsEndHasNot) {
   event.transition.second.open = false;
   EXPECT_TRUE(writer_.Record(event, kDetected + 7202 * kSecond));
   EXPECT_EQ(latest(), "SECOND none");
+  EXPECT_EQ(Shown().second, std::nullopt);
   EXPECT_EQ(Shown().acked_by, "anna");
 }
 

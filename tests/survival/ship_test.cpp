@@ -703,7 +703,7 @@ TEST_F(ShipTest, TheVerbsReadThePlant) {
   EXPECT_THAT(
       list.out,
       HasSubstr("unconfirmed_utc,fault_name,acked_utc,ack_comment,alarm_state,"
-                "shelved_until_utc,host,monitor\n"));
+                "shelved_until_utc,second,host,monitor\n"));
   EXPECT_THAT(list.out, HasSubstr(",a\n"));
   EXPECT_THAT(Store("history list --from '" + Url() + "' --monitor b").out,
               HasSubstr("no episode matches"));

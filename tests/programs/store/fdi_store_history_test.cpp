@@ -38,7 +38,7 @@ TEST_F(FdiStoreHistoryTest, ListedEpisodesHaveTheColumnsOfTheView) {
                   "model_set", "end_reason", "label", "acked_by", "strength",
                   "worst_strength", "severity", "priority", "unconfirmed_utc",
                   "certainty", "look_alikes", "fault_name", "acked_utc",
-                  "ack_comment", "alarm_state", "shelved_until_utc"));
+                  "ack_comment", "alarm_state", "shelved_until_utc", "second"));
   EXPECT_EQ(episode["fault_name"], "Flashing or critical flow");
   EXPECT_EQ(episode["fault"], "f7");
   EXPECT_EQ(episode["detected_utc"], "2026-11-20T14:56:11.000Z");
@@ -135,9 +135,10 @@ TEST_F(FdiStoreHistoryTest, AcknowledgedAndLabelledEpisodeSaysSo) {
   EXPECT_EQ(shown["label"], "f1");
   const std::string csv = Store("history list --csv").out;
   EXPECT_THAT(csv, HasSubstr("unconfirmed_utc,fault_name,acked_utc,"
-                             "ack_comment,alarm_state,shelved_until_utc\n"));
+                             "ack_comment,alarm_state,shelved_until_utc,"
+                             "second\n"));
   EXPECT_THAT(csv, testing::ContainsRegex("Flashing or critical flow,20[0-9TZ:"
-                                          ".-]+,seat worn,ACKED,\n"));
+                                          ".-]+,seat worn,ACKED,,\n"));
   EXPECT_THAT(Store("history show last").out,
               testing::ContainsRegex("acknowledged: +by anna at 20.+: seat "
                                      "worn\n"));

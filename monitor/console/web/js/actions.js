@@ -3,7 +3,7 @@
 
 import {path, post} from './api.js';
 import {button, field, h, replace, select, showDialog} from './dom.js';
-import {faultTitle, members, rowTitle} from './faults.js';
+import {faultTitle, members, moreText, rowTitle} from './faults.js';
 import {fromInput} from './format.js';
 import {store} from './store.js';
 
@@ -48,7 +48,7 @@ function ask({title, subject, fields, verb, commentNeeded, send}) {
 
 function describe(rows) {
   return rows.length === 1 ?
-    `${rows[0].valve}: ${rowTitle(rows[0])}` :
+    `${rows[0].valve}: ${rowTitle(rows[0])}${moreText(rows[0])}` :
     `${rows.length} alarms`;
 }
 

@@ -37,9 +37,14 @@ export function certaintyText({certainty, faults, fault, look_alikes}) {
     members(faults?.join('|') || fault).length + (look_alikes ?? []).length}`;
 }
 
-/** " or Bypass open (f18)": what looks the same to a model set; or empty. */
-export const alikeText = ({look_alikes: others}, title = faultTitle) =>
-  (others ?? []).map((fault) => ` or ${title(fault)}`).join('');
+/**
+ * " or Bypass open (f18), and Valve clogging (f1)": what looks the same to a
+ * model set, and what came on top; or empty.
+ */
+export const moreText = ({look_alikes: others, second}, title = faultTitle) =>
+  (others ?? []).map((fault) => ` or ${title(fault)}`).join('') +
+  (!second ? '' : `, and ${second === 'unknown' ?
+    'a second fault without a name' : title(second)}`);
 
 /** The same as an element that tells experts the number behind it. */
 export function certaintyNode(row, name = 'tag') {

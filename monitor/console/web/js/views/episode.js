@@ -7,7 +7,7 @@ import {exportPng} from '../charts/export.js';
 import {Timeline} from '../charts/timeline.js';
 import {TrendData} from '../charts/trend_data.js';
 import {button, errorNote, factList, h, replace, setText} from '../dom.js';
-import {alikeText, certaintyNode, faultTitle, groupName, layerText, markWord,
+import {moreText, certaintyNode, faultTitle, groupName, layerText, markWord,
   members, namurText, priorityNames, priorityOf, prioritySign, rowTitle,
   stateWord, unconfirmedText} from '../faults.js';
 import {durationText, intervalText, percentText, rangeText,
@@ -34,7 +34,7 @@ function facts({episode: row, model_hash: hash}) {
     ['Valve', valveLink(row.valve)],
     ['Fault', h('span', {class: 'with-sign'},
         prioritySign(priorityOf(row), members(row.fault).length > 0),
-        [rowTitle(row) + alikeText(row), layerText(row.layer)]
+        [rowTitle(row) + moreText(row), layerText(row.layer)]
             .filter(Boolean).join(', '))],
     ['Priority', priorityNames[priorityOf(row)]],
     ['State', [`${stateWord(row.state)}; ${groupName(row).toLowerCase()}`,

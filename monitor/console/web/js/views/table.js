@@ -1,7 +1,7 @@
 // Tables by declaration of their columns: {text, cell(row), class, header}.
 
 import {h} from '../dom.js';
-import {alikeText, certaintyNode, faultName, faultTitle, groupName, members,
+import {moreText, certaintyNode, faultName, faultTitle, groupName, members,
   namurText, priorityNames, priorityOf, prioritySign, qualityText, rowTitle,
   unconfirmedText} from '../faults.js';
 import {durationText, percentText, strengthText, timeText} from '../format.js';
@@ -54,9 +54,9 @@ function faultCell(row) {
   const name = rowTitle(row, faultName);
   const numbers = members(row.fault).join(', ');
   return h('a', {href: link('episode', row.episode), title:
-    rowTitle(row) + alikeText(row)}, name, numbers && numbers !== name ?
+    rowTitle(row) + moreText(row)}, name, numbers && numbers !== name ?
     h('span', {class: 'number'}, ` ${numbers}`) : null,
-  alikeText(row, faultName));
+  moreText(row, faultName));
 }
 
 /** A fault, what somebody found it to be, and what to check. */

@@ -2,7 +2,7 @@
 
 import {drawSparkline} from '../charts/sparkline.js';
 import {h, replace, setText} from '../dom.js';
-import {alikeText, certaintyText, factorTitle, faultName, faultOfTile,
+import {moreText, certaintyText, factorTitle, faultName, faultOfTile,
   faultTitle, inAlarm, isAlarm, members, priorityNames, priorityOf,
   prioritySign, qualityText, stateWord, unconfirmedText} from '../faults.js';
 import {percentText, shortTimeText, strengthText, timeText} from '../format.js';
@@ -36,7 +36,7 @@ export function rankOf(tile) {
 
 function whatText(tile) {
   if (isAlarm(tile)) {
-    const name = faultName(faultOfTile(tile)) + alikeText(tile, faultName);
+    const name = faultName(faultOfTile(tile)) + moreText(tile, faultName);
     return name[0].toUpperCase() + name.slice(1);
   }
   if (tile.unacked) return 'Returned, unacknowledged';
@@ -125,7 +125,7 @@ export class Tile {
       stateWord(tile.state) + (tile.unacked ? ', unacknowledged' : '') :
       what ? '' : ', normal');
     this.#what.title = alarm ?
-      faultTitle(faultOfTile(tile)) + alikeText(tile) : '';
+      faultTitle(faultOfTile(tile)) + moreText(tile) : '';
     // A calm valve draws no line: a line is a deviation, and says so. Words need
     // its room.
     const spark = tile.spark ?? [];

@@ -4,7 +4,7 @@ import {getOptional, path} from '../api.js';
 import {Timeline} from '../charts/timeline.js';
 import {TrendData} from '../charts/trend_data.js';
 import {button, h, replace, setText} from '../dom.js';
-import {alikeText, certaintyNode, factorTitle, faultName, faultOfTile,
+import {moreText, certaintyNode, factorTitle, faultName, faultOfTile,
   faultTitle, inAlarm, isAlarm, members, openText, priorityNames, priorityOf,
   prioritySign, qualityText, stateWord} from '../faults.js';
 import {durationText, numberText, percentText, strengthText,
@@ -38,7 +38,7 @@ function stateLine(tile) {
     h('span', {class: 'tag strong'},
         prioritySign(priority, members(faultOfTile(tile)).length > 0),
         inAlarm(tile) ? `${stateWord(tile.state)}: ` +
-            faultTitle(faultOfTile(tile)) + alikeText(tile) : openText(tile)),
+            faultTitle(faultOfTile(tile)) + moreText(tile) : openText(tile)),
     certaintyNode(tile),
     h('span', {class: 'tag'}, priorityNames[priority]),
     percentText(tile.strength) === '–' ? null :
