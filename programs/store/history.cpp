@@ -93,6 +93,13 @@ Report ListEpisodes(const HistoryOptions& options, const Context& context) {
     keys.insert(keys.end(), {"host", "monitor"});
   }
   report.Csv("episodes", keys);
+  // Of two faults, what a narrow list keeps has to say so.
+  Column meaning = TextColumn("meaning", [](const Json& row) {
+    const Json& name = row["fault_name"];
+    return (row["second"].is_null() ? "" : FaultText(row) + ": ") +
+           (name.is_null() ? "-" : name.get<std::string>());
+  });
+  meaning.least_width = kLeastName;
   Column alarm = TextColumn("alarm", AlarmText);
   alarm.tone = ToneOf;
   const auto end = [](const Json& row) {
@@ -109,7 +116,7 @@ Report ListEpisodes(const HistoryOptions& options, const Context& context) {
       alarm,
       {"severity", "severity", Format::kPlain, 0, 1},
       TextColumn("fault", FaultText, 4),
-      {"meaning", "fault_name", Format::kPlain, 0, 0, kLeastName},
+      meaning,
       {"how sure", "certainty", Format::kPlain, 0, 3},
       {"now", "strength", Format::kPercent, 0, 2},
       {"worst", "worst_strength", Format::kPercent, 0, 5},

@@ -57,7 +57,12 @@ std::string FaultLine(const Episode& e, const std::string& name) {
   for (const std::string& other : storage::LookAlikesOf(e)) {
     line += " or " + other;
   }
-  return line.append(ByLayer(e.layer.value_or("")));
+  line += ByLayer(e.layer.value_or(""));
+  if (e.second) {
+    line += ", and " + (*e.second == "unknown" ? "a second fault without a name"
+                                               : *e.second);
+  }
+  return line;
 }
 
 std::string AlarmLine(const Alarm& alarm, bool utc) {

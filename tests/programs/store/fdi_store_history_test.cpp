@@ -26,6 +26,17 @@ class FdiStoreHistoryTest : public FdiStoreTest {
   }
 };
 
+TEST_F(FdiStoreHistoryTest, WhatCameOnTopIsInEveryList) {
+  {
+    FaultEvent event = Event(TransitionKind::kSecond, 90, 0b010, 0.8);
+    event.transition.second = {.open = true, .faults = 0b100};
+    HistoryWriter(path_).Record(event, kDetected);
+  }
+  EXPECT_EQ(StoreJson("history list")["episodes"][0]["second"], "f19");
+  EXPECT_THAT(Store("history list").out, HasSubstr("f7 and f19: Flashing"));
+  EXPECT_THAT(Store("history show last").out, HasSubstr("(f7), and f19\n"));
+}
+
 TEST_F(FdiStoreHistoryTest, ListedEpisodesHaveTheColumnsOfTheView) {
   const json listed = StoreJson("history list");
 
