@@ -83,6 +83,17 @@ bool Detection::pending() const {
                              [](const Run& run) { return run.length > 0; });
 }
 
+std::uint32_t Detection::beyond() const {
+  std::uint32_t channels = 0;
+  for (std::size_t t = 0; t < models_->channels.size() * kTestsPerChannel;
+       ++t) {
+    if (runs_[t].length >= models_->decision.detection_samples) {
+      channels |= std::uint32_t{1} << (t / kTestsPerChannel);
+    }
+  }
+  return channels;
+}
+
 std::optional<std::int64_t> Detection::stamp_ns() const {
   std::optional<std::int64_t> stamp;
   const std::size_t tests = models_->channels.size() * kTestsPerChannel;

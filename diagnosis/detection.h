@@ -46,6 +46,9 @@ class Detection {
   /// True if some residual or window was beyond its limit, if only just.
   bool pending() const;
 
+  /// The channels, by bit, with a run beyond a limit that is n_d long.
+  std::uint32_t beyond() const;
+
   /// First sample of the earliest run beyond a limit that is n_d long.
   std::optional<std::int64_t> stamp_ns() const;
 

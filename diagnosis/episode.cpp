@@ -644,7 +644,7 @@ void Episode::Isolate(const Sample& sample, const Findings& findings,
   }
   // What is recognised fits over t_k samples, be single ones rare for it.
   supported = supported == 0 ? recognised_ : supported;
-  if (isolation_held_ || verdict.normal_factor >= threshold) {
+  if (isolation_held_ || findings.drift || verdict.normal_factor >= threshold) {
     contender_run_ = 0;
     proven_run_ = 0;
     return;
@@ -712,6 +712,7 @@ Transition Episode::Make(TransitionKind kind, std::int64_t stamp_ns,
   transition.detection_stamp_ns = detection_stamp_ns_;
   transition.faults = verdict.isolated;
   transition.reason = reason;
+  transition.drift = verdict.drift;
   transition.unknown = verdict.unknown;
   for (std::size_t i = 0; i < models_->faults.size(); ++i) {
     const bool counts =

@@ -110,6 +110,9 @@ class ClearingWindow {
   std::array<double, kMaxChannels> sums_{};
 };
 
+/// Those of the floor, and a drift.
+inline constexpr std::size_t kFindings = Floor::kTests + 1;
+
 /// Findings in one sample.
 struct Findings {
   std::optional<std::int64_t> detected;  ///< Stamp of a new detection.
@@ -117,8 +120,9 @@ struct Findings {
   FaultSet stuck{0};      ///< Faults of stuck transmitters: certain.
   FaultSet floor{0};      ///< Findings of the floor.
   FaultSet beginning{0};  ///< Those that some more such samples would make.
-  std::array<double, Floor::kTests> sizes{};  ///< Their sizes.
-  bool settled{true};                         ///< The observers have settled.
+  std::array<double, kFindings> sizes{};  ///< Their sizes.
+  bool drift{false};   ///< One of them, instead of any fault.
+  bool settled{true};  ///< The observers have settled.
 };
 
 /// The episode of a valve from its detection to its end: which faults explain
@@ -207,17 +211,17 @@ class Episode {
   bool isolation_held_{false};
   NameHold hold_{NameHold::kNone};
   std::int64_t detection_stamp_ns_{0};
-  FaultSet floor_{0};                      // findings that the episode shows
-  std::array<int, Floor::kTests> over_{};  // samples since each was there
-  bool begun_{false};                      // gathering of evidence has begun
-  int age_{0};                             // samples since the detection
-  int without_fault_{0};   // samples since some factor reached T/2
-  FaultSet proven_{0};     // the only fault that is not refuted
-  int proven_run_{0};      // samples in a row
-  bool early_{false};      // isolated before t_k
-  FaultSet contender_{0};  // candidate to replace the isolated set
-  int contender_run_{0};   // samples that supported it and no other since
-  FaultSet misfits_{0};    // do not fit the last t_k samples, or refuted
+  FaultSet floor_{0};                  // findings that the episode shows
+  std::array<int, kFindings> over_{};  // samples since each was there
+  bool begun_{false};                  // gathering of evidence has begun
+  int age_{0};                         // samples since the detection
+  int without_fault_{0};               // samples since some factor reached T/2
+  FaultSet proven_{0};                 // the only fault that is not refuted
+  int proven_run_{0};                  // samples in a row
+  bool early_{false};                  // isolated before t_k
+  FaultSet contender_{0};              // candidate to replace the isolated set
+  int contender_run_{0};  // samples that supported it and no other since
+  FaultSet misfits_{0};   // do not fit the last t_k samples, or refuted
   MisfitCounts misfit_counts_;
   // What the evidence refutes; counted in sets without a second look, which
   // have no other rule for a name that changes with a growing strength.

@@ -164,8 +164,8 @@ inline constexpr FaultFacts kFaultCatalogue[] = {
 
 /// Findings of the floor (diagnosis/floor.h), which are implausible readings,
 /// whatever the cause, then those of the audit of a loop
-/// (diagnosis/loop_watch.h). Their numbers begin at kFirstFinding, to leave
-/// room for more faults.
+/// (diagnosis/loop_watch.h), then a drift (diagnosis/drift_watch.h). Their
+/// numbers begin at kFirstFinding, to leave room for more faults.
 inline constexpr FaultFacts kFindingCatalogue[] = {
     {"travel_deviation", "rod does not follow the command", "", true},
     {"shut_flow", "flow with the valve shut", "", false},
@@ -182,6 +182,10 @@ inline constexpr FaultFacts kFindingCatalogue[] = {
     {"output_saturated", "command at an end of its range", "", false},
     {"oscillation_tuning", "the controller makes an oscillation", "", false},
     {"oscillation_external", "an oscillation from outside the loop", "", false},
+    {.name = "x_drift",
+     .description = "position drifts slowly",
+     .is_signed = true,
+     .visible_in = MaskOf(Signal::kX)},
 };
 
 /// The actuator faults of the DAMADICS benchmark are 1..kFaultCount.
@@ -213,6 +217,8 @@ inline constexpr int kReadingFrozen = 209;
 inline constexpr int kOutputSaturated = 210;
 inline constexpr int kOscillationTuning = 211;
 inline constexpr int kOscillationExternal = 212;
+inline constexpr int kLastLoopFinding = kOscillationExternal;
+inline constexpr int kPositionDrift = 213;
 static_assert(kFaultCatalogue[kDiaphragmPerforation - 1].name == "f10" &&
               kFaultCatalogue[kSupplyDrop - 1].name == "f16" &&
               kFaultCatalogue[kTemperatureTransmitterFault - 1].name == "t1" &&
@@ -220,7 +226,7 @@ static_assert(kFaultCatalogue[kDiaphragmPerforation - 1].name == "f10" &&
                   "p2" &&
               kFindingCatalogue[kLowFlow - kFirstFinding].name == "low_flow" &&
               kFindingCatalogue[kStiction - kFirstFinding].name == "stiction" &&
-              kOscillationExternal == kLastFinding);
+              kPositionDrift == kLastFinding);
 
 constexpr bool IsFault(int number) {
   return number >= 1 && number <= kLastFault;
@@ -231,7 +237,7 @@ constexpr bool IsFinding(int number) {
 
 /// What the audit of a loop finds.
 constexpr bool IsLoopFinding(int number) {
-  return number >= kFirstLoopFinding && number <= kLastFinding;
+  return number >= kFirstLoopFinding && number <= kLastLoopFinding;
 }
 
 /// The numbers of all faults, then of all findings.

@@ -77,8 +77,8 @@ bool IsShut(double x, double cv) {
 
 Floor::Floor(const ModelSet& models)
     : limits_(models.floor ? &*models.floor : nullptr),
-      first_(models.faults.size() -
-             static_cast<std::size_t>(FindingCount(models))) {
+      first_(static_cast<std::size_t>(
+          std::max(FaultIndex(models, kFirstFinding), 0))) {
   if (limits_ != nullptr) {
     rod_.emplace(*limits_);
   }

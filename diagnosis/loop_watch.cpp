@@ -52,7 +52,8 @@ std::shared_ptr<const ModelSet> AuditModels(double interval_s) {
   models->preset = "audit";
   models->sample_period_s = interval_s;
   models->decision.settling_samples = 0;
-  for (int finding = kFirstLoopFinding; finding <= kLastFinding; ++finding) {
+  for (int finding = kFirstLoopFinding; finding <= kLastLoopFinding;
+       ++finding) {
     models->faults.push_back(finding);
   }
   return models;

@@ -234,8 +234,10 @@ void Validate(const ModelSet& models) {
   if (models.floor) {
     ValidateFloor(models, *models.floor);
   }
-  Check(std::popcount(FindingsOf(models)) == FindingCount(models), models,
-        "a floor and its findings belong together");
+  const int drift = Contains(models.faults, kPositionDrift) ? 1 : 0;
+  Check(std::popcount(FindingsOf(models)) == FindingCount(models) + drift &&
+            (drift == 0 || models.floor),
+        models, "a floor and its findings belong together");
   for (std::size_t i = 0; i < models.observers.size(); ++i) {
     const Observer& observer = models.observers[i];
     Check((i == 0) == (observer.fault == 0), models,

@@ -8,7 +8,9 @@
 
 #include "diagnosis/coverage.h"
 #include "diagnosis/detection.h"
+#include "diagnosis/drift_watch.h"
 #include "diagnosis/episode.h"
+#include "diagnosis/fault_catalogue.h"
 #include "diagnosis/floor.h"
 #include "diagnosis/intake.h"
 #include "diagnosis/model_set.h"
@@ -26,6 +28,7 @@ namespace {
 constexpr std::array kPressureFactors{0.001, 0.01, 0.1, 10.0, 100.0, 1000.0};
 constexpr double kFarOff = 3.0;  // from the usual readings, as a factor
 constexpr double kZeroCelsiusK = 273.15;
+constexpr double kFullTravel = 100.0;  // [%]
 
 // True if a pressure or temperature is not what the set was trained on, but
 // would be in another unit. A transmitter that fails hardly ever ends there,
@@ -82,15 +85,16 @@ Intake CheckValues(const ModelSet& models, SignalMask required,
 
 // What Save() writes and Restore() reads, little endian and without padding:
 //
-//     snapshot = format:u32 content_hash:u64 coverage windows
+//     snapshot = format:u32 content_hash:u64 coverage windows drift
 //     coverage = stamped:u8 last_stamp_ns:i64 armed:u8
 //     windows  = (window window)*  residual and CV, by channel and length
 //     window   = length:i32 count:i32 mean:f64 variance:f64
+//     drift    = (count:i64 sum:f64 blocks:u64 mean:f64*)*  by span
 //
 // There are as many windows as the model set has, which content_hash
 // identifies. A change to any part, also in the Save() of ResidualWindow, needs
 // another format number.
-constexpr std::uint32_t kSnapshotFormat = 4;
+constexpr std::uint32_t kSnapshotFormat = 5;
 // Samples in a row, until nothing is known.
 constexpr int kMaxUncertainRun = 60;
 
@@ -110,6 +114,7 @@ struct Diagnosis {
         bank(plan->observers(), std::move(parts.outputs), parts.instructions),
         coverage(plan->models()),
         detection(plan->models()),
+        drift(plan->models()),
         stuck(plan->models()),
         floor(plan->models()),
         episode(plan->faults()),
@@ -121,6 +126,7 @@ struct Diagnosis {
   ObserverBank bank;
   Coverage coverage;
   Detection detection;
+  DriftWatch drift;
   StuckReadings stuck;
   Floor floor;
   Episode episode;
@@ -157,6 +163,7 @@ class ValveEngine::Impl {
   void ReadResiduals();
   Quality Judge(const Sample& sample);
   void Decide(const Sample& sample);
+  void FindDrift(Findings& findings);
   void StepEpisode(const Sample& sample, const Findings& findings);
 
   std::unique_ptr<Diagnosis> diagnosis_;
@@ -273,6 +280,7 @@ void ValveEngine::Impl::Initialise(const Sample& sample) {
   } else {
     diagnosis_->detection.Restart();
     diagnosis_->second.Restart();
+    diagnosis_->drift.Restart();
   }
   diagnosis_->floor.Restart();
   verdict_.initialised = true;
@@ -340,13 +348,40 @@ void ValveEngine::Impl::Decide(const Sample& sample) {
     }
   }
   const bool was_open = episode_open();
+  verdict_.drift = {};
+  if (findings.settled) {
+    FindDrift(findings);
+  }
   beside_ = was_open ? beside_ : NameBeside{};
   StepEpisode(sample, findings);
+  diagnosis_->drift.Follow(verdict_);
   // After an episode the windows still contain its fault, which would open the
   // next one at once.
   if (was_open && !episode_open()) {
     detection.Restart();
   }
+}
+
+// A finding beside those of the floor, which do not come slowly.
+void ValveEngine::Impl::FindDrift(Findings& findings) {
+  DriftWatch& drift = diagnosis_->drift;
+  const std::uint32_t beyond = diagnosis_->detection.beyond();
+  drift.Push(verdict_, beyond);
+  if (!episode_open() && findings.detected && findings.floor == 0 &&
+      findings.stuck == 0) {
+    drift.Begin(beyond);
+  }
+  if (!drift.drift() || findings.floor != 0 || findings.stuck != 0) {
+    return;
+  }
+  const auto bit =
+      static_cast<std::size_t>(FaultIndex(models(), kPositionDrift));
+  const auto first =
+      static_cast<std::size_t>(FaultIndex(models(), kFirstFinding));
+  findings.drift = true;
+  verdict_.drift = *drift.drift();
+  findings.floor |= FaultSet{1} << bit;
+  findings.sizes.at(bit - first) = drift.drift()->now / kFullTravel;
 }
 
 // What comes on top of a fault is told apart before the episode takes the
@@ -408,6 +443,7 @@ std::vector<std::byte> ValveEngine::Impl::Save() const {
   writer.Put(kSnapshotFormat, models().content_hash);
   diagnosis_->coverage.Save(writer);
   diagnosis_->detection.Save(writer);
+  diagnosis_->drift.Save(writer);
   return writer.Take();
 }
 
@@ -418,13 +454,15 @@ bool ValveEngine::Impl::Restore(std::span<const std::byte> bytes) {
   // Into copies, so that damaged bytes change nothing.
   Coverage coverage(models());
   Detection detection(models());
+  DriftWatch drift(models());
   if (!reader.Get(format, content_hash) || format != kSnapshotFormat ||
       content_hash != models().content_hash || !coverage.Restore(reader) ||
-      !detection.Restore(reader) || !reader.AtEnd()) {
+      !detection.Restore(reader) || !drift.Restore(reader) || !reader.AtEnd()) {
     return false;
   }
   diagnosis_->coverage = coverage;
   diagnosis_->detection = std::move(detection);
+  diagnosis_->drift = std::move(drift);
   // The initialisation compares the next stamp with the restored one, and
   // discards all of this if too much time has passed.
   needs_initialisation_ = true;

@@ -1,5 +1,8 @@
 #include "diagnosis/verdict.h"
 
+#include <array>
+#include <cmath>
+#include <cstdio>
 #include <utility>
 
 namespace fdi {
@@ -69,6 +72,19 @@ std::string_view TransitionName(TransitionKind kind) {
   return NameOf(kind, std::array<std::string_view, 7>{
                           "DETECTED", "ISOLATED", "REISOLATED", "CLEARED",
                           "CLOSED", "CHANGED", "SECOND"});
+}
+
+std::string DriftValue(const SlowDrift& drift) {
+  if (drift.now == 0.0) {
+    return "";
+  }
+  std::array<char, 160> text{};
+  std::snprintf(text.data(), text.size(),
+                "X reads %.2g %% %s its model, growing by %.2g %% an hour for "
+                "%.1f h",
+                std::abs(drift.now), drift.now > 0.0 ? "above" : "below",
+                std::abs(drift.slope), drift.hours);
+  return text.data();
 }
 
 std::string SecondValue(const SecondFault& second, std::string names) {

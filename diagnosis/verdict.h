@@ -123,6 +123,17 @@ struct SecondFault {
   double factor{0.0};    ///< The largest of theirs.
 };
 
+/// A slow drift of X (DriftWatch): the line through its mean residuals.
+struct SlowDrift {
+  double now{0.0};    ///< At the end, signed [%]; 0: there is none.
+  double slope{0.0};  ///< Of the same sign [%/h].
+  double hours{0.0};  ///< For how long; less where the line was at zero.
+};
+
+/// "X reads 0.22 % above its model, growing by 0.041 % an hour for 5.3 h";
+/// empty for none.
+std::string DriftValue(const SlowDrift& drift);
+
 /// The value of TransitionKind::kSecond: `names`, those of second.faults, or
 /// "unknown", or "none" where it is over.
 std::string SecondValue(const SecondFault& second, std::string names);
@@ -144,6 +155,7 @@ struct Transition {
   Unknown unknown{Unknown::kNone};     ///< As in the verdict at that time.
   Layer layer{Layer::kObservers};      ///< What named `faults`.
   SecondFault second{};                ///< What came on top of them.
+  SlowDrift drift{};                   ///< Where `faults` is a drift.
 };
 
 /// The engine's result for one sample.
@@ -167,6 +179,7 @@ struct Verdict {
   std::array<double, kMaxObservers> observer_factors{};  ///< By observer.
   FaultSet isolated{0};
   SecondFault second{};  ///< Beside `isolated`.
+  SlowDrift drift{};     ///< Instead of a fault.
   std::array<Transition, 4> transitions{};
   int transition_count{0};
 

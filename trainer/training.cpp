@@ -4,6 +4,7 @@
 
 #include "base/error.h"
 #include "base/parallel_for.h"
+#include "diagnosis/drift_watch.h"
 #include "trainer/calibration.h"
 #include "trainer/model_set_description.h"
 #include "trainer/observer_adaptation.h"
@@ -68,6 +69,7 @@ ModelSet TrainModelSet(const std::vector<TrainingRun>& runs,
     AddObserver(condition.fault, condition.strength, models);
   }
   AddFindings(models);
+  AddDriftFinding(models);
   const int channels = static_cast<int>(options.channels.size());
   std::vector<std::vector<Regressor>> regressors(options.channels.size());
   std::vector<double> saturations(options.channels.size());

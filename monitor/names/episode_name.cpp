@@ -295,6 +295,7 @@ void EpisodeName::WriteName(Transition& transition) const {
   transition.layer = now_.layer;
   transition.severity = now_.severity;
   transition.second = verdict_.second;
+  transition.drift = verdict_.drift;
   transition.factor = 0.0;
   for (std::size_t i = 0; i < models_->faults.size(); ++i) {
     if (now_.faults == 0 || Has(now_.faults, i)) {

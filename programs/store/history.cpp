@@ -180,6 +180,9 @@ std::string NoteText(const HistoryEntry& event) {
     if (event.kind == "SECOND") {
       return SecondText(event.value);
     }
+    if (!event.value.empty()) {
+      return event.value;  // How a position drifts.
+    }
     return ByPhysics(event.layer) ? kByPhysics : event.reason;
   }
   return event.value + (event.value.empty() ? "" : " ") + "by " + event.who +

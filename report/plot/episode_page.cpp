@@ -323,7 +323,9 @@ std::string EventSentence(const HistoryEntry& event,
   } else {
     text += NameAndFault(event.faults, texts);
     text.append(ByLayer(event.layer));
-    text += ", strength " + report::FormatNumber(event.strength, 2);
+    text += event.value.empty()
+                ? ", strength " + report::FormatNumber(event.strength, 2)
+                : ": " + event.value;
   }
   const auto severity =
       event.priority ? SeverityOf(*event.priority) : std::nullopt;

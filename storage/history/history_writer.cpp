@@ -77,7 +77,8 @@ struct Entry {
     const SecondFault& second = transition.second;
     return transition.kind == TransitionKind::kSecond
                ? SecondValue(second, NamesOf(second.faults))
-               : "";
+           : IsIsolation(transition.kind) ? DriftValue(transition.drift)
+                                          : "";
   }
 };
 

@@ -644,6 +644,17 @@ TEST_F(HistoryWriterTest, UnknownSaysWhyUntilAFaultIsIsolated) {
   EXPECT_EQ(reader.Show("last").unknown_kind, std::nullopt);
 }
 
+TEST_F(HistoryWriterTest, TheNameOfADriftSaysItsSizeAndPace) {
+  HistoryWriter writer(path_);
+  FaultEvent named = Event(Kind::kIsolated, 60, 1, 0.9);
+  named.transition.drift = {0.2, 0.04, 5.0};
+  writer.Record(named, kDetected);
+  HistoryReader reader(path_);
+  EXPECT_EQ(reader.Events(reader.Show("last").id).back().value,
+            "X reads 0.2 % above its model, growing by 0.04 % an hour for "
+            "5.0 h");
+}
+
 TEST_F(HistoryWriterTest, TheLayerThatNamedTheFaultIsKept) {
   HistoryWriter writer(path_);
   HistoryReader reader(path_);
