@@ -29,23 +29,115 @@ constexpr int kDoubtWindows = 10;  // of t_k samples: the longest doubt
 
 }  // namespace
 
+// A fault of the name as the one that stands: what it leaves of the readings.
+struct SecondFaultWatch::Member {
+  struct Left {
+    Left(const EnginePlan& plan, InstructionSet instructions)
+        : composed(plan.observers(), instructions), detection(plan.models()) {}
+
+    ObserverBank composed;
+    Detection detection;
+  };
+
+  explicit Member(const FaultBank::Leader& leader)
+      : standing{leader.path, leader.strength} {}
+
+  FaultSet fault() const { return FaultSet{1} << standing.path->fault_index; }
+  bool pending() const { return left && left->detection.pending(); }
+  void Judge(const Sample& sample, const ObserverBank& bank,
+             const FaultPlan& plan);
+  void LearnMargins(std::size_t channels);
+  void FollowStrength(double strength);
+  void Settle(bool fits);
+  void Unsettle();
+
+  StandingFault standing;
+  double spread{0.0};  // mean square of what the strength strays
+  int run{0};          // samples in the name
+  int watched{0};      // samples as what is expected
+  int quiet{0};        // samples in a row inside the limits
+  int fitting{0};      // samples that it fits; a misfit undoes four
+  std::array<double, kMaxChannels> margins{};  // what it leaves, at most
+  bool settled{false};
+  std::unique_ptr<Left> left;
+};
+
+void SecondFaultWatch::Member::Judge(const Sample& sample,
+                                     const ObserverBank& bank,
+                                     const FaultPlan& plan) {
+  const std::size_t channels = plan.models().channels.size();
+  ComposeBank(bank, plan, standing, left->composed);
+  LearnMargins(channels);
+  left->detection.Push(left->composed, sample, {margins.data(), channels});
+}
+
+// A model of a fault errs more than one of normal operation. What it leaves
+// before the fault is settled, it may leave later on.
+void SecondFaultWatch::Member::LearnMargins(std::size_t channels) {
+  if (watched >= kLearnSamples) {
+    return;
+  }
+  for (std::size_t c = 0; c < channels; ++c) {
+    const int channel = static_cast<int>(c);
+    const double residual =
+        left->composed.active(channel)
+            ? std::abs(CertainResidual(left->composed, channel))
+            : 0.0;
+    if (residual > 0.0) {  // Not of NaN either.
+      margins[c] = std::max(margins[c], kMargin * residual);
+    }
+  }
+}
+
+// Of a settled fault, what may be a second one does not move the strength.
+void SecondFaultWatch::Member::FollowStrength(double strength) {
+  ++run;
+  if (settled && pending()) {
+    return;
+  }
+  const double gain = std::max(1.0 / run, 1.0 / kStrengthMemory);
+  const double off = strength - standing.strength;
+  standing.strength += gain * off;
+  spread += gain * (off * off - spread);
+}
+
+// What the limits, with their margins, have caught since these are known does
+// not count: another look is taken at what the fault leaves.
+void SecondFaultWatch::Member::Settle(bool fits) {
+  fitting =
+      std::clamp(fitting + (fits ? 1 : -kMisfitWeight), 0, 2 * kFittingSamples);
+  ++watched;
+  if (watched == kLearnSamples) {
+    left->detection.Restart();
+  }
+  const bool caught =
+      watched > kLearnSamples && left->detection.stamp_ns().has_value();
+  quiet = watched <= kLearnSamples || caught ? 0 : quiet + 1;
+  watched = caught ? 0 : watched;
+  settled = quiet >= kQuietSamples && fitting >= kFittingSamples &&
+            std::sqrt(spread) < kMaxSpread;
+}
+
+void SecondFaultWatch::Member::Unsettle() {
+  watched = 0;
+  quiet = 0;
+  settled = false;
+}
+
 // What only an episode with a settled fault needs.
 struct SecondFaultWatch::Rivals {
-  Rivals(const EnginePlan& plan, InstructionSet instructions)
-      : composed(plan.observers(), instructions),
-        detection(plan.models()),
-        pair(plan.faults()),
+  explicit Rivals(const EnginePlan& plan)
+      : pair(plan.faults()),
         singles(plan.faults()),
         misfits(plan.models().faults.size(),
                 plan.models().decision.isolation_samples * 3 / 2) {}
 
-  ObserverBank composed;
-  Detection detection;  // on what the standing fault leaves
   Episode pair;
   Verdict verdict{};  // of the pair
   FaultBank singles;
   MisfitCounts misfits;  // of single faults
   FaultSet likely{0};    // where no pair fits; as of the end of the doubt
+  int quiet{0};          // samples in a row inside the limits
 };
 
 SecondFaultWatch::SecondFaultWatch(std::shared_ptr<const EnginePlan> plan,
@@ -65,12 +157,16 @@ void SecondFaultWatch::Restart() {
   phase_ = Phase::kNone;
   outlived_ = false;
   name_ = 0;
+  standing_ = nullptr;
+  members_.clear();
   rivals_.reset();
 }
 
 void SecondFaultWatch::Interrupt() {
-  if (rivals_) {
-    rivals_->detection.Interrupt();
+  for (const auto& member : members_) {
+    if (member->left) {
+      member->left->detection.Interrupt();
+    }
   }
 }
 
@@ -80,78 +176,54 @@ Episode::NameHold SecondFaultWatch::hold() const {
                                    : Episode::NameHold::kNone;
 }
 
-void SecondFaultWatch::Begin(FaultSet name) {
+void SecondFaultWatch::Begin() {
   Restart();
-  name_ = name;
-  phase_ = Phase::kFollowing;
-  standing_ = {};
-  spread_ = 0.0;
-  run_ = 0;
-  watched_ = 0;
-  quiet_ = 0;
-  fitting_ = 0;
-  margins_.fill(0.0);
-  settled_ = false;
-}
-
-// A model of a fault errs more than one of normal operation. What it leaves
-// before the fault is settled, it may leave later on.
-void SecondFaultWatch::LearnMargins(const ObserverBank& composed) {
-  if (phase_ != Phase::kWatching || watched_ >= kLearnSamples) {
-    return;
-  }
-  for (std::size_t c = 0; c < plan_->models().channels.size(); ++c) {
-    const int channel = static_cast<int>(c);
-    const double left = composed.active(channel)
-                            ? std::abs(CertainResidual(composed, channel))
-                            : 0.0;
-    if (left > 0.0) {  // Not of NaN either.
-      margins_[c] = std::max(margins_[c], kMargin * left);
-    }
-  }
+  phase_ = Phase::kWatching;
 }
 
 void SecondFaultWatch::Judge(const Sample& sample, const ObserverBank& bank) {
   outlived_ = false;
-  if (!rivals_) {
-    return;
+  const bool held = phase_ == Phase::kDoubt || phase_ == Phase::kOpen;
+  for (const auto& member : members_) {
+    if (member->left && (!held || member.get() == standing_)) {
+      member->Judge(sample, bank, *plan_->faults());
+    }
   }
-  ComposeBank(bank, *plan_->faults(), standing_, rivals_->composed);
-  LearnMargins(rivals_->composed);
-  rivals_->detection.Push(rivals_->composed, sample,
-                          {margins_.data(), plan_->models().channels.size()});
-  const auto stamp = rivals_->detection.stamp_ns();
-  if (phase_ == Phase::kWatching && settled_ && stamp) {
+  const auto stamp = !held && standing_ != nullptr && standing_->settled
+                         ? standing_->left->detection.stamp_ns()
+                         : std::nullopt;
+  if (stamp) {
     phase_ = Phase::kDoubt;
     stamp_ns_ = *stamp;
     age_ = 0;
     decided_ = 0;
     paired_ = 0;
-    quiet_ = 0;
+    rivals_->quiet = 0;
     rivals_->verdict = {};
-    rivals_->pair.Excuse(standing_.path->inputs);
+    rivals_->pair.Excuse(standing_->standing.path->inputs);
     rivals_->singles.Restart();
     rivals_->misfits.Restart();
   }
-  if (phase_ == Phase::kDoubt || phase_ == Phase::kOpen) {
+  if (held || stamp) {
     Compete(sample, bank);
     Decide();
   }
 }
 
 void SecondFaultWatch::Compete(const Sample& sample, const ObserverBank& bank) {
-  const ObserverBank& composed = rivals_->composed;
+  const ObserverBank& composed = standing_->left->composed;
   Verdict& verdict = rivals_->verdict;
   verdict.stamp_ns = sample.stamp_ns;
   verdict.transition_count = 0;
   for (std::size_t c = 0; c < plan_->models().channels.size(); ++c) {
     const int channel = static_cast<int>(c);
-    verdict.residuals[c] = composed.active(channel)
-                               ? CertainResidual(composed, channel, margins_[c])
-                               : std::numeric_limits<double>::quiet_NaN();
+    verdict.residuals[c] =
+        composed.active(channel)
+            ? CertainResidual(composed, channel, standing_->margins[c])
+            : std::numeric_limits<double>::quiet_NaN();
   }
   Findings findings;
-  findings.abnormal = rivals_->detection.pending();
+  findings.abnormal = standing_->pending();
   findings.detected = stamp_ns_;
   rivals_->pair.Score(composed, verdict);
   rivals_->pair.Step(sample, composed, findings, verdict);
@@ -176,8 +248,8 @@ void SecondFaultWatch::Balance() {
 
 void SecondFaultWatch::Decide() {
   const int quiet = 3 * plan_->models().decision.clearing_samples;
-  quiet_ = rivals_->detection.pending() ? 0 : quiet_ + 1;
-  if (rivals_->verdict.state == State::kNormal || quiet_ >= quiet) {
+  rivals_->quiet = standing_->pending() ? 0 : rivals_->quiet + 1;
+  if (rivals_->verdict.state == State::kNormal || rivals_->quiet >= quiet) {
     WatchOn();  // It is over.
     return;
   }
@@ -240,15 +312,19 @@ bool SecondFaultWatch::IsPair(const FaultBank::Leader& pair) const {
 // What is known of the standing fault stays so, and may be exceeded again.
 void SecondFaultWatch::WatchOn() {
   phase_ = Phase::kWatching;
-  rivals_->detection.Restart();
+  for (const auto& member : members_) {
+    if (member->left) {
+      member->left->detection.Restart();
+    }
+  }
 }
 
 // One fault explains all. It has to settle, with wider margins.
 void SecondFaultWatch::GiveUp() {
   phase_ = Phase::kWatching;
-  watched_ = 0;
-  quiet_ = 0;
-  settled_ = false;
+  for (const auto& member : members_) {
+    member->Unsettle();
+  }
 }
 
 // What is settled is the name that counts, and one without findings.
@@ -261,92 +337,118 @@ FaultSet SecondFaultWatch::NameOf(const NameBeside& beside,
                                                    : FaultSet{0};
 }
 
-FaultBank::Leader SecondFaultWatch::LeaderOf(const Episode& episode,
-                                             const NameBeside& beside) const {
-  if (beside.faults == 0) {
-    // One that stands already stays it as long as it is in the name.
-    return episode.LeaderOf(standing_.path != nullptr
-                                ? FaultSet{1} << standing_.path->fault_index
-                                : name_);
+FaultSet SecondFaultWatch::members() const {
+  FaultSet faults = 0;
+  for (const auto& member : members_) {
+    faults |= member->fault();
   }
-  for (const StrengthPath& path : plan_->faults()->paths()) {
-    if (path.fault_index == beside.bit && !path.taught &&
-        path.sign * beside.strength > 0.0) {
-      return {&path, std::abs(beside.strength), 0.0};
+  return faults;
+}
+
+SecondFaultWatch::Member& SecondFaultWatch::MemberAt(
+    const FaultBank::Leader& leader) {
+  const auto found = std::ranges::find_if(members_, [&](const auto& member) {
+    return member->standing.path->fault_index == leader.path->fault_index;
+  });
+  if (found == members_.end()) {
+    return *members_.emplace_back(std::make_unique<Member>(leader));
+  }
+  if ((*found)->standing.path != leader.path) {
+    standing_ = standing_ == found->get() ? nullptr : standing_;
+    *found = std::make_unique<Member>(leader);
+  }
+  return **found;
+}
+
+// The faults of the name with a strength each, likeliest first. Where only the
+// observers name it, the one that stands already stays as long as it is in it.
+SecondFaultWatch::Likeliest SecondFaultWatch::Present(
+    const Episode& episode, const NameBeside& beside) {
+  Likeliest present{};
+  std::size_t count = 0;
+  const auto add = [&](const FaultBank::Leader& leader) {
+    present[count] = &MemberAt(leader);
+    present[count++]->FollowStrength(leader.strength);
+  };
+  if (beside.faults == 0) {
+    const auto leader =
+        episode.LeaderOf(standing_ != nullptr ? standing_->fault() : name_);
+    if (leader.path != nullptr) {
+      add(leader);
+    }
+    return present;
+  }
+  const auto& paths = plan_->faults()->paths();
+  for (const NameBeside::Fault& fault : beside.likely) {
+    const auto path = std::ranges::find_if(paths, [&](const StrengthPath& p) {
+      return p.fault_index == fault.bit && !p.taught &&
+             p.sign * fault.strength > 0.0;
+    });
+    if (path != paths.end()) {
+      add({&*path, std::abs(fault.strength), 0.0});
     }
   }
-  return {};
+  return present;
+}
+
+// One that does not stand is no name for what it leaves: it settles anew.
+void SecondFaultWatch::Watch(Member& member, bool fits) {
+  if (member.settled && &member != standing_ &&
+      member.left->detection.stamp_ns()) {
+    member.Unsettle();
+  }
+  if (!member.left && member.run >= kSteadySamples) {
+    member.left = std::make_unique<Member::Left>(*plan_, instructions_);
+    if (!rivals_) {
+      rivals_ = std::make_unique<Rivals>(*plan_);
+    }
+  } else if (member.left && !member.settled) {
+    member.Settle(fits);
+  }
 }
 
 void SecondFaultWatch::Follow(const Episode& episode, const NameBeside& beside,
                               Verdict& verdict) {
   verdict.second = {};
   const bool held = phase_ == Phase::kDoubt || phase_ == Phase::kOpen;
-  const FaultSet name = held ? name_ : NameOf(beside, verdict);
+  if (held) {
+    Write(verdict);
+    return;
+  }
+  const FaultSet name = NameOf(beside, verdict);
   if (!plan_->faults()->judges_fit() || name == 0) {
     Restart();
     return;
   }
-  const bool goes_on = standing_.path != nullptr &&
-                       Has(name, standing_.path->fault_index) &&
-                       ((name & ~name_) == 0 || (name_ & ~name) == 0);
-  if (name_ == 0 || (name != name_ && !goes_on)) {
-    Begin(name);
+  const FaultSet known = members();
+  const bool goes_on =
+      (name & known) != 0 &&
+      ((name & ~known) == 0 || (name & ~name_) == 0 || (name_ & ~name) == 0);
+  if (!goes_on) {
+    Begin();
   }
   name_ = name;
-  ++run_;
-  if (!held) {
-    const FaultBank::Leader leader = LeaderOf(episode, beside);
-    if (leader.path == nullptr) {
-      Restart();
-      return;
-    }
-    FollowStrength(leader);
+  if (standing_ != nullptr && (standing_->fault() & name) == 0) {
+    standing_ = nullptr;
   }
-  if (phase_ == Phase::kFollowing && run_ >= kSteadySamples) {
-    rivals_ = std::make_unique<Rivals>(*plan_, instructions_);
-    phase_ = Phase::kWatching;
-  } else if (phase_ == Phase::kWatching) {
-    settled_ = settled_ || Settles(episode, beside.faults != 0);
+  if (members_.size() > NameBeside::kMost) {
+    std::erase_if(members_, [name](const auto& member) {
+      return (member->fault() & name) == 0;
+    });
   }
-  Write(verdict);
-}
-
-// Of a settled fault, what may be a second one does not move the strength.
-void SecondFaultWatch::FollowStrength(const FaultBank::Leader& leader) {
-  if (leader.path != standing_.path) {
-    Begin(name_);
-    standing_.path = leader.path;
-    standing_.strength = leader.strength;
-    run_ = 1;
-  }
-  if (settled_ && rivals_->detection.pending()) {
+  const Likeliest present = Present(episode, beside);
+  if (present[0] == nullptr) {
+    Restart();
     return;
   }
-  const double gain = std::max(1.0 / run_, 1.0 / kStrengthMemory);
-  const double off = leader.strength - standing_.strength;
-  standing_.strength += gain * off;
-  spread_ += gain * (off * off - spread_);
-}
-
-// What the limits, with their margins, have caught since these are known does
-// not count: another look is taken at what the name leaves.
-bool SecondFaultWatch::Settles(const Episode& episode, bool by_physics) {
-  const bool fits = by_physics || (name_ & ~episode.misfits()) != 0;
-  fitting_ = std::clamp(fitting_ + (fits ? 1 : -kMisfitWeight), 0,
-                        2 * kFittingSamples);
-  ++watched_;
-  if (watched_ == kLearnSamples) {
-    rivals_->detection.Restart();
+  for (const auto& member : members_) {
+    Watch(*member, beside.faults != 0 || (name_ & ~episode.misfits()) != 0);
   }
-  quiet_ = watched_ <= kLearnSamples || rivals_->detection.stamp_ns()
-               ? 0
-               : quiet_ + 1;
-  if (watched_ > kLearnSamples && rivals_->detection.stamp_ns()) {
-    watched_ = 0;
-  }
-  return quiet_ >= kQuietSamples && fitting_ >= kFittingSamples &&
-         std::sqrt(spread_) < kMaxSpread;
+  const auto settled = std::ranges::find_if(present, [](const Member* member) {
+    return member != nullptr && member->settled;
+  });
+  standing_ = settled != present.end() ? *settled : present[0];
+  Write(verdict);
 }
 
 // Where no pair fits either, those that stand out of all pairs: by a share of
@@ -375,9 +477,10 @@ void SecondFaultWatch::Write(Verdict& verdict) const {
   second.doubt = phase_ == Phase::kDoubt;
   second.open = phase_ == Phase::kOpen;
   second.standing = second.doubt || second.open ? name_ : FaultSet{0};
-  if (standing_.path != nullptr && !standing_.path->taught) {
-    second.standing_bit = standing_.path->fault_index;
-    second.standing_strength = standing_.path->sign * standing_.strength;
+  const StandingFault& standing = standing_->standing;
+  if (!standing.path->taught) {
+    second.standing_bit = standing.path->fault_index;
+    second.standing_strength = standing.path->sign * standing.strength;
   }
   if (!second.open) {
     return;
@@ -397,8 +500,8 @@ void SecondFaultWatch::Write(Verdict& verdict) const {
                                           models.decision.isolation_threshold);
     }
   }
-  verdict.strengths[standing_.path->fault_index] =
-      standing_.path->sign * standing_.strength;
+  verdict.strengths[standing.path->fault_index] =
+      standing.path->sign * standing.strength;
 }
 
 }  // namespace fdi

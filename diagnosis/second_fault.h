@@ -14,24 +14,31 @@ namespace fdi {
 
 /// A name that counts beside the engine's, by a simulation of the valve.
 struct NameBeside {
-  FaultSet faults{0};    ///< Empty: there is none.
-  std::size_t bit{0};    ///< The likeliest of them.
-  double strength{0.0};  ///< Of that one; signed.
+  static constexpr std::size_t kMost = 4;
+  struct Fault {
+    std::size_t bit{0};
+    double strength{0.0};  ///< Signed.
+  };
+
+  FaultSet faults{0};                 ///< Empty: there is none.
+  std::array<Fault, kMost> likely{};  ///< Those faults, likeliest first.
 };
 
 /// Finds what comes on top of the fault that an open episode is named after.
 ///
-/// 1. Following: the name has not changed, and its strength does not move.
-/// 2. Watching: the fault at its strength belongs to what is expected. Once
+/// 1. Watching: the fault at its strength belongs to what is expected. Once
 ///    what is left has been inside the limits of normal operation for long, the
-///    fault is settled.
-/// 3. In doubt: the limits are exceeded, as a detection asks for. The name is
+///    fault is settled. Of a name of several faults by a simulation, each is
+///    watched for itself: the one that stands is the likeliest that is settled,
+///    and it may change places with another one without beginning anew.
+/// 2. In doubt: the limits are exceeded, as a detection asks for. The name is
 ///    held. Pairs of the settled fault and another one compete with every
 ///    single fault at every strength, both on the evidence from here on.
-/// 4. Open: no single fault fits, and a pair does or none does either.
+/// 3. Open: no single fault fits, and a pair does or none does either.
 ///
 /// Of a set that does not judge the fit (FitBounds) nothing is ever second.
-/// Memory of its own is taken where 2 begins, and given back with the episode.
+/// Memory of its own is taken with a name, most of it where that has stayed for
+/// some time, and given back with the episode.
 class SecondFaultWatch {
  public:
   SecondFaultWatch(std::shared_ptr<const EnginePlan> plan,
@@ -59,22 +66,18 @@ class SecondFaultWatch {
               Verdict& verdict);
 
  private:
-  enum class Phase : std::uint8_t {
-    kNone,
-    kFollowing,
-    kWatching,
-    kDoubt,
-    kOpen
-  };
+  enum class Phase : std::uint8_t { kNone, kWatching, kDoubt, kOpen };
+  struct Member;
   struct Rivals;
 
   FaultSet NameOf(const NameBeside& beside, const Verdict& verdict) const;
-  FaultBank::Leader LeaderOf(const Episode& episode,
-                             const NameBeside& beside) const;
-  void Begin(FaultSet name);
-  void LearnMargins(const ObserverBank& composed);
-  bool Settles(const Episode& episode, bool by_physics);
-  void FollowStrength(const FaultBank::Leader& leader);
+  FaultSet members() const;
+  Member& MemberAt(const FaultBank::Leader& leader);
+  // The faults of the name, likeliest first; then null.
+  using Likeliest = std::array<Member*, NameBeside::kMost>;
+  Likeliest Present(const Episode& episode, const NameBeside& beside);
+  void Begin();
+  void Watch(Member& member, bool fits);
   void Compete(const Sample& sample, const ObserverBank& bank);
   void Balance();
   void Decide();
@@ -91,14 +94,8 @@ class SecondFaultWatch {
   std::unique_ptr<Rivals> rivals_;
   Phase phase_{Phase::kNone};
   FaultSet name_{0};
-  StandingFault standing_;
-  double spread_{0.0};  // mean square of what the strength strays
-  int run_{0};          // samples with this name
-  int watched_{0};      // samples with the fault as expected
-  int quiet_{0};        // samples in a row inside the limits
-  int fitting_{0};      // samples that the name fits; a misfit undoes four
-  std::array<double, kMaxChannels> margins_{};  // what it leaves, at most
-  bool settled_{false};
+  std::vector<std::unique_ptr<Member>> members_;  // of the name, now or before
+  Member* standing_{nullptr};                     // one of them
   int age_{0};      // samples since the doubt began
   int decided_{0};  // samples in a row that one fault explains
   int paired_{0};   // samples in a row that only a pair does

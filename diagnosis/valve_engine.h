@@ -16,7 +16,7 @@ namespace fdi {
 
 /// Diagnoses one valve. Pure: what Step() returns depends on the samples given
 /// so far alone; no clock, no I/O, and no allocation after construction but
-/// for what a settled fault needs (SecondFaultWatch). The monitor and
+/// for what a named fault needs (SecondFaultWatch). The monitor and
 /// `fdi-trainer evaluate` run this very class.
 ///
 /// Not thread safe: one thread at a time per engine, and for all engines that

@@ -95,8 +95,11 @@ void EpisodeName::FollowLook(const Inputs& inputs) {
   if (now_.source != NameSource::kLook) {
     beside_ = {};
   } else if (inputs.look && !inputs.look->faults.empty()) {
-    const NamedFault& first = inputs.look->faults.front();
-    beside_ = {SetOf(inputs.look->faults), first.bit, first.estimate.strength};
+    const std::vector<NamedFault>& faults = inputs.look->faults;
+    beside_ = {SetOf(faults)};
+    for (std::size_t i = 0; i < faults.size() && i < NameBeside::kMost; ++i) {
+      beside_.likely[i] = {faults[i].bit, faults[i].estimate.strength};
+    }
   }
 }
 

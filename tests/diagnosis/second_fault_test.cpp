@@ -4,6 +4,8 @@
 #include <functional>
 #include <memory>
 #include <tuple>
+#include <utility>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -51,6 +53,9 @@ class PlantRun {
 
   void To(int end, const Strength& f1, const Strength& f6) {
     for (; k_ < end; ++k_) {
+      if (name_) {
+        engine_.TakeName(name_(k_));
+      }
       Sample sample = PlantSample(static_cast<std::uint64_t>(k_));
       AddF1(sample, f1(k_));
       AddF6(sample, f6(k_));
@@ -63,12 +68,16 @@ class PlantRun {
     }
   }
 
+  // What a look calls the episode at sample k.
+  void Name(std::function<NameBeside(int)> name) { name_ = std::move(name); }
+
   const Verdict& last() const { return last_; }
   bool opened() const { return opened_; }
   bool closed() const { return closed_; }
 
  private:
   ValveEngine engine_;
+  std::function<NameBeside(int)> name_;
   Noise noise_{3};
   Verdict last_;
   int k_{0};
@@ -170,6 +179,64 @@ TEST(SecondFaultTest, AFaultThatGrowsIsNoSecondOne) {
 TEST(SecondFaultTest, NothingIsSecondToAFaultThatIsNotSettled) {
   PlantRun run;
   run.To(500, From(kBegin, 0.5), From(kBegin + 200, 0.5));
+  EXPECT_FALSE(run.opened());
+}
+
+// f7, which no observer tells from f1.
+constexpr FaultSet kBitF7 = 4;
+
+std::shared_ptr<const ModelSet> PlantWithTwin() {
+  ModelSet models = *FittingPlant();
+  const std::vector<Observer> observers = models.observers;
+  for (Observer twin : observers) {
+    if (twin.fault == 1) {
+      twin.name = "f7";
+      twin.fault = 7;
+      models.observers.push_back(twin);
+    }
+  }
+  models.faults = {1, 6, 7};
+  return std::make_shared<const ModelSet>(models);
+}
+
+// f1 and f7, or f7 and f1, likeliest first.
+NameBeside BothOf(bool f7_first) {
+  return {kBitF1 | kBitF7,
+          {{{f7_first ? 2U : 0U, 0.5}, {f7_first ? 0U : 2U, 0.5}}}};
+}
+
+NameBeside OneOf(std::size_t bit) {
+  return {FaultSet{1} << bit, {{{bit, 0.5}}}};
+}
+
+TEST(SecondFaultTest, ANameWhoseFaultsChangePlacesStands) {
+  PlantRun run(PlantWithTwin());
+  run.Name([](int k) { return BothOf(k / 100 % 2 == 0); });
+  run.To(kSecond + 120, From(kBegin, 0.5), From(kSecond, 0.5));
+  const SecondFault& second = run.last().second;
+  EXPECT_TRUE(second.open);
+  EXPECT_EQ(second.standing, kBitF1 | kBitF7);
+  EXPECT_EQ(second.faults, kBitF6);
+}
+
+TEST(SecondFaultTest, WhatIsLeftOfANameHasBeenWatchedAllAlong) {
+  PlantRun run(PlantWithTwin());
+  run.Name([](int k) {
+    const bool back = k >= 350 && k < 400;
+    return k < 300 || back ? BothOf(false) : OneOf(k < 600 ? 0 : 2);
+  });
+  run.To(kSecond + 120, From(kBegin, 0.5), From(kSecond, 0.5));
+  const SecondFault& second = run.last().second;
+  EXPECT_TRUE(second.open);
+  EXPECT_EQ(second.standing, kBitF7);
+  EXPECT_EQ(second.standing_bit, 2U);
+  EXPECT_EQ(second.faults, kBitF6);
+}
+
+TEST(SecondFaultTest, ANameThatIsNewSettlesAnew) {
+  PlantRun run(PlantWithTwin());
+  run.Name([](int k) { return OneOf(k < 600 ? 0 : 2); });
+  run.To(kSecond + 120, From(kBegin, 0.5), From(kSecond, 0.5));
   EXPECT_FALSE(run.opened());
 }
 

@@ -278,7 +278,19 @@ TEST_F(EpisodeNameTest, ASecondFaultIsAnnouncedAndNoLookAtBothRenames) {
   EXPECT_THAT(kinds_, ElementsAre(Kind::kReisolated, Kind::kSecond));
   EXPECT_FALSE(last_.second.open);
   EXPECT_EQ(name_.beside().faults, kF7);
-  EXPECT_EQ(name_.beside().strength, 0.3);
+  EXPECT_EQ(name_.beside().likely[0].strength, 0.3);
+}
+
+TEST_F(EpisodeNameTest, TheEngineIsToldEachFaultOfALookLikeliestFirst) {
+  Step(0, {Kind::kDetected});
+  look_ =
+      EpisodeName::Look{{{1, {0.3, 0.2, 0.4}}, {0, {-0.5, -0.6, -0.4}}}, false};
+  Step(kF1);
+  EXPECT_EQ(name_.beside().faults, kF1 | kF7);
+  EXPECT_EQ(name_.beside().likely[0].bit, 1U);
+  EXPECT_EQ(name_.beside().likely[0].strength, 0.3);
+  EXPECT_EQ(name_.beside().likely[1].bit, 0U);
+  EXPECT_EQ(name_.beside().likely[1].strength, -0.5);
 }
 
 TEST_F(EpisodeNameTest, ALookAtWhatIsOnTopNamesIt) {
