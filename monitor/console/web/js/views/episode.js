@@ -7,8 +7,8 @@ import {exportPng} from '../charts/export.js';
 import {Timeline} from '../charts/timeline.js';
 import {TrendData} from '../charts/trend_data.js';
 import {button, errorNote, factList, h, replace, setText} from '../dom.js';
-import {moreText, certaintyNode, faultTitle, groupName, layerText, markWord,
-  members, namurText, priorityNames, priorityOf, prioritySign, rowTitle,
+import {certaintyNode, faultTitle, groupName, layerText, markWord, members,
+  moreText, namurText, priorityNames, priorityOf, prioritySign, rowTitle,
   stateWord, unconfirmedText} from '../faults.js';
 import {durationText, intervalText, percentText, rangeText,
   strengthText, unitText, wholePercent, zoneName}

@@ -1,7 +1,7 @@
 // Tables by declaration of their columns: {text, cell(row), class, header}.
 
 import {h} from '../dom.js';
-import {moreText, certaintyNode, faultName, faultTitle, groupName, members,
+import {certaintyNode, faultName, faultTitle, groupName, members, moreText,
   namurText, priorityNames, priorityOf, prioritySign, qualityText, rowTitle,
   unconfirmedText} from '../faults.js';
 import {durationText, percentText, strengthText, timeText} from '../format.js';

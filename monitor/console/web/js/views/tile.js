@@ -2,9 +2,9 @@
 
 import {drawSparkline} from '../charts/sparkline.js';
 import {h, replace, setText} from '../dom.js';
-import {moreText, certaintyText, factorTitle, faultName, faultOfTile,
-  faultTitle, inAlarm, isAlarm, members, priorityNames, priorityOf,
-  prioritySign, qualityText, stateWord, unconfirmedText} from '../faults.js';
+import {certaintyText, factorTitle, faultName, faultOfTile, faultTitle, inAlarm,
+  isAlarm, members, moreText, priorityNames, priorityOf, prioritySign,
+  qualityText, stateWord, unconfirmedText} from '../faults.js';
 import {percentText, shortTimeText, strengthText, timeText} from '../format.js';
 import {link} from '../route.js';
 import {store} from '../store.js';

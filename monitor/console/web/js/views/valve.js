@@ -4,9 +4,9 @@ import {getOptional, path} from '../api.js';
 import {Timeline} from '../charts/timeline.js';
 import {TrendData} from '../charts/trend_data.js';
 import {button, h, replace, setText} from '../dom.js';
-import {moreText, certaintyNode, factorTitle, faultName, faultOfTile,
-  faultTitle, inAlarm, isAlarm, members, openText, priorityNames, priorityOf,
-  prioritySign, qualityText, stateWord} from '../faults.js';
+import {certaintyNode, factorTitle, faultName, faultOfTile, faultTitle, inAlarm,
+  isAlarm, members, moreText, openText, priorityNames, priorityOf, prioritySign,
+  qualityText, stateWord} from '../faults.js';
 import {durationText, numberText, percentText, strengthText,
   timeText, unitText} from '../format.js';
 import {link} from '../route.js';
