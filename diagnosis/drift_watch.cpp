@@ -4,6 +4,7 @@
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <span>
 
 #include "diagnosis/fault_catalogue.h"
 #include "diagnosis/student.h"

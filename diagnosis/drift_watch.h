@@ -4,8 +4,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
-#include <span>
-#include <vector>
 
 #include "diagnosis/model_set.h"
 #include "diagnosis/residual_windows.h"
@@ -62,6 +60,7 @@ class DriftWatch {
  public:
   /// `models` must outlive it. It watches sets that list the finding.
   explicit DriftWatch(const ModelSet& models);
+  bool watches() const { return watches_; }
 
   /// What was before does not count.
   void Restart();

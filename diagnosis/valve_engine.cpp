@@ -365,13 +365,18 @@ void ValveEngine::Impl::Decide(const Sample& sample) {
 // A finding beside those of the floor, which do not come slowly.
 void ValveEngine::Impl::FindDrift(Findings& findings) {
   DriftWatch& drift = diagnosis_->drift;
+  if (!drift.watches()) {
+    return;
+  }
   const std::uint32_t beyond = diagnosis_->detection.beyond();
   drift.Push(verdict_, beyond);
-  if (!episode_open() && findings.detected && findings.floor == 0 &&
-      findings.stuck == 0) {
+  if (findings.floor != 0 || findings.stuck != 0) {
+    return;
+  }
+  if (!episode_open() && findings.detected) {
     drift.Begin(beyond);
   }
-  if (!drift.drift() || findings.floor != 0 || findings.stuck != 0) {
+  if (!drift.drift()) {
     return;
   }
   const auto bit =

@@ -73,11 +73,10 @@ std::string WallClock(const Json& time, bool utc) {
 
 // "f19", or "f19 and f1" with what came on top.
 std::string FaultText(const Json& row) {
-  const auto name = [](const Json& fault) {
-    return fault.is_null() ? "-" : fault.get<std::string>();
-  };
-  return name(row["fault"]) +
-         (row["second"].is_null() ? "" : " and " + name(row["second"]));
+  const Json& fault = row["fault"];
+  const Json& second = row["second"];
+  return (fault.is_null() ? "-" : fault.get<std::string>()) +
+         (second.is_null() ? "" : " and " + second.get<std::string>());
 }
 
 Report ListEpisodes(const HistoryOptions& options, const Context& context) {
