@@ -26,7 +26,7 @@ INSERT INTO scenario VALUES
   ('F5i', 'f19', 19, 0.0, 1.0, 50, '0 to 1 in 850 s', '6/3', 99.6, 84.3, 35,
    75);
 
--- Channels of the newest version of the set.
+-- Channels of the newest set: paper-extended, or paper.
 CREATE TEMP TABLE fit AS
 SELECT o.fault, o.strength, o.observer,
        max(CASE WHEN c.name = 'F' THEN c.rules END) AS rules_f,
@@ -38,9 +38,7 @@ SELECT o.fault, o.strength, o.observer,
 FROM models.model_set m
 JOIN models.observer o USING (model_set_id)
 JOIN models.channel c USING (model_set_id, observer)
-WHERE m.name = 'paper'
-  AND m.version = (SELECT max(version) FROM models.model_set
-                   WHERE name = 'paper')
+WHERE m.model_set_id = (SELECT max(model_set_id) FROM models.model_set)
 GROUP BY o.observer;
 
 .print

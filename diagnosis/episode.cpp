@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <functional>
+#include <numeric>
 #include <utility>
 
 #include "diagnosis/fault_catalogue.h"
@@ -184,6 +186,9 @@ constexpr double kLongS = 86400.0;
 constexpr double kLongMemories = 4.0;
 constexpr double kRefutingMemories = 2.0;
 
+// Samples after which a finding that comes and goes is forgotten, at most.
+constexpr int kLongestKept = 100000;
+
 // A stuck transmitter is certain, so observers are not needed.
 void ApplyStuckFindings(FaultSet stuck, Verdict& verdict) {
   verdict.normal_factor = 0.0;
@@ -214,7 +219,10 @@ Episode::Episode(std::shared_ptr<const FaultPlan> plan)
       contradictions_(models_->faults.size(),
                       static_cast<int>(kRefutingMemories *
                                        models_->decision.evidence_window)),
-      shares_(models_->faults.size()) {}
+      shares_(models_->faults.size()) {
+  left_.reserve(static_cast<std::size_t>(models_->decision.detection_samples) +
+                1);
+}
 
 void Episode::Score(const ObserverBank& bank, Verdict& verdict) const {
   faults_.Score(bank, verdict);
@@ -233,6 +241,7 @@ void Episode::Step(const Sample& sample, const ObserverBank& bank,
     begun_ = false;
     floor_ = 0;
     over_.fill(0);
+    kept_.fill(models_->decision.isolation_samples * 3 / 2);
   }
   // The floor may open an episode before the observers have settled. What they
   // show meanwhile is a transient that the evidence would carry for the length
@@ -325,7 +334,7 @@ void Episode::Open(std::int64_t stamp_ns, Verdict& verdict) {
   age_ = 0;
   without_fault_ = 0;
   contender_run_ = 0;
-  proven_run_ = 0;
+  left_.clear();
   early_ = false;
   misfits_ = 0;
   misfit_counts_.Restart();
@@ -359,10 +368,10 @@ void Episode::NameFloor(Verdict& verdict) {
 // What the floor found is what an episode is about for as long as it is there.
 // Where it has been over for longer than a fault may misfit, and normal
 // operation does not explain what is seen instead, the episode shows something
-// else by now. A valve that looks healthy keeps the name of what it had.
+// else by now. One that comes and goes takes twice as long each time. A valve
+// that looks healthy keeps the name of what it had.
 void Episode::ForgetFindings(FaultSet present, const Verdict& verdict) {
   const DecisionParameters& decision = models_->decision;
-  const int most = decision.isolation_samples * 3 / 2;
   const bool abnormal = verdict.normal_factor < decision.isolation_threshold;
   const std::size_t first =
       models_->faults.size() -
@@ -370,8 +379,11 @@ void Episode::ForgetFindings(FaultSet present, const Verdict& verdict) {
   for (std::size_t i = 0; first + i < models_->faults.size(); ++i) {
     const FaultSet bit = FaultSet{1} << (first + i);
     int& over = over_.at(i);
-    over = (present & bit) != 0 ? 0 : std::min(over + (abnormal ? 1 : 0), most);
-    floor_ &= over == most ? ~bit : ~FaultSet{0};
+    over = (present & bit) != 0 ? 0 : over + (abnormal ? 1 : 0);
+    if ((floor_ & bit) != 0 && over >= kept_.at(i)) {
+      floor_ &= ~bit;
+      kept_.at(i) *= kept_.at(i) < kLongestKept ? 2 : 1;
+    }
   }
 }
 
@@ -420,11 +432,12 @@ FaultSet Episode::WithGroups(FaultSet set, const Verdict& verdict) const {
   return joined;
 }
 
-// Wald's sequential test: before t_k, the one fault that is left once the
-// likelihood ratio to every other one and to normal operation is more than
-// m/α, with m faults, so that a wrong name has at most the probability α where
-// the models are right. They err most in the first moments of a fault, so it
-// has to hold for more than n_d samples.
+// Wald's sequential test: before t_k, the few faults that are left once the
+// likelihood ratio to every other one and to normal operation is more than m/α,
+// with m faults, so that a name without the fault has at most the probability α
+// where the models are right. They err most in the first moments of a fault, so
+// what was left in any of more than n_d samples counts; an input that has moved
+// with the fault is evidence beside the models, and n_d samples are enough.
 FaultSet Episode::Proven(const Verdict& verdict) {
   const DecisionParameters& decision = models_->decision;
   if (decision.early_error <= 0.0 || isolation_.full()) {
@@ -433,11 +446,23 @@ FaultSet Episode::Proven(const Verdict& verdict) {
   const double rivals = static_cast<double>(models_->faults.size());
   const FaultSet left =
       faults_.Unrefuted(std::log(rivals / decision.early_error));
-  const bool one = std::popcount(left) == 1 &&
-                   left == FactorsFrom(decision.isolation_threshold, verdict);
-  proven_run_ = !one ? 0 : left == proven_ ? proven_run_ + 1 : 1;
-  proven_ = left;
-  return proven_run_ > decision.detection_samples ? left : 0;
+  if ((left & FactorsFrom(decision.isolation_threshold, verdict)) == 0) {
+    left_.clear();
+    return 0;
+  }
+  if (left_.size() == left_.capacity()) {
+    left_.erase(left_.begin());
+  }
+  left_.push_back(left);
+  const auto needed = static_cast<std::size_t>(
+      decision.detection_samples + (faults_.ShownByInputs(left) ? 0 : 1));
+  if (left_.size() < needed) {
+    return 0;
+  }
+  const FaultSet any =
+      std::accumulate(left_.end() - static_cast<std::ptrdiff_t>(needed),
+                      left_.end(), FaultSet{0}, std::bit_or<>());
+  return std::popcount(any) <= kMaxFaultSetSize ? any : 0;
 }
 
 void Episode::Name(FaultSet faults, Verdict& verdict) {
@@ -558,7 +583,11 @@ void Episode::ApplyMisfits(Verdict& verdict) const {
 void Episode::NameEarly(const Sample& sample, FaultSet beginning,
                         Verdict& verdict) {
   const FaultSet proven = Proven(verdict);
-  const bool early = (proven & ~verdict.isolated) != 0;
+  const FaultSet named = verdict.isolated & ~floor_names_;
+  // A set is narrowed to the one fault that is left, and to no other set.
+  const bool narrower =
+      (proven & ~named) == 0 && std::popcount(proven) == 1 && proven != named;
+  const bool early = proven != 0 && ((proven & named) == 0 || narrower);
   const FaultSet name =
       early ? Recognised(WithGroups(proven, verdict)) : verdict.isolated;
   const FaultSet loss = LossBeside(name, floor_ | beginning, sample, verdict);
@@ -616,7 +645,7 @@ FaultSet Episode::Lasting(FaultSet supported, const Verdict& verdict) const {
 // What the name does not explain comes on top of it, or may.
 void Episode::KeepName() {
   contender_run_ = 0;
-  proven_run_ = 0;
+  left_.clear();
   if (hold_ == NameHold::kExplained) {
     misfits_ = 0;
     misfit_counts_.Restart();
@@ -646,7 +675,7 @@ void Episode::Isolate(const Sample& sample, const Findings& findings,
   supported = supported == 0 ? recognised_ : supported;
   if (isolation_held_ || findings.drift || verdict.normal_factor >= threshold) {
     contender_run_ = 0;
-    proven_run_ = 0;
+    left_.clear();
     return;
   }
   if (supported == 0) {

@@ -213,11 +213,11 @@ class Episode {
   std::int64_t detection_stamp_ns_{0};
   FaultSet floor_{0};                  // findings that the episode shows
   std::array<int, kFindings> over_{};  // samples since each was there
+  std::array<int, kFindings> kept_{};  // after which it is forgotten
   bool begun_{false};                  // gathering of evidence has begun
   int age_{0};                         // samples since the detection
   int without_fault_{0};               // samples since some factor reached T/2
-  FaultSet proven_{0};                 // the only fault that is not refuted
-  int proven_run_{0};                  // samples in a row
+  std::vector<FaultSet> left_;         // unrefuted in the last samples, < t_k
   bool early_{false};                  // isolated before t_k
   FaultSet contender_{0};              // candidate to replace the isolated set
   int contender_run_{0};  // samples that supported it and no other since

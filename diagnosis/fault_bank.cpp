@@ -209,22 +209,34 @@ void FaultBank::ApplyEvidence(Verdict& verdict) const {
 }
 
 FaultSet FaultBank::Unrefuted(double margin) const {
-  const double best = BestEvidence();
-  if (best - trained_.total(0) < margin) {
+  const StrengthTracker* best = nullptr;
+  double most = -std::numeric_limits<double>::infinity();
+  for (const StrengthTracker& tracker : trackers_) {
+    const double evidence = tracker.evidence(trained_);
+    if (SuitsInputs(tracker) && evidence > most) {
+      best = &tracker;
+      most = evidence;
+    }
+  }
+  if (best == nullptr || most - trained_.total(0) < margin ||
+      !best->accounts() || !best->fits_so_far()) {
     return 0;
   }
   FaultSet unrefuted = 0;
   for (const StrengthTracker& tracker : trackers_) {
-    const double evidence = tracker.evidence(trained_);
-    if (evidence == best && !(tracker.accounts() && tracker.fits_so_far() &&
-                              SuitsInputs(tracker))) {
-      return 0;
-    }
-    if (best - evidence - allowance_ < margin) {
+    if (SuitsInputs(tracker) &&
+        most - tracker.evidence(trained_) - allowance_ < margin) {
       unrefuted |= FaultSet{1} << tracker.path().fault_index;
     }
   }
   return unrefuted;
+}
+
+bool FaultBank::ShownByInputs(FaultSet faults) const {
+  return std::ranges::all_of(trackers_, [&](const StrengthTracker& tracker) {
+    const StrengthPath& path = tracker.path();
+    return !Has(faults, path.fault_index) || (odd_ & path.moved) != 0;
+  });
 }
 
 FaultSet FaultBank::Contradicted() const {

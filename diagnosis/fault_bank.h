@@ -55,10 +55,14 @@ class FaultBank {
   /// Applies the evidence so far to the factors set by Score().
   void ApplyEvidence(Verdict& verdict) const;
 
-  /// The faults that the evidence does not refute: L_best − L_f − a < `margin`;
-  /// nothing while it does not refute normal operation, or while the best one
-  /// does not account for what is seen or does not fit it so far.
+  /// Of the faults that suit P1, P2 and T1, those that the evidence does not
+  /// refute: L_best − L_f − a < `margin`; nothing while it does not refute
+  /// normal operation, or while the best one does not account for what is seen
+  /// or does not fit it so far.
   FaultSet Unrefuted(double margin) const;
+
+  /// Whether P1, P2 or T1 has moved as each of these faults always moves it.
+  bool ShownByInputs(FaultSet faults) const;
 
   /// The faults that a taught observer explains, and within `margin` as well as
   /// the best explanation; nothing while normal operation does.

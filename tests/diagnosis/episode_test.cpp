@@ -231,6 +231,10 @@ TEST_F(EpisodeTest, AFindingThatIsOverIsNotTheNameOfWhatGoesOn) {
   EXPECT_TRUE(Found(0, 0.0, last));
   EXPECT_EQ(verdict_.state, State::kDetected);
   EXPECT_EQ(verdict_.isolated, 0U);
+  // The second time it is kept for twice as long.
+  EXPECT_TRUE(Found(second, 0.0, 1));
+  EXPECT_FALSE(Found(0, 0.0, 2 * last - 1));
+  EXPECT_TRUE(Found(0, 0.0, 1));
 }
 
 // The floor opens the episode, and the valve is not judged any more before the

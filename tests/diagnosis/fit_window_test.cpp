@@ -186,6 +186,36 @@ TEST(FitWindowTest, AFaultThatMovesAnInputIsNotNamedWhereTheInputIsAsUsual) {
   EXPECT_EQ(seen.last.unknown, Unknown::kOutsideKnown);
 }
 
+// Evaporation moves T1, which is as good as one more sample. Where T1 is off,
+// no fault that does not act on it is named, however well it explains X and F.
+TEST(FitWindowTest, AnInputThatHasMovedNamesTheFaultThatAlwaysMovesIt) {
+  std::vector<std::int64_t> named_ns;
+  for (const SignalMask moved : {MaskOf(Signal::kT1), SignalMask{0}}) {
+    for (const int fault : {7, 6}) {
+      ModelSet judged = Fitted();
+      judged.decision.early_error = 1e-3;
+      judged.validity.t1 = {15.0, 25.0};
+      judged.faults.back() = fault;
+      for (Observer& observer : judged.observers) {
+        const bool last = observer.fault == 6;
+        observer.fault = last ? fault : observer.fault;
+        observer.moved = last ? moved : SignalMask{0};
+      }
+      const Seen seen = FollowChange(judged, [](Sample& sample) {
+        AddF6(sample, 1.0);
+        sample.Set(Signal::kT1, 60.0);
+      });
+      EXPECT_EQ(seen.last.isolated, fault == 7 ? 4U : 0U);
+      if (fault == 7) {
+        ASSERT_GE(seen.transitions.size(), 2U);
+        EXPECT_EQ(seen.transitions[1].faults, 4U);
+        named_ns.push_back(seen.transitions[1].stamp_ns);
+      }
+    }
+  }
+  EXPECT_EQ(named_ns.at(1) - named_ns.at(0), 1000000000);
+}
+
 // The name is taken back once the readings have left what the fault does.
 TEST(FitWindowTest, ANameThatFitsNoMoreIsTakenBack) {
   ValveEngine engine(std::make_shared<const ModelSet>(Fitted()));
