@@ -189,30 +189,36 @@ DriftWatch::DriftWatch(const ModelSet& models)
 void DriftWatch::Restart() {
   memory_.Restart();
   recent_.Restart();
+  line_.reset();
   drift_.reset();
+}
+
+bool DriftWatch::Restore(SnapshotReader& reader) {
+  const bool restored = memory_.Restore(reader);
+  line_ = restored ? memory_.Line(least_) : std::nullopt;
+  return restored;
 }
 
 void DriftWatch::Push(const Verdict& verdict, std::uint32_t beyond) {
   const double residual = verdict.residuals[channel_];
+  ended_ = false;
   if (!watches_ || !std::isfinite(residual)) {
     return;
   }
   recent_.Push(residual);
-  const bool ended = memory_.Push(residual);
+  ended_ = memory_.Push(residual);
+  line_ = ended_ ? memory_.Line(least_) : line_;
   if (!drift_) {
     return;
   }
-  if (const auto line = ended ? memory_.Line(least_) : std::nullopt) {
-    drift_ = line;
-  }
+  drift_ = ended_ && line_ ? line_ : drift_;
   Judge(beyond);
 }
 
 // A step on top of the drift, and another channel, speak against it for as long
 // as they last.
 void DriftWatch::Judge(std::uint32_t beyond) {
-  const bool against = !Alone(beyond) || std::abs(recent_.mean()) >
-                                             kOnTop * std::abs(drift_->now);
+  const bool against = !Alone(beyond) || OnTop();
   against_ = std::max(against_ + (against ? 1 : -1), 0);
   const double window = models_->decision.evidence_window;
   if (against_ > window || (age_ >= kMemories * window &&
@@ -221,18 +227,38 @@ void DriftWatch::Judge(std::uint32_t beyond) {
   }
 }
 
+bool DriftWatch::OnTop() const {
+  return std::abs(recent_.mean()) > kOnTop * std::abs(drift_->now);
+}
+
 void DriftWatch::Begin(std::uint32_t beyond) {
   drift_.reset();
-  if (!watches_ || beyond == 0 || !Alone(beyond)) {
-    return;
+  if (watches_ && beyond != 0 && Alone(beyond)) {
+    Take();
   }
-  drift_ = memory_.Line(least_);
+}
+
+void DriftWatch::Take() {
+  drift_ = line_;
   against_ = 0;
   age_ = 0;
   share_ = 0.0;
-  if (drift_ && std::abs(recent_.mean()) > kOnTop * std::abs(drift_->now)) {
+  if (drift_ && OnTop()) {
     drift_.reset();
   }
+}
+
+bool DriftWatch::Emerges() {
+  drift_.reset();
+  if (ended_ && recent_.full() && present()) {
+    Take();
+  }
+  return drift_.has_value();
+}
+
+bool DriftWatch::present() const {
+  constexpr double kShare = 0.5;
+  return line_ && recent_.mean() / line_->now >= kShare;
 }
 
 void DriftWatch::Follow(const Verdict& verdict) {

@@ -55,7 +55,8 @@ void AddDriftFinding(ModelSet& models);
 /// By its form it can be a fault of the actuator or the transmitter, so what
 /// counts is how it came and how far: X alone deviates when it is detected, it
 /// had grown over hours before, and no fault of medium size is left to explain
-/// it. Then it is said, and no fault is named.
+/// it. Then it is said, and no fault is named. So is what grows over hours and
+/// is beyond no limit yet.
 class DriftWatch {
  public:
   /// `models` must outlive it. It watches sets that list the finding.
@@ -71,6 +72,10 @@ class DriftWatch {
 
   /// This sample opens an episode.
   void Begin(std::uint32_t beyond);
+  /// Without an episode: whether X has drifted, so that this sample opens one.
+  bool Emerges();
+  /// X is still off by at least half of what it drifted.
+  bool present() const;
   /// The episode after that sample; none: it ends.
   void Follow(const Verdict& verdict);
 
@@ -78,10 +83,12 @@ class DriftWatch {
   const std::optional<SlowDrift>& drift() const { return drift_; }
 
   void Save(SnapshotWriter& writer) const { memory_.Save(writer); }
-  bool Restore(SnapshotReader& reader) { return memory_.Restore(reader); }
+  bool Restore(SnapshotReader& reader);
 
  private:
   bool Alone(std::uint32_t beyond) const { return (beyond & ~follow_) == 0; }
+  bool OnTop() const;
+  void Take();
   void Judge(std::uint32_t beyond);
 
   const ModelSet* models_;
@@ -92,6 +99,8 @@ class DriftWatch {
   double least_{0.0};        // drift [%]
   SlowMemory memory_;
   ResidualWindow recent_;
+  bool ended_{false};              // a block, with this sample
+  std::optional<SlowDrift> line_;  // at the last such end
   std::optional<SlowDrift> drift_;
   int against_{0};     // samples that speak against a drift
   int age_{0};         // samples since the detection

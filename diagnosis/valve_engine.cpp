@@ -370,11 +370,14 @@ void ValveEngine::Impl::FindDrift(Findings& findings) {
   }
   const std::uint32_t beyond = diagnosis_->detection.beyond();
   drift.Push(verdict_, beyond);
+  findings.abnormal = findings.abnormal || drift.present();
   if (findings.floor != 0 || findings.stuck != 0) {
     return;
   }
   if (!episode_open() && findings.detected) {
     drift.Begin(beyond);
+  } else if (!episode_open() && drift.Emerges()) {
+    findings.detected = verdict_.stamp_ns;
   }
   if (!drift.drift()) {
     return;

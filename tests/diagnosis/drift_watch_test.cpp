@@ -123,6 +123,32 @@ TEST(DriftWatchTest, AnotherChannelIsNotX) {
   EXPECT_FALSE(Begun(WatchedPlant(), Growing, 301, 0));
 }
 
+// At the end of a block, and for as long as X is off.
+TEST(DriftWatchTest, WhatIsBeyondNoLimitEmerges) {
+  const ModelSet models = WatchedPlant();
+  DriftWatch watch(models);
+  std::vector<int> emerged;
+  for (int k = 0; k < 600; ++k) {
+    watch.Push(OffBy(k < 420 ? 5e-4 * k : 0.0), 0);
+    if (watch.Emerges()) {
+      emerged.push_back(k);
+      EXPECT_TRUE(watch.present());
+    }
+  }
+  // A quarter of the deviation of 0.5 is reached after 250 samples.
+  EXPECT_EQ(emerged, (std::vector<int>{269, 299, 329, 359, 389, 419}));
+  EXPECT_FALSE(watch.present());
+}
+
+TEST(DriftWatchTest, AStepBelowEveryLimitDoesNotEmerge) {
+  const ModelSet models = WatchedPlant();
+  DriftWatch watch(models);
+  for (int k = 0; k < 1000; ++k) {
+    watch.Push(OffBy(k < 300 ? 0.0 : 0.2), 0);
+    EXPECT_FALSE(watch.Emerges());
+  }
+}
+
 TEST(DriftWatchTest, OnlySetsThatListItAreWatched) {
   ModelSet models = WatchedPlant();
   models.faults.pop_back();
@@ -228,6 +254,12 @@ TEST(DriftOfAValveTest, ItIsSaidUntilItIsAsLargeAsAFault) {
   const auto ramp = [](int k) { return 0.006 * k; };
   EXPECT_EQ(NamesOf(ramp, 1000), std::vector<std::string>{"x_drift"});
   EXPECT_EQ(NamesOf(ramp, 2000), (std::vector<std::string>{"x_drift", "f1"}));
+}
+
+// One episode, from before any limit is reached until X is back.
+TEST(DriftOfAValveTest, ASmallOneIsAnEpisodeUntilItIsGone) {
+  const auto small = [](int k) { return k < 1200 ? 5e-4 * k : 0.0; };
+  EXPECT_EQ(NamesOf(small, 1800), std::vector<std::string>{"x_drift"});
 }
 
 TEST(DriftOfAValveTest, AnAbruptFaultOfThatSizeIsNamed) {
