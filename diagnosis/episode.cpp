@@ -220,6 +220,10 @@ Episode::Episode(std::shared_ptr<const FaultPlan> plan)
                       static_cast<int>(kRefutingMemories *
                                        models_->decision.evidence_window)),
       shares_(models_->faults.size()) {
+  for (const int fault : models_->undetectable) {
+    const int index = FaultIndex(*models_, fault);
+    hidden_ |= names_last_ && index >= 0 ? FaultSet{1} << index : 0;
+  }
   left_.reserve(static_cast<std::size_t>(models_->decision.detection_samples) +
                 1);
 }
@@ -669,6 +673,11 @@ void Episode::Isolate(const Sample& sample, const Findings& findings,
   FaultSet supported = isolation_.Supported();
   CountSupport(supported);
   if (IsAllOf(supported, misfits_)) {
+    supported = 0;
+  }
+  // As little as a fault that no limit shows explains no episode: the evidence
+  // is too weak for a name.
+  if ((supported & hidden_) != 0) {
     supported = 0;
   }
   // What is recognised fits over t_k samples, be single ones rare for it.
