@@ -454,12 +454,12 @@ FaultSet Episode::Proven(const Verdict& verdict) {
     left_.clear();
     return 0;
   }
-  if (left_.size() == left_.capacity()) {
+  const auto length = static_cast<std::size_t>(decision.detection_samples);
+  if (left_.size() > length) {
     left_.erase(left_.begin());
   }
   left_.push_back(left);
-  const auto needed = static_cast<std::size_t>(
-      decision.detection_samples + (faults_.ShownByInputs(left) ? 0 : 1));
+  const std::size_t needed = length + (faults_.ShownByInputs(left) ? 0 : 1);
   if (left_.size() < needed) {
     return 0;
   }
