@@ -11,7 +11,7 @@ export PATH=$PWD/build/release/bin:$PATH
 out=demo-out
 export FDI_DATA=$out/data
 domain=${FDI_DOMAIN:-42}
-set=${FDI_DEMO_SET:-paper-extended} # or paper
+model_set=${FDI_DEMO_SET:-paper-extended} # or paper
 start=2026-01-01T00:00:00Z
 monitor=
 
@@ -31,12 +31,12 @@ mkdir -p "$out"
 
 say "Training on simulated runs of the paper's eleven conditions"
 begin=$SECONDS
-show fdi-trainer train --campaign "campaigns/$set.toml" >"$out/training.txt"
+show fdi-trainer train --campaign "campaigns/$model_set.toml" >"$out/training.txt"
 echo "$((SECONDS - begin)) s; models and their figures: $out/training.txt"
 
 say "Starting the monitor"
-echo "\$ fdi-monitor run --model-set $set --domain $domain"
-fdi-monitor run --model-set "$set" --domain "$domain" 2>"$out/monitor.log" &
+echo "\$ fdi-monitor run --model-set $model_set --domain $domain"
+fdi-monitor run --model-set "$model_set" --domain "$domain" 2>"$out/monitor.log" &
 monitor=$!
 for _ in $(seq 300); do
   grep -q monitor_ready "$out/monitor.log" && break

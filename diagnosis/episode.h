@@ -217,7 +217,7 @@ class Episode {
   bool begun_{false};                  // gathering of evidence has begun
   int age_{0};                         // samples since the detection
   int without_fault_{0};               // samples since some factor reached T/2
-  std::vector<FaultSet> left_;         // unrefuted in the last samples, < t_k
+  std::vector<FaultSet> left_;         // unrefuted, by sample before t_k
   bool early_{false};                  // isolated before t_k
   FaultSet contender_{0};              // candidate to replace the isolated set
   int contender_run_{0};  // samples that supported it and no other since
