@@ -75,6 +75,11 @@ class FaultPlan {
   }
   /// The set says how a fault that acts fits (FitBounds).
   bool judges_fit() const { return judges_fit_; }
+  /// The channel predicts from the position, which is then no effect of a
+  /// fault but where the fault has brought the rod.
+  bool takes_position(std::size_t channel) const {
+    return takes_position_[channel];
+  }
   /// λ
   double memory() const { return memory_; }
 
@@ -82,6 +87,7 @@ class FaultPlan {
   std::shared_ptr<const ObserverPlan> observers_;
   std::vector<std::size_t> fault_indices_;
   std::vector<double> channel_times_;
+  std::vector<bool> takes_position_;
   double memory_;
   bool judges_fit_{false};
   std::vector<StrengthPath> paths_;
