@@ -213,6 +213,50 @@ TEST_F(StrengthTrackerTest,
   EXPECT_LT(std::abs(f3.evidence() - f6.evidence()), 0.5 * before);
 }
 
+// F is predicted from X, by one observer of f1 wrongly, as where the rod stands
+// at the stop of a weaker fault.
+ModelSet PlantWithFlowFromPosition(std::size_t wrong) {
+  ModelSet models = LinearPlant();
+  models.faults = {1};
+  models.observers.resize(3);
+  for (Observer& observer : models.observers) {
+    observer.channels[1].model.regressors = {{Signal::kX, 0}};
+    for (ChannelObserver& channel : observer.channels) {
+      channel.fit = {-1.5, 1.5, 4.0};
+    }
+  }
+  models.observers[wrong].channels[1].model.rules[0].intercept += 3.0;
+  return models;
+}
+
+bool Fits(double strength, std::size_t wrong) {
+  const ModelSet models = PlantWithFlowFromPosition(wrong);
+  ObserverBank bank(models);
+  bank.Initialise(PlantSample(0));
+  FaultBank faults(models);
+  faults.Restart();
+  Noise noise(6);
+  for (std::uint64_t k = 0; k < 200; ++k) {
+    Sample sample = PlantSample(k);
+    sample.values[Index(Signal::kX)] -= 20.0 * strength;
+    sample.values[Index(Signal::kF)] += 20.0 * strength;
+    noise.Add(sample);
+    bank.Step(sample);
+    faults.PushInputs(sample);
+    faults.Update(bank);
+  }
+  return faults.misfits() == 0;
+}
+
+TEST(FaultBankTest, FlowAtAPositionIsJudgedByTheNeighbourThatKnowsIt) {
+  EXPECT_TRUE(Fits(0.75, 1));
+  EXPECT_TRUE(Fits(0.75, 2));
+  // Below the least trained strength, normal operation is the neighbour and
+  // would excuse any fault.
+  EXPECT_FALSE(Fits(0.25, 1));
+  EXPECT_TRUE(Fits(0.25, 2));
+}
+
 // Where F is at its limit f6 differs from normal operation nowhere.
 TEST(FaultBankTest, FaultIsNotNamedForWantOfEvidence) {
   const ModelSet models = SaturatingPlant();
