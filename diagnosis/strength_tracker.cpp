@@ -328,8 +328,9 @@ void StrengthTracker::UpdateFactor(const ObserverBank& bank) {
   factor_ = 1.0;
   accounts_ = false;
   double furthest = 0.0;
+  const bool early = age_ <= plan_->models().decision.isolation_samples;
   const PathPlace place = path_->PlaceOf(strength_);
-  for (std::size_t c = 0; c < channels_; ++c) {
+  for (std::size_t c = 0; c < channels_ && (early || factor_ > 0.0); ++c) {
     if (!bank.active(static_cast<int>(c))) {
       continue;
     }

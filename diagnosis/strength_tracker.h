@@ -62,9 +62,10 @@ class StrengthTracker {
   /// does not hide both. A fault that is not yet refutable is not isolated.
   bool refutable() const { return refutable_; }
 
-  /// Whether the fault accounts for what is seen: where the normal observer is
-  /// furthest off, in deviations, the residual is less than half of its one.
-  /// Else the fault only tolerates it, as a rod that sticks does nearly all.
+  /// Of the first t_k samples: whether the fault accounts for what is seen.
+  /// Where the normal observer is furthest off, in deviations, the residual is
+  /// less than half of its one. Else the fault only tolerates it, as a rod that
+  /// sticks does nearly all.
   bool accounts() const { return accounts_; }
 
   /// Smallest membership over the active channels of the residual at the
