@@ -438,16 +438,18 @@ FaultSet Episode::WithGroups(FaultSet set, const Verdict& verdict) const {
 
 // Wald's sequential test: before t_k, the few faults that are left once the
 // likelihood ratio to every other one and to normal operation is more than m/α,
-// with m faults, so that a name without the fault has at most the probability α
-// where the models are right. They err most in the first moments of a fault, so
-// what was left in any of more than n_d samples counts; an input that has moved
-// with the fault is evidence beside the models, and n_d samples are enough.
+// with m faults (findings of the floor have none), so that a name without the
+// fault has at most the probability α where the models are right. They err most
+// in the first moments of a fault, so what was left in any of more than n_d
+// samples counts; an input that has moved with the fault is evidence beside the
+// models, and n_d samples are enough.
 FaultSet Episode::Proven(const Verdict& verdict) {
   const DecisionParameters& decision = models_->decision;
   if (decision.early_error <= 0.0 || isolation_.full()) {
     return 0;
   }
-  const double rivals = static_cast<double>(models_->faults.size());
+  const double rivals =
+      static_cast<double>(models_->faults.size()) - std::popcount(floor_names_);
   const FaultSet left =
       faults_.Unrefuted(std::log(rivals / decision.early_error));
   if ((left & FactorsFrom(decision.isolation_threshold, verdict)) == 0) {
