@@ -74,6 +74,7 @@ test('a fault is in the alarm list within 2 s of its event', async () => {
 });
 
 test('acknowledging bears the name of the user and persists', async () => {
+  await plant.untilNamed('V1');
   const page = await open(browser, address, '#/alarms');
   await page.getByRole('button', {name: 'Acknowledge V1'}).click();
   await page.getByLabel('Comment').fill('sent somebody');

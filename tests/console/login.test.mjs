@@ -59,6 +59,7 @@ test('nothing is shown before a login', async () => {
 });
 
 test('who may acknowledge does so by name, and cannot label', async () => {
+  await plant.untilNamed('V1');
   const page = await open(browser, address, '#/alarms', kOptions);
   await logIn(page, 'acknowledge');
   await page.getByRole('button', {name: 'Acknowledge V1'}).click();

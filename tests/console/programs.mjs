@@ -94,6 +94,19 @@ export class Plant {
         '--log-level', 'warning', ...words);
   }
 
+  /**
+   * The newest episode of that valve has a name. With it the priority may rise,
+   * and what was acknowledged before has to be acknowledged again.
+   */
+  untilNamed(valve) {
+    return until(async () => {
+      const {episodes} = JSON.parse(await this.run('fdi-store', 'history',
+          'list', '--valve', valve, '--json'));
+      return episodes.length > 0 && episodes[0].fault !== 'unknown' &&
+          episodes[0].fault !== null;
+    }, `a name of the fault of ${valve}`);
+  }
+
   async stop() {
     this.#kill();
     await Promise.all([...this.#children].map((child) => child.ended));

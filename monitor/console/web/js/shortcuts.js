@@ -14,7 +14,10 @@ export function onKey(key, text, action) {
   };
 }
 
+// A dialog that has been closed keeps the focus until the next frame if the
+// button that opened it has been replaced meanwhile.
 function isTyping(target) {
+  if (target.closest?.('dialog:not([open])')) return false;
   return target.closest?.('input, select, textarea, dialog') !== null &&
       target.closest?.('input[type="checkbox"]') === null;
 }
