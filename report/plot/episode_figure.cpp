@@ -288,11 +288,10 @@ std::vector<Panel> WindowPanels(const EpisodeEvidence& evidence,
       panels.push_back(std::move(panel));
     }
     if (made_detection(w.deviation_beyond)) {
-      Panel panel{LabelOf(evidence, "deviation of residual ", w.channel)};
-      panel.series = {
-          {"deviation " + over, ink::kBlack, 1.4, Dash::kSolid, w.deviation, x},
-          {"its limit", ink::kPurple, 1.4, Dash::kDashDot, w.upper_deviation,
-           x}};
+      Panel panel{LabelOf(evidence, "deviation of ", w.channel)};
+      panel.series = {{over, ink::kBlack, 1.4, Dash::kSolid, w.deviation, x},
+                      {"its limit", ink::kPurple, 1.4, Dash::kDashDot,
+                       w.upper_deviation, x}};
       panels.push_back(std::move(panel));
     }
   }
