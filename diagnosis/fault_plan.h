@@ -75,8 +75,7 @@ class FaultPlan {
   }
   /// The set says how a fault that acts fits (FitBounds).
   bool judges_fit() const { return judges_fit_; }
-  /// The channel predicts from the position, which is then no effect of a
-  /// fault but where the fault has brought the rod.
+  /// The channel predicts the flow from X: where the rod stands is its input.
   bool takes_position(std::size_t channel) const {
     return takes_position_[channel];
   }

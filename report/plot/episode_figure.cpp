@@ -178,15 +178,14 @@ std::string_view UnitOf(const EpisodeEvidence& evidence, std::size_t channel) {
                                  : SignalUnit(*signal);
 }
 
-std::string LabelOf(const EpisodeEvidence& evidence, const std::string& what,
-                    std::size_t channel) {
-  return what + evidence.episode.channels[channel] + " [" +
+std::string LabelOf(const EpisodeEvidence& evidence, std::size_t channel) {
+  return "residual of " + evidence.episode.channels[channel] + " [" +
          std::string(UnitOf(evidence, channel)) + "]";
 }
 
 Panel ResidualPanel(const EpisodeEvidence& evidence,
                     const std::vector<TracePoint>& trace, std::size_t channel) {
-  Panel panel{LabelOf(evidence, "residual of ", channel)};
+  Panel panel{LabelOf(evidence, channel)};
   panel.series = {{"measured − normal", ink::kBlack, 1.4, Dash::kSolid,
                    Residuals(trace, channel)}};
   if (evidence.models) {
@@ -277,19 +276,19 @@ std::vector<Panel> WindowPanels(const EpisodeEvidence& evidence,
   };
   const std::vector<double> x = TimesOf(evidence, trace);
   for (const WindowTrace& w : ComputeWindows(*evidence.models, trace)) {
-    const std::string over =
-        "over " + std::to_string(w.limits->length) + " samples";
+    const std::string samples = std::to_string(w.limits->length) + " samples";
     if (made_detection(w.mean_beyond)) {
-      Panel panel{LabelOf(evidence, "mean residual of ", w.channel)};
+      Panel panel{LabelOf(evidence, w.channel)};
       panel.series = {
-          {"mean " + over, ink::kBlack, 1.4, Dash::kSolid, w.mean, x}};
+          {"mean over " + samples, ink::kBlack, 1.4, Dash::kSolid, w.mean, x}};
       panel.limits = {{w.limits->upper_mean, "limits of the mean"},
                       {w.limits->lower_mean, ""}};
       panels.push_back(std::move(panel));
     }
     if (made_detection(w.deviation_beyond)) {
-      Panel panel{LabelOf(evidence, "deviation of ", w.channel)};
-      panel.series = {{over, ink::kBlack, 1.4, Dash::kSolid, w.deviation, x},
+      Panel panel{LabelOf(evidence, w.channel)};
+      panel.series = {{"deviation of " + samples, ink::kBlack, 1.4,
+                       Dash::kSolid, w.deviation, x},
                       {"its limit", ink::kPurple, 1.4, Dash::kDashDot,
                        w.upper_deviation, x}};
       panels.push_back(std::move(panel));

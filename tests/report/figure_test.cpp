@@ -337,7 +337,7 @@ TEST_F(EpisodeFigureTest, TheWindowThatMadeTheDetectionIsDrawnWithItsLimits) {
 
   ASSERT_EQ(figure.panels.size(), 6U);
   EXPECT_EQ(figure.panels[3].label, "residual of F(CV) [m3/h]");
-  EXPECT_EQ(figure.panels[4].label, "mean residual of F(CV) [m3/h]");
+  EXPECT_EQ(figure.panels[4].label, "residual of F(CV) [m3/h]");
   EXPECT_EQ(figure.panels[4].series[0].title, "mean over 30 samples");
   EXPECT_NEAR(figure.panels[4].series[0].y[30], -1.5, 0.06);
   EXPECT_EQ(figure.panels[4].limits[1].value, -1.4);
