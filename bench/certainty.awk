@@ -6,10 +6,12 @@
 #     awk -F, -f bench/certainty.awk RUNS
 function Beside(name, fault) {
   return name == "f6" && fault == "f18" || name == "f18" && fault == "f6" ||
-    (name == "f2" || name == "f19") && fault == "f5"
+    (name == "f2" || name == "f19") && fault == "f5" ||
+    name == "f2" && fault == "f19" ||
+    (name == "f10" || name == "f11") && fault == "f12"
 }
 # A line of set_calibration.sh begins with the valve.
-{ fault = $(NF - 19); name = $(NF - 4); certainty = $(NF - 3) }
+{ fault = $(NF - 21); name = $(NF - 6); certainty = $(NF - 5) }
 certainty == "" || certainty == "-" { silent++; next }
 {
   answers[certainty]++

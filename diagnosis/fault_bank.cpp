@@ -185,7 +185,9 @@ double FaultBank::EvidenceMembership(double behind) const {
 
 void FaultBank::ApplyEvidence(Verdict& verdict) const {
   const double best = BestEvidence();
-  const double candidate = 0.5 * plan_->models().decision.isolation_threshold;
+  const double isolation = plan_->models().decision.isolation_threshold;
+  const double candidate = 0.5 * isolation;
+  const double tolerated = 0.5 * (1.0 + isolation);
   verdict.normal_factor = std::min(
       verdict.normal_factor, EvidenceMembership(best - trained_.total(0)));
   const std::array<double, kMaxFaults> instant = verdict.fault_factors;
@@ -199,6 +201,7 @@ void FaultBank::ApplyEvidence(Verdict& verdict) const {
     const double factor =
         std::min({std::max(instant[i], tracker.factor()),
                   tracker.refutable() ? 1.0 : candidate,
+                  tracker.tolerates() ? tolerated : 1.0,
                   EvidenceMembership(best - evidence - allowance_)});
     verdict.fault_factors[i] = std::max(verdict.fault_factors[i], factor);
     if (evidence > leading[i]) {

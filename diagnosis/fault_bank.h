@@ -21,7 +21,9 @@ namespace fdi {
 /// μ_L falling from 1 to 0 between the evidence core and support. Normal
 /// operation competes in the same way with d_0, without a. A fault that no
 /// reading since the detection could have refuted has at most d_f = T/2: it is
-/// a candidate, but absence of contrary evidence does not isolate it.
+/// a candidate, but absence of contrary evidence does not isolate it. One that
+/// tolerates what is seen, but does not account for it, has at most (1 + T)/2:
+/// it can be isolated, but is not sure.
 ///
 /// a allows for interpolation. The error between two trained strengths is the
 /// same sample after sample, so that its likelihood adds up to a verdict that

@@ -27,12 +27,19 @@ enum class Onset : std::uint8_t {
   kThreshold,  ///< None until the force lacks, and little more beyond.
 };
 
-/// When one fault is taken for another of its `look_alikes`.
+/// When one fault is taken for another.
 enum class Alike : std::uint8_t {
-  kNever,
   kWithinItsSize,  ///< Their effects have one shape; only the size tells.
   kWhileWeak,      ///< As long as both effects are within the model's error.
-  kUnfit,  ///< Where no fault explains the record as a healthy valve is.
+  kUnfit,     ///< Where no fault explains the record as a healthy valve is.
+  kUntaught,  ///< By observers that were not taught that sign of the other one.
+};
+
+/// A fault that another one is taken for.
+struct LookAlike {
+  int fault{0};  ///< Its number; 0: none.
+  Alike when{Alike::kWithinItsSize};
+  int sign{0};  ///< Of its strength; 0: either.
 };
 
 inline constexpr SignalMask kRodSignals =
@@ -58,8 +65,7 @@ struct FaultFacts {
   bool of_water{false};
   /// The signal whose reading is not what acts on the valve.
   std::optional<Signal> hides{};
-  Alike alike{Alike::kNever};
-  std::array<int, 2> look_alikes{};  ///< Numbers of faults; 0: none.
+  std::array<LookAlike, 3> look_alikes{};
 };
 
 /// All faults, numbered by position from 1 on. Models, databases and messages
@@ -69,12 +75,10 @@ inline constexpr FaultFacts kFaultCatalogue[] = {
      .description = "valve clogging",
      .paper_name = "F1",
      .onset = Onset::kStop,
-     .alike = Alike::kUnfit,
-     .look_alikes = {10, 16}},
+     .look_alikes = {{{10, Alike::kUnfit}, {16, Alike::kUnfit}}}},
     {.name = "f2",
      .description = "plug or seat sedimentation",
-     .alike = Alike::kWhileWeak,
-     .look_alikes = {5}},
+     .look_alikes = {{{5, Alike::kWhileWeak}, {19, Alike::kUntaught, 1}}}},
     {.name = "f3", .description = "plug or seat erosion", .paper_name = "F2"},
     {.name = "f4",
      .description = "increased friction of valve or bushing",
@@ -84,15 +88,13 @@ inline constexpr FaultFacts kFaultCatalogue[] = {
      .description = "external leakage",
      .acts_on = ActsOn::kFlow,
      .visible_in = MaskOf(Signal::kF),
-     .alike = Alike::kWhileWeak,
-     .look_alikes = {2}},
+     .look_alikes = {{{2, Alike::kWhileWeak}}}},
     {.name = "f6",
      .description = "internal leakage",
      .paper_name = "F3",
      .acts_on = ActsOn::kFlow,
      .visible_in = MaskOf(Signal::kF),
-     .alike = Alike::kWithinItsSize,
-     .look_alikes = {18}},
+     .look_alikes = {{{18, Alike::kWithinItsSize}}}},
     {.name = "f7",
      .description = "medium evaporation or critical flow",
      .paper_name = "F4",
@@ -104,9 +106,12 @@ inline constexpr FaultFacts kFaultCatalogue[] = {
     {.name = "f10",
      .description = "diaphragm perforation",
      .onset = Onset::kThreshold,
-     .alike = Alike::kUnfit,
-     .look_alikes = {1, 16}},
-    {.name = "f11", .description = "spring fault"},
+     .look_alikes = {{{1, Alike::kUnfit},
+                      {16, Alike::kUnfit},
+                      {12, Alike::kUntaught, 1}}}},
+    {.name = "f11",
+     .description = "spring fault",
+     .look_alikes = {{{12, Alike::kUntaught, 1}}}},
     {.name = "f12",
      .description = "electro-pneumatic transducer fault",
      .is_signed = true},
@@ -121,8 +126,7 @@ inline constexpr FaultFacts kFaultCatalogue[] = {
     {.name = "f16",
      .description = "supply pressure drop",
      .onset = Onset::kThreshold,
-     .alike = Alike::kUnfit,
-     .look_alikes = {1, 10}},
+     .look_alikes = {{{1, Alike::kUnfit}, {10, Alike::kUnfit}}}},
     {.name = "f17",
      .description = "unexpected pressure change across the valve",
      .is_signed = true,
@@ -131,8 +135,7 @@ inline constexpr FaultFacts kFaultCatalogue[] = {
      .description = "bypass valve open",
      .acts_on = ActsOn::kFlow,
      .visible_in = MaskOf(Signal::kF),
-     .alike = Alike::kWithinItsSize,
-     .look_alikes = {6}},
+     .look_alikes = {{{6, Alike::kWithinItsSize}}}},
     {.name = "f19",
      .description = "flow sensor fault",
      .paper_name = "F5",

@@ -90,6 +90,8 @@ class AccountedShare {
   bool tells(int least) const {
     return count_ >= 0.9 * least && seen_ > kTelling * count_;
   }
+  /// Mean of r_0².
+  double normal() const { return seen_ / count_; }
   double share() const { return (seen_ - left_) / (seen_ - noise_); }
 
  private:

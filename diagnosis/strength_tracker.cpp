@@ -52,6 +52,7 @@ void StrengthTracker::Restart() {
   factor_ = 0.0;
   fit_.Restart();
   misfit_ = 0.0;
+  tolerates_ = false;
   accounted_.fill({});
   std::fill(cells_.begin(), cells_.end(), 0.0);
 }
@@ -370,8 +371,13 @@ double StrengthTracker::Between(std::size_t channel, const Segment& segment,
 
 void StrengthTracker::PushFit(const ObserverBank& bank,
                               const ObserverEvidence& trained, bool shown) {
-  const bool begins =
-      shown && age_ <= plan_->models().decision.isolation_samples;
+  const int t_k = plan_->models().decision.isolation_samples;
+  // The first t_k samples are those of a rod on its way.
+  const bool early = age_ <= t_k;
+  if (age_ == t_k + 1) {
+    accounted_.fill({});
+  }
+  const bool begins = shown && early;
   const StrengthPath::Node& best = BestNode(trained);
   const bool is_trained = trained.total(best.observer) >= total_;
   const PathPlace place =
@@ -391,10 +397,10 @@ void StrengthTracker::PushFit(const ObserverBank& bank,
       p.residual = apart ? Between(c, segment, place, p.residual) : p.residual;
       const double effect =
           apart || std::isnan(normal) ? 0.0 : normal - p.residual;
-      const double early = begins ? kOnsetError * effect : 0.0;
+      const double onset = begins ? kOnsetError * effect : 0.0;
       const double spread =
           std::sqrt(std::min(p.variance - p.error, kMaxFitVariance * sd * sd) +
-                    (apart ? 0.0 : p.error) + early * early);
+                    (apart ? 0.0 : p.error) + onset * onset);
       z[c] = p.residual / spread;
       u[c] = effect / spread;
       PushAccount(bank, c, p.residual);
@@ -408,18 +414,23 @@ void StrengthTracker::PushFit(const ObserverBank& bank,
     const FitBounds& limits = path_->points[node * channels_ + c].fit;
     misfit_ = std::max(misfit_, fit_.Excess(c, limits));
   }
-  if (!Accounts(node)) {
+  const SignalMask explains =
+      plan_->models().observers[path_->nodes[node].observer].moved;
+  const Account account =
+      AccountOf(early ? plan_->models().decision.detection_samples + 1 : t_k);
+  if (early || age_ > 2 * t_k) {
+    tolerates_ = account.tolerates;
+  }
+  if (!early && (account.lacks & explains) != 0) {
     misfit_ = std::max(misfit_, kUnaccounted);
   }
 }
 
-// The first t_k samples are those of a rod on its way.
 void StrengthTracker::PushAccount(const ObserverBank& bank, std::size_t channel,
                                   double residual) {
   const int c = static_cast<int>(channel);
   const double normal = bank.residual(0, c);
-  if (age_ <= plan_->models().decision.isolation_samples || bank.saturated(c) ||
-      std::isnan(residual) || std::isnan(normal)) {
+  if (bank.saturated(c) || std::isnan(residual) || std::isnan(normal)) {
     return;
   }
   const double sd = path_->points[channel].sd;  // of normal operation
@@ -428,19 +439,26 @@ void StrengthTracker::PushAccount(const ObserverBank& bank, std::size_t channel,
 }
 
 // An observer that explains its own data, or knows none that normal operation
-// does not, has to explain what is seen.
-bool StrengthTracker::Accounts(std::size_t node) const {
+// does not, has to explain what is seen; any other one may tolerate it.
+StrengthTracker::Account StrengthTracker::AccountOf(int least) const {
   const ModelSet& models = plan_->models();
-  const SignalMask explains =
-      models.observers[path_->nodes[node].observer].moved;
+  Account account;
+  double most = 0.0;  // mean of r_0²
+  double lacking = 0.0;
   for (std::size_t c = 0; c < channels_; ++c) {
-    if ((explains & kRodSignals & MaskOf(models.channels[c].output)) != 0 &&
-        accounted_[c].tells(models.decision.isolation_samples) &&
-        accounted_[c].share() < AccountedShare::kLeast) {
-      return false;
+    const SignalMask output = MaskOf(models.channels[c].output) & kRodSignals;
+    if (output != 0 && accounted_[c].tells(least)) {
+      const bool lacks = accounted_[c].share() < AccountedShare::kLeast;
+      const double normal = accounted_[c].normal();
+      most = std::max(most, normal);
+      if (lacks) {
+        account.lacks |= output;
+        lacking = std::max(lacking, normal);
+      }
     }
   }
-  return true;
+  account.tolerates = lacking > 0.5 * most;
+  return account;
 }
 
 }  // namespace fdi

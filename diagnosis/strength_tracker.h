@@ -84,10 +84,17 @@ class StrengthTracker {
   bool fits() const { return !fit_.full() || fits_so_far(); }
   /// The same of fewer samples, within wider limits.
   bool fits_so_far() const { return misfit_ <= 1.0; }
+  /// Where X or F is furthest from normal operation, the fault does not account
+  /// for what is seen (AccountedShare): that it fits says little.
+  bool tolerates() const { return tolerates_; }
 
   const StrengthPath& path() const { return *path_; }
 
  private:
+  struct Account {  // for what normal operation does not explain in X and F
+    SignalMask lacks{0};
+    bool tolerates{false};  // lacks where that is most, or half as much
+  };
   struct Segment {  // of one channel
     double low;     // prediction of the weaker node
     double slope;   // dŷ/ds
@@ -123,7 +130,7 @@ class StrengthTracker {
   void UpdateFactor(const ObserverBank& bank);
   void PushAccount(const ObserverBank& bank, std::size_t channel,
                    double residual);
-  bool Accounts(std::size_t node) const;
+  Account AccountOf(int least) const;
 
   const FaultPlan* plan_;
   const StrengthPath* path_;
@@ -142,6 +149,7 @@ class StrengthTracker {
   bool accounts_{false};
   FitWindow fit_;
   double misfit_{0.0};  // 1 at the limit
+  bool tolerates_{false};
   std::array<AccountedShare, kMaxChannels> accounted_{};
   std::vector<double> cells_;  // evidence by cell and channel
 };

@@ -59,7 +59,7 @@ SELECT e.episode_id, e.valve_id, e.source_id, e.detected_ns, e.isolated_ns,
   e.cleared_ns, e.ended_ns, e.end_reason, e.fault, e.fault_bits, e.peak_factor,
   e.strength, e.unknown_kind, e.layer, e.model_set, e.model_hash, e.flow_unit,
   e.channels, e.faults, e.label, e.acked_by, e.acked_ns, e.session_id,
-  e.lowest, e.highest, e.priority, e.worst_strength, e.unconfirmed_ns
+  e.lowest, e.highest, e.priority, e.worst_strength, e.unconfirmed_ns, e.known
 FROM (SELECT DISTINCT key FROM batch
       WHERE item IN ('episode', 'trace', 'strength')) c
   CROSS JOIN episode e ON e.episode_id = c.key
@@ -291,7 +291,8 @@ SELECT * FROM (
      WHERE (t.episode_id, t.monitor_id) = (e.episode_id, e.monitor_id)
        AND is_stamp(last_ns)),
     e.session_id, e.fault_bits, e.strength, e.unknown_kind, e.layer,
-    e.flow_unit, e.channels, e.faults, e.lowest, e.highest, e.worst_strength,
+    e.flow_unit, e.channels, e.faults, coalesce(e.known, e.faults), e.lowest,
+    e.highest, e.worst_strength,
     e.priority, e.unconfirmed_ns, plain_name(e.monitor_id, e.fault),
     ack_comment(e.monitor_id, e.episode_id, e.acked_by, e.acked_ns),
     (SELECT nullif(s.value, 'none') FROM episode_event s

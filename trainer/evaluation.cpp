@@ -150,10 +150,9 @@ Wording WordingOf(const ModelSet& models, const Verdict& verdict,
       strength = verdict.strengths[bit];
     }
   }
-  std::vector<std::string> known(models.faults.size());
-  std::ranges::transform(models.faults, known.begin(), FaultName);
   const std::string name = JoinText(faults, "|", FaultName);
-  const auto beside = LookAlikesBeside(name, layer, strength, known);
+  const auto beside = LookAlikesBeside(
+      name, layer, strength, KnownFaults(models.faults, models.observers));
   Wording wording{WithLookAlikes(CertaintyOf(name, layer, factor), beside), {}};
   for (const std::string& fault : beside) {
     wording.look_alikes.push_back(RequireFault(fault));

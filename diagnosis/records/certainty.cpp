@@ -15,6 +15,15 @@ constexpr double kAgreeingFactor = 0.5;
 constexpr double kWeak = 0.06;
 constexpr int kExternalLeak = 5;
 
+// Whether KnownFaults() have `name`, with that sign if it is not 0.
+bool Knows(const std::vector<std::string>& known, const std::string& name,
+           int sign) {
+  return std::ranges::any_of(known, [&](std::string_view one) {
+    return one == name || (sign <= 0 && one == name + "-") ||
+           (sign >= 0 && one == name + "+");
+  });
+}
+
 }  // namespace
 
 std::string_view CertaintyName(Certainty certainty) {
@@ -50,20 +59,21 @@ std::vector<std::string> LookAlikesBeside(
     return beside;
   }
   const FaultFacts& facts = FaultFactsOf(*fault);
-  const auto add = [&](int other) {
-    if (other != 0 &&
-        std::ranges::find(known, FaultName(other)) == known.end()) {
+  const auto add = [&](int other, int sign) {
+    if (!Knows(known, FaultName(other), sign)) {
       beside.push_back(FaultName(other));
     }
   };
   const bool weak = strength > 0.0 && strength <= kWeak;
-  if (facts.alike == Alike::kWithinItsSize ||
-      (weak && facts.alike == Alike::kWhileWeak)) {
-    std::ranges::for_each(facts.look_alikes, add);
+  for (const LookAlike& other : facts.look_alikes) {
+    if (other.fault != 0 && other.when != Alike::kUnfit &&
+        (other.when != Alike::kWhileWeak || weak)) {
+      add(other.fault, other.sign);
+    }
   }
   // Not so to a simulation, which sees what the loop does.
   if (weak && facts.acts_on == ActsOn::kFlowReading) {
-    add(kExternalLeak);
+    add(kExternalLeak, 0);
   }
   return beside;
 }
@@ -71,9 +81,7 @@ std::vector<std::string> LookAlikesBeside(
 std::vector<std::string> LookAlikesOf(const FaultEvent& event) {
   std::vector<std::string> known;
   if (event.models) {
-    for (const int fault : event.models->faults) {
-      known.push_back(FaultName(fault));
-    }
+    known = KnownFaults(event.models->faults, event.models->observers);
   }
   const Transition& t = event.transition;
   return LookAlikesBeside(IsolatedFaults(event), t.layer, t.strength, known);

@@ -4,6 +4,7 @@
 #include <string_view>
 #include <vector>
 
+#include "diagnosis/fault_catalogue.h"
 #include "diagnosis/records/fault_event.h"
 #include "diagnosis/verdict.h"
 
@@ -31,13 +32,34 @@ std::string_view CertaintyName(Certainty certainty);  ///< "one of", ...
 Certainty CertaintyOf(std::string_view faults, Layer layer, double factor,
                       Unknown unknown = Unknown::kTooEarly);
 
+/// The faults that a model set knows, by name. One that can have either sign,
+/// but has observers of one only, has the sign behind its name: "f19-".
+/// @param faults those of the set, findings included.
+/// @param observers with their `fault` and `strength`.
+template <typename Observers>
+std::vector<std::string> KnownFaults(const std::vector<int>& faults,
+                                     const Observers& observers) {
+  std::vector<std::string> known;
+  for (const int fault : faults) {
+    bool negative = false;
+    bool positive = false;
+    for (const auto& observer : observers) {
+      negative |= observer.fault == fault && observer.strength < 0.0;
+      positive |= observer.fault == fault && observer.strength > 0.0;
+    }
+    const bool one = HasNegative(fault) && negative != positive;
+    known.push_back(FaultName(fault) + (!one ? "" : negative ? "-" : "+"));
+  }
+  return known;
+}
+
 /// Faults that look like `faults`, where these are a single one, to observers
-/// whose set does not know them: of one shape whatever the size, or as long as
-/// both are weak. Empty for a name by a simulation of the valve, which knows
-/// all faults.
+/// whose set does not know them: of one shape whatever the size, as long as
+/// both are weak, or with a sign that the set does not know. Empty for a name
+/// by a simulation of the valve, which knows all faults.
 /// @param strength of the fault; signed [-].
-/// @param known names of all faults of the set; empty: the set is not known,
-///   and nothing is added.
+/// @param known KnownFaults() of the set; empty: the set is not known, and
+///   nothing is added.
 std::vector<std::string> LookAlikesBeside(
     std::string_view faults, Layer layer, double strength,
     const std::vector<std::string>& known);

@@ -1,6 +1,7 @@
 #include "programs/monitor/bus_view.h"
 
 #include "diagnosis/fault_catalogue.h"
+#include "diagnosis/records/certainty.h"
 #include "diagnosis/records/valve_glob.h"
 #include "monitor/bus/dds_options.h"
 #include "programs/monitor/verbs.h"
@@ -70,14 +71,10 @@ report::Json ModelNames::Residuals(const idl::DecisionMessage& message) const {
   return residuals;
 }
 
-std::vector<std::string> ModelNames::FaultsOf(std::uint64_t hash) const {
-  std::vector<std::string> names;
-  if (const idl::ModelSetInfoMessage* info = Find(hash)) {
-    for (const int fault : info->faults) {
-      names.push_back(FaultName(fault));
-    }
-  }
-  return names;
+std::vector<std::string> ModelNames::KnownTo(std::uint64_t hash) const {
+  const idl::ModelSetInfoMessage* info = Find(hash);
+  return info != nullptr ? KnownFaults(info->faults, info->observers)
+                         : std::vector<std::string>();
 }
 
 report::Json ModelNames::Factors(const idl::DecisionMessage& message) const {

@@ -83,8 +83,8 @@ class ModelNames {
   void Add(const idl::ModelSetInfoMessage& info);
   /// Null if the ModelSetInfo has not arrived yet.
   const idl::ModelSetInfoMessage* Find(std::uint64_t hash) const;
-  /// The faults of a set by name; empty as Find() is null.
-  std::vector<std::string> FaultsOf(std::uint64_t hash) const;
+  /// KnownFaults() of a set; empty as Find() is null.
+  std::vector<std::string> KnownTo(std::uint64_t hash) const;
   /// Whether the factors of `message` can be named, or there are none.
   bool Explains(const idl::DecisionMessage& message) const;
 

@@ -204,7 +204,7 @@ Json TopBoard::RowOf(const LatestVector& latest, Clock::time_point now) const {
   const bool since = open != open_.end() && abnormal;
   const bool silent = IsSilent(latest, now);
   const std::vector<std::string> look_alikes = LookAlikesBeside(
-      faults, Layer::kObservers, strength, names_.FaultsOf(message.model_hash));
+      faults, Layer::kObservers, strength, names_.KnownTo(message.model_hash));
   Certainty certainty = WithLookAlikes(
       CertaintyOf(faults, Layer::kObservers, largest), look_alikes);
   if (since && faults.empty() && open->second.unnamed == Certainty::kNotKnown) {

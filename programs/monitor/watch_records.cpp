@@ -101,7 +101,7 @@ WatchRecord WatchRecords::RecordOf(const idl::DecisionMessage& message) const {
   std::vector<std::string> look_alikes;
   if (v.state != State::kNormal) {
     look_alikes = LookAlikesBeside(faults, Layer::kObservers, strength,
-                                   names_.FaultsOf(message.model_hash));
+                                   names_.KnownTo(message.model_hash));
     certainty = CertaintyName(WithLookAlikes(
         CertaintyOf(faults, Layer::kObservers, largest), look_alikes));
     line += " " + certainty.get<std::string>() +
@@ -147,7 +147,7 @@ void WatchRecords::Add(const FaultEvent& message, Clock::time_point /*now*/) {
   const Transition& t = message.transition;
   const std::string faults = IsolatedFaults(message);
   const std::vector<std::string> look_alikes = LookAlikesBeside(
-      faults, t.layer, t.strength, names_.FaultsOf(message.model_hash));
+      faults, t.layer, t.strength, names_.KnownTo(message.model_hash));
   Json candidates = Json::array();
   for (const FaultCandidate& candidate : message.candidates) {
     candidates.push_back({{"fault", FaultName(candidate.fault)},

@@ -71,7 +71,7 @@ bool IsAlike(Alike alike, const SecondLook& look, const Explanation& e,
       // such excuse, unless the force on the rod is not known.
       return (look.misfit > kGoodMisfit || !look.complete) &&
              e.distance <= kAlike * nothing;
-    case Alike::kNever:
+    case Alike::kUntaught:  // A simulation knows all faults.
       break;
   }
   return false;
@@ -100,10 +100,12 @@ void AddIndistinguishable(const SecondLook& look, double nothing,
       if (e.fault == 0 || Has(set, e.fault)) {
         continue;
       }
-      const FaultFacts& facts = FaultFactsOf(e.fault);
-      if (facts.alike == alike && IsAlike(alike, look, e, nothing) &&
-          std::ranges::any_of(facts.look_alikes,
-                              [&](int other) { return Has(set, other); })) {
+      const auto& others = FaultFactsOf(e.fault).look_alikes;
+      if (IsAlike(alike, look, e, nothing) &&
+          std::ranges::any_of(others, [&](const LookAlike& other) {
+            return other.fault != 0 && other.when == alike &&
+                   Has(set, other.fault);
+          })) {
         set.push_back(e);
       }
     }

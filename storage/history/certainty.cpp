@@ -17,7 +17,7 @@ Certainty CertaintyOf(const Episode& episode) {
 std::vector<std::string> LookAlikesOf(const Episode& episode) {
   return LookAlikesBeside(episode.fault.value_or(""),
                           ParseLayer(episode.layer.value_or("")),
-                          episode.strength, episode.faults);
+                          episode.strength, episode.known);
 }
 
 std::string_view NoNameText(const Episode& episode) {

@@ -71,6 +71,8 @@ struct Episode {
   FlowUnit flow_unit{FlowUnit::kM3PerHour};
   std::vector<std::string> channels;  ///< Of the trace.
   std::vector<std::string> faults;    ///< Of the trace, by index.
+  /// KnownFaults() of its set; `faults` if an earlier version stored it.
+  std::vector<std::string> known;
   std::optional<double> lowest;  ///< Ends of the 95 % interval of strength.
   std::optional<double> highest;
   /// The largest strength since it has its name, whatever its sign.
@@ -167,9 +169,9 @@ FDI_FIELDS(fdi::storage::Episode, episode_id, valve_id, detected_utc,
            isolated_utc, cleared_utc, fault, peak_factor, model_set, end_reason,
            label, acked_by, source_id, model_hash, detected_ns, isolated_ns,
            cleared_ns, ended_ns, acked_ns, trace_end_ns, session_id, fault_bits,
-           strength, unknown_kind, layer, flow_unit, channels, faults, lowest,
-           highest, worst_strength, priority, unconfirmed_ns, fault_name,
-           ack_comment, second)
+           strength, unknown_kind, layer, flow_unit, channels, faults, known,
+           lowest, highest, worst_strength, priority, unconfirmed_ns,
+           fault_name, ack_comment, second)
 
 FDI_FIELDS(fdi::storage::MonitorSession, session_id, start_ns, alive_ns,
            stop_ns, clean, software, config)

@@ -7,6 +7,7 @@
 #include "base/error.h"
 #include "base/text.h"
 #include "diagnosis/fault_catalogue.h"
+#include "diagnosis/records/certainty.h"
 #include "storage/database/record.h"
 #include "storage/history/episode.h"
 #include "storage/history/health.h"
@@ -102,6 +103,7 @@ Entry InsertEpisode(Database& database, const FaultEvent& event,
             models.name + "@" + std::to_string(models.version),
             models.content_hash, FlowUnitName(models.flow_unit),
             JoinText(channels, "|"), JoinText(entry.names, "|"),
+            JoinText(KnownFaults(models.faults, models.observers), "|"),
             PriorityOf(t.severity))
       .Run();
   return entry;

@@ -10,9 +10,9 @@ SELECT v.episode_id, v.valve_id, v.detected_utc, v.isolated_utc,
   e.cleared_ns, e.ended_ns, e.acked_ns,
   (SELECT max(last_ns) FROM episode_trace t
    WHERE t.episode_id = e.episode_id), e.session_id, e.fault_bits, e.strength,
-  e.unknown_kind, e.layer, e.flow_unit, e.channels, e.faults, e.lowest,
-  e.highest, e.worst_strength, e.priority, e.unconfirmed_ns, v.fault_name,
-  v.ack_comment,
+  e.unknown_kind, e.layer, e.flow_unit, e.channels, e.faults,
+  coalesce(e.known, e.faults), e.lowest, e.highest, e.worst_strength,
+  e.priority, e.unconfirmed_ns, v.fault_name, v.ack_comment,
   (SELECT nullif(s.value, 'none') FROM episode_event s
    WHERE s.episode_id = e.episode_id AND s.kind = 'SECOND'
    ORDER BY s.stamp_ns DESC LIMIT 1)
@@ -98,8 +98,8 @@ WHERE (e.ended_ns IS NULL OR e.ended_ns >= ?2) AND e.detected_ns < ?3 AND
 -- name: insert_episode
 INSERT INTO episode (episode_id, session_id, valve_id, source_id, detected_ns,
   peak_factor, strength, model_set, model_hash, flow_unit, channels, faults,
-  priority)
-VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)
+  known, priority)
+VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)
 ON CONFLICT (episode_id) DO NOTHING
 -- name: faults_of_episode
 SELECT fault_bits, peak_factor, strength, detected_ns, faults, priority
@@ -525,13 +525,13 @@ WHERE excluded.stamp_ns > shadow_accumulator.stamp_ns
 -- name: copy_open_episodes
 INSERT OR IGNORE INTO episode (episode_id, valve_id, source_id, detected_ns,
   isolated_ns, cleared_ns, fault_bits, peak_factor, strength, model_set,
-  model_hash, flow_unit, channels, faults, label, acked_by, acked_ns,
+  model_hash, flow_unit, channels, faults, known, label, acked_by, acked_ns,
   unknown_kind, fault, layer, lowest, highest, priority, worst_strength,
   raised_ns)
 SELECT episode_id, valve_id, source_id, detected_ns, isolated_ns, cleared_ns,
   fault_bits, peak_factor, strength, model_set, model_hash, flow_unit,
-  channels, faults, label, acked_by, acked_ns, unknown_kind, fault, layer,
-  lowest, highest, priority, worst_strength, raised_ns
+  channels, faults, known, label, acked_by, acked_ns, unknown_kind, fault,
+  layer, lowest, highest, priority, worst_strength, raised_ns
 FROM source.episode WHERE valve_id = ? AND ended_ns IS NULL
 -- name: copy_open_faults
 INSERT OR IGNORE INTO episode_fault

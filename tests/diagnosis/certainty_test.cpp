@@ -40,8 +40,25 @@ TEST(CertaintyTest, WhatASetDoesNotKnowAndLooksTheSameStandsBeside) {
   EXPECT_EQ(beside("f19", 0.07, paper), Names());
   EXPECT_EQ(beside("f19", -0.05, paper), Names());
   EXPECT_EQ(beside("f1", 0.9, paper), Names());
+  // A sign that the set was not taught: a flow reading that is too low.
+  EXPECT_EQ(beside("f2", 0.5, {"f2", "f5", "f19-"}), Names{"f19"});
+  EXPECT_EQ(beside("f2", 0.5, {"f2", "f5", "f19+"}), Names());
+  EXPECT_EQ(beside("f2", 0.5, {"f2", "f5", "f19"}), Names());
+  EXPECT_EQ(beside("f2", 0.05, {"f2", "f19-"}), (Names{"f5", "f19"}));
+  EXPECT_EQ(beside("f11", 0.5, {"f11", "f12-"}), Names{"f12"});
   EXPECT_EQ(WithLookAlikes(Certainty::kSure, {"f18"}), Certainty::kOneOf);
   EXPECT_EQ(WithLookAlikes(Certainty::kNotYet, {}), Certainty::kNotYet);
+}
+
+TEST(CertaintyTest, AKnownFaultHasTheSignOfItsObserversIfThatIsOneOfTwo) {
+  const std::vector<int> faults{2, 4, 12, 19, 201};
+  const std::vector<Observer> observers{
+      {"normal", 0, 0.0, {}},    {"f2 0.50", 2, 0.5, {}},
+      {"f4 0.50", 4, 0.5, {}},   {"f12 -0.50", 12, -0.5, {}},
+      {"f12 0.50", 12, 0.5, {}}, {"f19 -0.50", 19, -0.5, {}}};
+  EXPECT_EQ(KnownFaults(faults, observers),
+            (std::vector<std::string>{"f2", "f4", "f12", "f19-",
+                                      "travel_deviation"}));
 }
 
 TEST(CertaintyTest, AnEventKnowsTheFaultsOfItsSet) {
@@ -56,6 +73,10 @@ TEST(CertaintyTest, AnEventKnowsTheFaultsOfItsSet) {
   event.models = models;
   EXPECT_EQ(CertaintyOf(event), Certainty::kOneOf);
   EXPECT_EQ(LookAlikesOf(event), std::vector<std::string>{"f18"});
+  models->faults = {2, 5, 19};
+  models->observers = {{"f19 -0.50", 19, -0.5, {}}};
+  event.candidates = {{2, 1.0, 0.4, true}};
+  EXPECT_EQ(LookAlikesOf(event), std::vector<std::string>{"f19"});
 }
 
 TEST(CertaintyTest, OnTheBusTheCandidatesTellWhetherItIsTooEarly) {

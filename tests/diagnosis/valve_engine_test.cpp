@@ -354,6 +354,34 @@ TEST(ValveEngineTest, UnusableModelSetIsRefused) {
                DataError);
 }
 
+// An observer that predicts nearly what the normal one does, and errs more in its
+// own data, allows nearly everything: it can be the name, but not a sure one.
+TEST(ValveEngineTest, AFaultThatOnlyToleratesWhatIsSeenIsNeverSure) {
+  for (const bool explains : {true, false}) {
+    ModelSet models = tests::LinearPlant();
+    for (Observer& observer : models.observers) {
+      ChannelObserver& flow = observer.channels[1];
+      if (observer.fault == 6 && !explains) {
+        flow = tests::LinearModel(Signal::kF, -1.0, 104.0);
+        flow.residual_sd = 8.0;
+        flow.membership = {-100.0, -50.0, 50.0, 100.0};
+      }
+      flow.fit = observer.fault == 0 ? FitBounds{} : FitBounds{-3.0, 3.0, 9.0};
+    }
+    ValveEngine engine(std::make_shared<const ModelSet>(models));
+    StepRange(engine, 0, 50);
+    const Seen seen = StepRange(engine, 50, 150, FullF6);
+    EXPECT_EQ(FaultSetName(engine.models(), seen.last.isolated), "f6");
+    const double sure = explains ? 1.0 : 0.85;
+    EXPECT_DOUBLE_EQ(seen.last.fault_factors[2], sure);
+    for (const Transition& transition : seen.transitions) {
+      if (transition.kind == TransitionKind::kIsolated) {
+        EXPECT_DOUBLE_EQ(transition.factor, sure);
+      }
+    }
+  }
+}
+
 // f3 and f6 are told apart by the command: at 50 % they are the same. What is
 // not told apart is a set, and a set is narrowed once one of it is refuted.
 TEST(ValveEngineTest, WhatIsNotRefutedIsNamedOnceAllOthersAre) {

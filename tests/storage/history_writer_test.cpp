@@ -66,6 +66,32 @@ TEST_F(HistoryWriterTest, ViewHasTheNamesOfTheMonitorThatStartedLast) {
             "Travel blocked or Flow wrong");
 }
 
+TEST_F(HistoryWriterTest, WhatTheSetKnowsIsKeptWithItsSigns) {
+  auto models = std::make_shared<ModelSet>(*Event(Kind::kDetected, 0).models);
+  models->faults = {2, 5, 19};
+  models->observers.push_back({"f19 -0.50", 19, -0.5, {}});
+  HistoryWriter writer(path_);
+  for (const Kind kind : {Kind::kDetected, Kind::kIsolated}) {
+    FaultEvent event = Event(kind, 0, 0b001, 1.0);
+    event.models = models;
+    writer.Record(event, kDetected);
+  }
+  const auto shown = [&] { return HistoryReader(path_).Show("last"); };
+  EXPECT_THAT(shown().known, ElementsAre("f2", "f5", "f19-"));
+  EXPECT_THAT(LookAlikesOf(shown()), ElementsAre("f19"));
+  EXPECT_EQ(CertaintyOf(shown()), Certainty::kOneOf);
+
+  // As an earlier version has stored it.
+  {
+    Database database(path_, HistorySchema(), Access::kWriter);
+    Transaction transaction(database);
+    database.Run("UPDATE episode SET known = NULL");
+    transaction.Commit();
+  }
+  EXPECT_THAT(shown().known, ElementsAre("f2", "f5", "f19"));
+  EXPECT_EQ(CertaintyOf(shown()), Certainty::kSure);
+}
+
 TEST_F(HistoryWriterTest, WhatEndedBeforeItHadANameIsNotUnlikeAnyFault) {
   HistoryWriter writer(path_);
   writer.BeginSession(kDetected, "test", "", {{"unknown", "Unlike any"}});

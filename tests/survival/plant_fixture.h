@@ -147,7 +147,8 @@ class PlantFixture : public HistoryFixture {
                "episode_id, valve_id, source_id, detected_ns, isolated_ns, "
                "cleared_ns, ended_ns, end_reason, fault, fault_bits, "
                "peak_factor, strength, unknown_kind, layer, model_set, "
-               "model_hash, flow_unit, channels, faults, label, acked_by, "
+               "model_hash, flow_unit, channels, faults, known, label, "
+               "acked_by, "
                "acked_ns, session_id",
                "episode_id"},
           {"episode_fault",
