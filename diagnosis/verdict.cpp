@@ -93,6 +93,19 @@ std::string SecondValue(const SecondFault& second, std::string names) {
                               : std::move(names);
 }
 
+SecondFault ParseSecond(std::string_view value,
+                        const std::vector<std::string>& faults) {
+  SecondFault second;
+  second.open = !value.empty() && value != "none";
+  const std::string names = "|" + std::string(value) + "|";
+  for (std::size_t bit = 0; bit < faults.size(); ++bit) {
+    if (second.open && names.find("|" + faults[bit] + "|") != names.npos) {
+      second.faults |= FaultSet{1} << bit;
+    }
+  }
+  return second;
+}
+
 std::string_view EndReasonName(EndReason reason) {
   return NameOf(reason, std::array<std::string_view, 7>{
                             "", "cleared", "stream_ended", "stale_timeout",

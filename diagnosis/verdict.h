@@ -6,6 +6,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "diagnosis/model_set.h"
 #include "diagnosis/severity.h"
@@ -137,6 +138,9 @@ std::string DriftValue(const SlowDrift& drift);
 /// The value of TransitionKind::kSecond: `names`, those of second.faults, or
 /// "unknown", or "none" where it is over.
 std::string SecondValue(const SecondFault& second, std::string names);
+/// The inverse. @param faults names, by bit; others are left out.
+SecondFault ParseSecond(std::string_view value,
+                        const std::vector<std::string>& faults);
 
 /// A transition of an episode.
 struct Transition {

@@ -58,6 +58,7 @@ OpenEpisode OpenEpisodeOf(const FaultEvent& event) {
   episode.isolated = transition.faults != 0;
   episode.layer = transition.layer;
   episode.severity = transition.severity;
+  episode.second = transition.second;
   episode.model_set = event.model_set;
   episode.model_version = event.model_version;
   episode.model_hash = event.model_hash;

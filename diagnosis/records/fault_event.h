@@ -81,6 +81,7 @@ struct OpenEpisode {
   bool isolated{false};
   Layer layer{Layer::kObservers};    ///< What named them.
   std::optional<Severity> severity;  ///< As last stored.
+  SecondFault second;                ///< What was on top of them.
   std::string model_set;
   int model_version{0};
   std::uint64_t model_hash{0};

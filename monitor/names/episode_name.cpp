@@ -111,6 +111,9 @@ void EpisodeName::FollowSecond(const Inputs& inputs) {
   if ((now_.faults & second.standing) == 0) {
     second = {};
   }
+  if (now_.source == NameSource::kRestart && inherited_ && !second.open) {
+    second = inherited_->second;  // It stands as long as that name does.
+  }
   if (second.open && inputs.on_top) {
     second.faults = SetOf(inputs.on_top->faults);
     second.strength = second.faults != 0
@@ -127,6 +130,7 @@ void EpisodeName::Begin() {
   const std::optional<OpenEpisode> inherited = std::move(inherited_);
   Reset();
   inherited_ = inherited;
+  second_ = inherited_ ? inherited_->second : SecondFault{};
   open_ = true;
   named_ = inherited_ && inherited_->isolated;
 }
@@ -137,7 +141,7 @@ EpisodeName::Choice EpisodeName::Choose(const Inputs& inputs) {
   if ((now_.faults & second.standing) != 0) {
     return {now_.faults, Unknown::kNone, now_.source, now_.layer};
   }
-  if (inputs.look) {
+  if (inputs.look && !TakesTwoForOne(SetOf(inputs.look->faults))) {
     inherited_.reset();
     const FaultSet faults = SetOf(inputs.look->faults);
     return {faults,
@@ -179,7 +183,18 @@ bool EpisodeName::InheritedStands(const Inputs& inputs) const {
   }
   const FaultSet observed = inputs.engine.isolated;
   const bool finding = observed != 0 && (observed & ~findings_) == 0;
-  return observed == 0 || (finding && (inherited_->faults & ~findings_) != 0);
+  return observed == 0 || (finding && (inherited_->faults & ~findings_) != 0) ||
+         TakesTwoForOne(observed);
+}
+
+// What came on top has to be found anew, and until then both faults together
+// may look like a third one, or like none.
+bool EpisodeName::TakesTwoForOne(FaultSet faults) const {
+  if (!inherited_ || !inherited_->second.open) {
+    return false;
+  }
+  const FaultSet both = inherited_->faults | inherited_->second.faults;
+  return faults == 0 || (faults & ~both) != 0;
 }
 
 void EpisodeName::Rename(const Choice& choice, const Inputs& inputs) {

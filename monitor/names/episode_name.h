@@ -53,7 +53,8 @@ struct EpisodeNow {
 /// 1. a second look whose answer counts (simulator::LookBook);
 /// 2. the name that an earlier session or the leader of a pair gave: one by a
 ///    look until a look of this session has an answer; another one until the
-///    observers name a fault, for which the floor is not enough;
+///    observers name a fault, for which the floor is not enough; with a second
+///    fault on top, both until one of the two is named;
 /// 3. the observers, with their memory, and the floor until they have a name.
 ///
 /// The engine is an input and never changed: its transitions that name a fault
@@ -121,6 +122,7 @@ class EpisodeName {
   Choice Choose(const Inputs& inputs);
   Choice OfObservers(const Inputs& inputs) const;
   bool InheritedStands(const Inputs& inputs) const;
+  bool TakesTwoForOne(FaultSet faults) const;
   void FollowLook(const Inputs& inputs);
   void FollowSecond(const Inputs& inputs);
   void Rename(const Choice& choice, const Inputs& inputs);

@@ -125,8 +125,11 @@ void EpisodeNames::FollowStrengths(const Verdict& engine) {
   const bool by_look = now.source == NameSource::kLook ||
                        (now.source == NameSource::kRestart && looks_ &&
                         now.layer == Layer::kPhysics);
-  const StrengthDue due =
-      strengths_.Step(engine, now.faults, engine.detected && !by_look);
+  // An estimate of a fault that the observers do not name says nothing.
+  const bool unseen =
+      now.source == NameSource::kRestart && (engine.isolated & now.faults) == 0;
+  const StrengthDue due = strengths_.Step(
+      engine, now.faults, engine.detected && !by_look && !unseen);
   if (by_look && due == StrengthDue::kPoint) {
     RequestGrowth();
   } else if (!by_look && due != StrengthDue::kNothing) {

@@ -418,7 +418,9 @@ std::optional<LookTask> EpisodeLooks::RoutineTask(bool suspected) const {
   task.window.at_position = at_position_;
   task.slowness = slowness_;
   for (const Row& row : rows_) {
-    task.window.rows.push_back(row.row);
+    RecordRow& compared = task.window.rows.emplace_back(row.row);
+    compared.x_measured = compared.x_measured && row.covered;
+    compared.flow_measured = compared.flow_measured && row.covered;
   }
   if (MeasuredRows(task.window) < kRoutineMeasured) {
     return std::nullopt;
@@ -522,7 +524,9 @@ std::optional<LookTask> EpisodeLooks::Step(const Sample& sample,
   }
   // If there are not more rows than were judged before, AddRow() has begun
   // anew, and so does the count: all rows of a routine look have been judged.
-  const bool judged = verdict.quality == Quality::kLive &&
+  rows_.back().covered = verdict.quality == Quality::kLive;
+  const bool judged = (verdict.quality == Quality::kLive ||
+                       verdict.quality == Quality::kUncovered) &&
                       (!detection_ns_ || suspected) &&
                       rows_.size() > std::min(judged_, kMaxRows - 1);
   judged_ = judged ? judged_ + 1 : 0;

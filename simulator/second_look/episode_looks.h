@@ -147,10 +147,11 @@ inline constexpr std::int64_t kRoutineDelayNs = 60'000'000'000;
 /// should look at an episode that is open: 20 (early), 40, 150 and 300 s after
 /// its detection, then at twice the age each time. While there is none, or
 /// one that a routine look opened, a routine look is due every 300 s, at the
-/// same stamps whenever a program was started. What comes on top of the fault
-/// of an episode is looked at 40, 150 and 300 s after it was detected, with
-/// that fault as it stood before. All of these are longer by SlownessOf() the
-/// period. Keeps the last 420 samples.
+/// same stamps whenever a program was started; it does not compare what lies
+/// outside the commands and pressures that the set was taught. What comes on
+/// top of the fault of an episode is looked at 40, 150 and 300 s after it was
+/// detected, with that fault as it stood before. All of these are longer by
+/// SlownessOf() the period. Keeps the last 420 samples.
 class EpisodeLooks {
  public:
   /// `physics` must outlive it.
@@ -170,6 +171,7 @@ class EpisodeLooks {
   struct Row {
     std::int64_t stamp_ns;
     RecordRow row;
+    bool covered{false};  // Where the model set was taught.
   };
 
   void AddRow(const Sample& sample);
@@ -196,7 +198,7 @@ class EpisodeLooks {
   bool by_routine_{false};         // The open episode.
   std::int64_t second_ns_{0};      // Detection of what is on top.
   std::int64_t second_age_ns_{0};  // Of the next look at it.
-  std::size_t judged_{0};  // Rows in a row that a routine look may have.
+  std::size_t judged_{0};  // Rows in a row that a routine look may hold.
   std::int64_t slot_{0};   // Of a routine look.
 };
 

@@ -308,6 +308,7 @@ OpenEpisode ReadOpen(const Statement& row) {
   }
   episode.candidates = IsolatedCandidates(isolated, factor, strength);
   episode.severity = ReadSeverity(row, 13);
+  episode.second = ParseSecond(row.Text(14), names);
   SplitModelSet(model_set, episode.model_set, episode.model_version);
   return episode;
 }

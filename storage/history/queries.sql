@@ -166,7 +166,10 @@ SELECT episode_id, valve_id, source_id, detected_ns,
     (SELECT stamp_ns FROM accumulator a
      WHERE a.valve_id = e.valve_id AND a.source_id = e.source_id), 0)),
   fault_bits, isolated_ns IS NOT NULL, layer, model_set, model_hash, faults,
-  peak_factor, strength, priority
+  peak_factor, strength, priority,
+  (SELECT s.value FROM episode_event s
+   WHERE s.episode_id = e.episode_id AND s.kind = 'SECOND'
+   ORDER BY s.stamp_ns DESC LIMIT 1)
 FROM episode e WHERE ended_ns IS NULL ORDER BY detected_ns, valve_id
 -- The columns make an EndedEpisode; beside max() they are of the same row.
 -- name: last_ends

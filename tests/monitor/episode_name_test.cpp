@@ -193,6 +193,38 @@ TEST_F(EpisodeNameTest, AnInheritedNameStandsUntilTheObserversNameAFault) {
   EXPECT_EQ(last_.kind, Kind::kReisolated);
 }
 
+TEST_F(EpisodeNameTest, WhatIsOnTopOfAnInheritedNameStandsAsLongAsThat) {
+  OpenEpisode left = Left(kF7);
+  left.second.open = true;
+  left.second.faults = kF1;
+  name_.Inherit(&left);
+  EXPECT_EQ(Step(0, {Kind::kDetected}).second.faults, kF1);
+  EXPECT_EQ(Step(0).second.faults, kF1);
+  EXPECT_THAT(kinds_, ElementsAre(Kind::kDetected)) << "it was announced";
+
+  EXPECT_FALSE(Step(kF7, {Kind::kIsolated}).second.open);
+  EXPECT_THAT(kinds_, ElementsAre(Kind::kDetected, Kind::kSecond));
+  EXPECT_FALSE(last_.second.open);
+  EXPECT_EQ(last_.faults, kF7);
+}
+
+TEST_F(EpisodeNameTest, TwoInheritedFaultsAreNotRenamedAsAThird) {
+  OpenEpisode left = Left(kF7);
+  left.second.open = true;  // Its name is not known.
+  name_.Inherit(&left);
+  Step(0, {Kind::kDetected});
+  EXPECT_EQ(Step(kF1, {Kind::kIsolated}).isolated, kF7);
+  for (const std::vector<NamedFault>& faults :
+       {std::vector<NamedFault>{{0, {0.1, 0.0, 0.2}}}, {}}) {
+    look_ = EpisodeName::Look{faults, faults.empty()};
+    EXPECT_EQ(Step(kF1).isolated, kF7);
+    EXPECT_TRUE(name_.verdict().second.open);
+  }
+  look_ = EpisodeName::Look{{{1, {0.5, 0.4, 0.6}}}, false};
+  EXPECT_EQ(Step(kF1).isolated, kF7);
+  EXPECT_FALSE(name_.verdict().second.open);
+}
+
 TEST_F(EpisodeNameTest, AnInheritedNameEndsTheEpisodeIfNothingReplacesIt) {
   const OpenEpisode left = Left(kF7);
   for (const bool outside : {false, true}) {

@@ -1107,6 +1107,8 @@ class RoutineLookTest : public ::testing::Test {
     }
     if (const auto task = looks_.Step(sample, verdict)) {
       due_.emplace_back(count_, task->occasion);
+      compared_.push_back(
+          std::ranges::count_if(task->window.rows, &RecordRow::x_measured));
       looks_.Enter(*task, TakeLook(Physics(), *task).value());
     }
     ++count_;
@@ -1118,6 +1120,7 @@ class RoutineLookTest : public ::testing::Test {
   std::int64_t detection_ns_{0};
   bool open_{false};
   std::vector<std::pair<std::int64_t, LookOccasion>> due_;
+  std::vector<std::ptrdiff_t> compared_;  // Positions of the window.
   std::vector<std::int64_t> opened_;
   std::vector<std::int64_t> cleared_;
 };
@@ -1149,11 +1152,30 @@ TEST_F(RoutineLookTest, FindsNothingInAHealthyValve) {
 TEST_F(RoutineLookTest, TakesOnlyWindowsThatAreJudgedThroughout) {
   const std::vector<RecordRow> rows = Recording(1000, 4, {});
   for (std::size_t k = 0; k < rows.size(); ++k) {
-    quality_ = k == 300 ? Quality::kUncovered : Quality::kLive;
+    quality_ = k == 300 ? Quality::kInhibited : Quality::kLive;
     Step(rows[k]);
   }
   ASSERT_EQ(due_.size(), 1U);
   EXPECT_EQ(due_[0].first, 900);  // 420 rows since.
+}
+
+// Else a valve that passes the end of its range now and then would have none.
+TEST_F(RoutineLookTest, DoesNotCompareWhatIsOutsideTheTaughtRange) {
+  const std::vector<RecordRow> rows = Recording(1000, 4, {});
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    RecordRow row = rows[k];
+    const bool outside = k % 10 == 0 && k >= 700;
+    row.x_pct += outside ? 30.0 : 0.0;
+    quality_ = outside ? Quality::kUncovered : Quality::kLive;
+    Step(row);
+  }
+  EXPECT_EQ(compared_, (std::vector<std::ptrdiff_t>{420, 399}));
+  EXPECT_EQ(due_.back().first, 900);
+  EXPECT_TRUE(opened_.empty());
+
+  quality_ = Quality::kUncovered;  // Parked for a while: too little is left.
+  Feed(Recording(600, 5, {}));
+  EXPECT_EQ(due_.size(), 2U);
 }
 
 TEST(SuspicionTest, TakesTwoLooksInARowThatNameTheSameFault) {

@@ -457,11 +457,16 @@ TEST_F(GrowingAlarmTest, ASecondFaultHasToBeAcknowledgedAndItsEndHasNot) {
   };
   EXPECT_EQ(latest(), "SECOND f19");
   EXPECT_EQ(Shown().second, "f19");
+  const auto left = [this] { return writer_.OpenEpisodes().at(0).second; };
+  EXPECT_TRUE(left().open);
+  EXPECT_EQ(left().faults, event.transition.faults);
   event.transition.stamp_ns += kSecond;
   event.transition.second.faults = 0;
   EXPECT_TRUE(writer_.Record(event, kDetected + 7201 * kSecond));
   EXPECT_EQ(latest(), "SECOND unknown");
   EXPECT_EQ(Shown().second, "unknown");
+  EXPECT_TRUE(left().open);
+  EXPECT_EQ(left().faults, 0U);
   EXPECT_EQ(writer_.UnsentEvents().back().transition.kind, Kind::kSecond);
   EXPECT_EQ(OnTheBus(Kind::kSecond), Kind::kReisolated);
   editor_.Acknowledge("last", By("anna", kDetected + 7201 * kSecond));
@@ -470,6 +475,7 @@ TEST_F(GrowingAlarmTest, ASecondFaultHasToBeAcknowledgedAndItsEndHasNot) {
   EXPECT_TRUE(writer_.Record(event, kDetected + 7202 * kSecond));
   EXPECT_EQ(latest(), "SECOND none");
   EXPECT_EQ(Shown().second, std::nullopt);
+  EXPECT_FALSE(left().open);
   EXPECT_EQ(Shown().acked_by, "anna");
 }
 
