@@ -185,7 +185,7 @@ EpisodeLook LookOf(std::uint64_t episode_id, const PlantRows& header,
   }
   for (int r = 0; r < faults.size(); ++r) {
     LookFault& f = look.faults.emplace_back();
-    f.fault = RequireFault(faults.Text(r, 0).value_or(""));
+    f.fault = RequireFinding(faults.Text(r, 0).value_or(""));
     ParseColumn("strength", faults.Text(r, 1), f.strength);
     ParseColumn("lowest", faults.Text(r, 2), f.lowest);
     ParseColumn("highest", faults.Text(r, 3), f.highest);
@@ -373,7 +373,7 @@ std::vector<StrengthPoint> PlantReader::Strengths(std::uint64_t episode_id) {
   return Judged<StrengthPoint>("strength", rows, [&](int r) {
     StrengthPoint p;
     p.episode_id = episode_id;
-    p.fault = RequireFault(rows.Text(r, 0).value_or(""));
+    p.fault = RequireFinding(rows.Text(r, 0).value_or(""));
     ParseColumn("stamp_ns", rows.Text(r, 1), p.stamp_ns);
     ParseColumn("strength", rows.Text(r, 2), p.strength);
     ParseColumn("lowest", rows.Text(r, 3), p.lowest);

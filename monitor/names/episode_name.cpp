@@ -188,13 +188,12 @@ bool EpisodeName::InheritedStands(const Inputs& inputs) const {
 }
 
 // What came on top has to be found anew, and until then both faults together
-// may look like a third one, or like none.
+// may look like either of them, at another strength, like a third one or none.
 bool EpisodeName::TakesTwoForOne(FaultSet faults) const {
   if (!inherited_ || !inherited_->second.open) {
     return false;
   }
-  const FaultSet both = inherited_->faults | inherited_->second.faults;
-  return faults == 0 || (faults & ~both) != 0;
+  return faults == 0 || (faults & ~inherited_->faults) != 0;
 }
 
 void EpisodeName::Rename(const Choice& choice, const Inputs& inputs) {

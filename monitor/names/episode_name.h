@@ -54,7 +54,7 @@ struct EpisodeNow {
 /// 2. the name that an earlier session or the leader of a pair gave: one by a
 ///    look until a look of this session has an answer; another one until the
 ///    observers name a fault, for which the floor is not enough; with a second
-///    fault on top, both until one of the two is named;
+///    fault on top, both until the first one is named by itself;
 /// 3. the observers, with their memory, and the floor until they have a name.
 ///
 /// The engine is an input and never changed: its transitions that name a fault

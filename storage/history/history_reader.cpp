@@ -41,7 +41,7 @@ bool IsUnacked(EpisodeState state) {
 }
 
 std::string FaultOf(const EpisodeFilter& filter) {
-  return HasFaultFilter(filter) ? FaultName(RequireFault(filter.fault))
+  return HasFaultFilter(filter) ? FaultName(RequireFinding(filter.fault))
                                 : filter.fault;
 }
 

@@ -50,7 +50,7 @@ std::optional<EpisodeLook> HistoryReader::Look(std::uint64_t episode_id) {
   faults.Bind(id);
   while (faults.Step()) {
     LookFault& f = look.faults.emplace_back();
-    const std::optional<int> fault = ParseFault(faults.Text(0));
+    const std::optional<int> fault = ParseFinding(faults.Text(0));
     if (!fault) {
       throw DataError("second look at " + id + ": no fault is called " +
                       faults.Text(0));

@@ -49,7 +49,7 @@ std::vector<StrengthPoint> HistoryReader::Strengths(std::uint64_t episode_id) {
   rows.Bind(id);
   std::vector<StrengthPoint> points;
   while (rows.Step()) {
-    const std::optional<int> fault = ParseFault(rows.Text(0));
+    const std::optional<int> fault = ParseFinding(rows.Text(0));
     if (!fault) {
       throw DataError("strengths of " + id + ": no fault is called " +
                       rows.Text(0));
@@ -67,7 +67,7 @@ std::vector<Growth> GrowthOf(const Episode& episode,
                              const std::vector<StrengthPoint>& strengths) {
   std::vector<Growth> growths;
   for (const std::string& name : SplitNames(episode.fault.value_or(""))) {
-    if (const std::optional<int> fault = ParseFault(name)) {
+    if (const std::optional<int> fault = ParseFinding(name)) {
       if (const auto growth = fdi::GrowthOf(strengths, *fault)) {
         growths.push_back(*growth);
       }

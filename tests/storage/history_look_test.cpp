@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
+#include "diagnosis/fault_catalogue.h"
 #include "tests/storage/history_fixture.h"
 
 namespace fdi::storage {
@@ -15,7 +16,8 @@ class HistoryLookTest : public HistoryFixture {
     look.period_ns = kSecond;
     look.misfit = misfit;
     look.faults = {{19, -0.25, -0.3, -0.2, kDetected, false},
-                   {7, 0.5, 0.4, 0.6, kDetected - kSecond, true}};
+                   {7, 0.5, 0.4, 0.6, kDetected - kSecond, true},
+                   {kFirstFinding, 0.5, 0.4, 0.6, kDetected, false}};
     look.x_pct = {50.0, 50.25, 51.0, 52.0};
     look.flow = {20.0, 20.125, 21.0, 22.0};
     return look;

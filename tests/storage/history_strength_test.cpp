@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
+#include "diagnosis/fault_catalogue.h"
 #include "storage/history/strength.h"
 #include "tests/storage/history_fixture.h"
 
@@ -26,7 +27,9 @@ TEST_F(HistoryStrengthTest, PointsAreReadByTimeAsTheyWereStored) {
   StrengthPoint observed = Strength(0, 19, -0.25);
   observed.layer = Layer::kObservers;
   const std::vector<StrengthPoint> points = {observed, Strength(0, 7, 0.125),
-                                             Strength(1, 7, 0.25)};
+                                             Strength(1, 7, 0.25),
+                                             Strength(2, kFirstFinding, 0.5)};
+  writer.StoreStrength(points[3]);
   writer.StoreStrength(points[2]);
   writer.StoreStrength(Strength(0, 7, 0.5));
   writer.StoreStrength(points[1]);  // Instead of it.

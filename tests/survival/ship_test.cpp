@@ -14,6 +14,7 @@
 #include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
 
+#include "diagnosis/fault_catalogue.h"
 #include "plant/plant_reader.h"
 #include "storage/history/history_reader.h"
 #include "storage/history/retention.h"
@@ -619,10 +620,14 @@ TEST_F(ShipTest, TheVerbsReadThePlant) {
     EpisodeLook look;
     look.episode_id = Id("LV-1");
     look.period_ns = kSecond;
-    look.faults = {{1, 0.5, 0.4, 0.6, kDetected, false}};
+    constexpr int kFinding = kLastFinding;  // A look may name one, too.
+    look.faults = {{1, 0.5, 0.4, 0.6, kDetected, false},
+                   {kFinding, 0.5, 0.4, 0.6, kDetected, false}};
     look.x_pct = {1.0};
     look.flow = {2.0};
     writer.StoreLook(look);
+    writer.StoreStrength(
+        {Id("LV-1"), kDetected, kFinding, 0.5, 0.4, 0.6, Layer::kPhysics});
     for (const int hour : {0, 1, 2}) {
       writer.StoreStrength({Id("LV-1"), kDetected + hour * 3600 * kSecond, 1,
                             0.1 * hour, 0.1 * hour - 0.01, 0.1 * hour + 0.01,
@@ -672,13 +677,14 @@ TEST_F(ShipTest, TheVerbsReadThePlant) {
   for (const char* filter :
        {"", "--limit 7", "--valve V0042", "--valve 'V00[0-4]*'",
         "--valve 'LV-?'", "--valve 'LV-*'", "--fault f7", "--fault unknown",
-        "--fault f1 --valve 'V*'", "--state open", "--state unacked",
-        "--state rtn_unack", "--state shelved", "--state isolated --limit 3",
-        "--since 2026-01-01 --utc"}) {
+        "--fault low_flow", "--fault f1 --valve 'V*'", "--state open",
+        "--state unacked", "--state rtn_unack", "--state shelved",
+        "--state isolated --limit 3", "--since 2026-01-01 --utc"}) {
     same(std::string("history list ") + filter);
     same(std::string("history stats --until 2026-11-21 --utc ") + filter);
   }
   same("history show last");
+  same("history show " + EpisodeIdText(Id("LV-1")));
   same("history show aaaa00000000012");
   same("history show aaaa");
   same("history show nothing");
@@ -1048,6 +1054,13 @@ TEST_F(ShipTest, AnUpgradeMovesBadRowsAside) {
   Init();
   HistoryWriter writer(Folder("a") / "history.db");
   RecordEpisode(writer, 0b01);
+  {  // As an earlier version has stored it.
+    Database history(Folder("a") / "history.db", HistorySchema(),
+                     Access::kWriter);
+    Transaction transaction(history);
+    history.Run("UPDATE episode SET known = NULL");
+    transaction.Commit();
+  }
   ASSERT_EQ(Ship("a").code, 0);
   PlantDatabase owner(Url());
   owner.RunScript(kLiftChecks);
@@ -1055,6 +1068,7 @@ TEST_F(ShipTest, AnUpgradeMovesBadRowsAside) {
   owner.RunScript(
       "DELETE FROM fdi.episode_strength;"
       "ALTER TABLE fdi.shelf DROP COLUMN planned_ns;"
+      "ALTER TABLE fdi.episode DROP COLUMN known;"
       "DROP FUNCTION fdi.is_stamp, fdi.is_finite; DROP TABLE fdi.unsound;"
       "DROP INDEX fdi.data_gap_once, fdi.shelf_once;"
       "ALTER TABLE fdi.data_gap ADD PRIMARY KEY (gap_id, monitor_id);"
