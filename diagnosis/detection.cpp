@@ -79,7 +79,8 @@ void Detection::Count(std::size_t test, bool beyond, std::int64_t stamp_ns) {
 }
 
 bool Detection::pending() const {
-  return std::ranges::any_of(runs_,
+  const std::size_t tests = models_->channels.size() * kTestsPerChannel;
+  return std::ranges::any_of(std::span(runs_).first(tests),
                              [](const Run& run) { return run.length > 0; });
 }
 

@@ -26,7 +26,8 @@ namespace {
 
 // Pa, mbar, bar and MPa in kPa, and a decimal point in another place.
 constexpr std::array kPressureFactors{0.001, 0.01, 0.1, 10.0, 100.0, 1000.0};
-constexpr double kFarOff = 3.0;  // from the usual readings, as a factor
+constexpr double kFarOff = 3.0;    // from the usual readings, as a factor
+constexpr double kFlowLost = 0.5;  // of the flow before
 constexpr double kZeroCelsiusK = 273.15;
 constexpr double kFullTravel = 100.0;  // [%]
 
@@ -157,6 +158,7 @@ class ValveEngine::Impl {
 
  private:
   void ClearVerdict();
+  Intake CheckSample(const Sample& measured, bool begins);
   void TakeSource(const Sample& sample);
   void Reject(Intake intake);
   void Initialise(const Sample& sample);
@@ -174,6 +176,8 @@ class ValveEngine::Impl {
   NameBeside beside_;
   bool has_source_{false};
   bool needs_initialisation_{true};
+  bool lost_pressure_{false};  // what looks like another unit is none
+  double flow_before_{0.0};
   std::int64_t stamp_ns_{0};  // of the last sample in order
   SignalMask present_{0};
   int uncertain_{0};  // samples in a row of which no channel was measured
@@ -207,8 +211,7 @@ const Verdict& ValveEngine::Impl::Step(const Sample& measured) {
     return verdict_;
   }
   const Intake values =
-      CheckValues(models(), diagnosis_->plan->required(), measured,
-                  episode_open(), needs_initialisation_ || placement.gap);
+      CheckSample(measured, needs_initialisation_ || placement.gap);
   if (values != Intake::kAccepted) {
     Reject(values);
     return verdict_;
@@ -244,6 +247,28 @@ const Verdict& ValveEngine::Impl::Step(const Sample& measured) {
   return verdict_;
 }
 
+// A pump that stops may leave a tenth of the pressure, as another unit would,
+// but takes the flow with it at that sample.
+Intake ValveEngine::Impl::CheckSample(const Sample& measured, bool begins) {
+  const auto check = [&](bool any_pressure) {
+    return CheckValues(models(), diagnosis_->plan->required(), measured,
+                       any_pressure, begins);
+  };
+  Intake values = check(episode_open());
+  if (values != Intake::kUnit) {
+    lost_pressure_ = lost_pressure_ && episode_open();
+  } else if (lost_pressure_ ||
+             (!begins && measured.Has(Signal::kF) &&
+              measured[Signal::kF] < kFlowLost * flow_before_)) {
+    values = check(true);
+    lost_pressure_ = true;
+  }
+  if (values == Intake::kAccepted) {
+    flow_before_ = measured.Has(Signal::kF) ? measured[Signal::kF] : 0.0;
+  }
+  return values;
+}
+
 // What was known of another source says nothing about this one; a snapshot
 // restored before the first source does.
 void ValveEngine::Impl::TakeSource(const Sample& sample) {
@@ -258,6 +283,7 @@ void ValveEngine::Impl::TakeSource(const Sample& sample) {
   }
   has_source_ = true;
   needs_initialisation_ = true;
+  lost_pressure_ = false;
 }
 
 void ValveEngine::Impl::Reject(Intake intake) {

@@ -184,6 +184,28 @@ TEST(ValveEngineIntakeTest, APressureInAnotherUnitIsRefused) {
   }
 }
 
+// A pump that stops leaves a tenth of the pressure for once, and no flow.
+TEST(ValveEngineIntakeTest, APressureThatFallsWithTheFlowIsNoOtherUnit) {
+  ModelSet models = tests::LinearPlant();
+  models.channels.push_back({"P1", Signal::kP1, -50.0, 50.0});
+  for (Observer& observer : models.observers) {
+    observer.channels.push_back(tests::LinearModel(Signal::kP1, 0.0, 3500.0));
+    observer.channels.back().model.output_max = 4000.0;
+  }
+  models.validity.p1 = {3200.0, 3800.0};
+  for (const bool flows : {true, false}) {
+    ValveEngine engine(std::make_shared<const ModelSet>(models));
+    const Seen seen = StepRange(engine, 0, 100, [&](Sample& sample) {
+      sample.Set(Signal::kP1, sample.seq < 50 ? 3500.0 : 350.0);
+      if (sample.seq >= 50 && !flows) {
+        sample.Set(Signal::kF, 0.0);
+      }
+    });
+    EXPECT_EQ(seen.last.intake, flows ? Intake::kUnit : Intake::kAccepted);
+    EXPECT_EQ(seen.last.detected, !flows);
+  }
+}
+
 // A pressure that falls passes a tenth of the usual one: no reason to stop.
 TEST(ValveEngineIntakeTest, InAnEpisodeAPressureIsJudgedAsItIs) {
   ModelSet models = tests::LinearPlant();
