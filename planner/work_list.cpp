@@ -96,7 +96,8 @@ std::string TrendText(const LimitTrend& trend) {
          ForecastText(trend.forecast);
 }
 
-// "Dead band of the valve: 1.40 over the last day, accepted up to 1.00"
+// "Dead band of the valve: 1.40 % of travel over the last day, accepted up to
+// 1.00"
 std::string FigureText(const FigureReason& reason) {
   const report::FigureText& text = reason.text;
   if (!reason.worse.empty()) {
@@ -106,6 +107,7 @@ std::string FigureText(const FigureReason& reason) {
   }
   const bool low = text.lowest && reason.value < *text.lowest;
   return text.name + ": " + report::FormatNumber(reason.value, 2) +
+         (text.unit.empty() ? "" : " " + text.unit) +
          " over the last day, accepted " +
          (low ? "from " + report::FormatNumber(*text.lowest, 2)
               : "up to " + report::FormatNumber(*text.highest, 2));
@@ -412,7 +414,9 @@ std::string RowText(const WorkRow& row) {
   }
   if (work.service_hours > 0.0) {
     text += "\n   " + report::FormatNumber(work.travel_strokes, 0) +
-            " strokes in " + report::FormatNumber(work.service_hours, 0) +
+            " strokes in " +
+            report::FormatNumber(work.service_hours,
+                                 work.service_hours < 10.0 ? 1 : 0) +
             " h, " + report::FormatNumber(100.0 * work.live_share, 0) +
             " % of it judged";
   }

@@ -84,6 +84,7 @@ void ReadWords(TomlReader& table, Entry& text) {
 
 void ReadFigure(TomlReader& table, FigureText& text) {
   ReadWords(table, text);
+  text.unit = table.Text("unit").value_or(text.unit);
   for (auto [key, limit] : {std::pair("lowest", &text.lowest),
                             std::pair("highest", &text.highest)}) {
     if (const auto value = table.Number(key)) {
@@ -272,6 +273,7 @@ Json FaultTextsJson(const FaultTexts& texts) {
     figures.push_back(
         {{"figure", std::string(loop::FigureName(figure))},
          {"name", text.name},
+         {"unit", text.unit},
          {"check", text.check},
          {"discipline", std::string(DisciplineName(text.discipline))},
          {"namur", std::string(NamurName(text.namur))},

@@ -50,6 +50,7 @@ struct FaultText {
 /// somebody.
 struct FigureText {
   std::string name;
+  std::string unit;  ///< "% of travel"; empty: none.
   std::string check;
   Discipline discipline{Discipline::kInstrument};
   NamurClass namur{NamurClass::kMaintenanceRequired};

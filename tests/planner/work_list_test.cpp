@@ -240,8 +240,8 @@ TEST_F(ReadWorkTest, AFigureBeyondItsLimitIsAReason) {
 
   ASSERT_EQ(rows.size(), 1u);
   EXPECT_EQ(rows[0].why,
-            "Dead band of the valve: 1.40 over the last day, accepted up to "
-            "1.00");
+            "Dead band of the valve: 1.40 % of travel over the last day, "
+            "accepted up to 1.00");
   const auto json = WorkListReport(rows).document["rows"][0];
   EXPECT_EQ(json["namur"], "maintenance required");
   EXPECT_EQ(json["discipline"], "mechanical");
