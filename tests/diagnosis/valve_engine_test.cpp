@@ -354,8 +354,8 @@ TEST(ValveEngineTest, UnusableModelSetIsRefused) {
                DataError);
 }
 
-// An observer that predicts nearly what the normal one does, and errs more in its
-// own data, allows nearly everything: it can be the name, but not a sure one.
+// An observer that predicts nearly what the normal one does, and errs more in
+// its own data, allows nearly everything: it may be the name, but not sure.
 TEST(ValveEngineTest, AFaultThatOnlyToleratesWhatIsSeenIsNeverSure) {
   for (const bool explains : {true, false}) {
     ModelSet models = tests::LinearPlant();
