@@ -116,6 +116,7 @@ void FaultBank::Update(const ObserverBank& bank) {
   trained_.Gather(bank);
   for (StrengthTracker& tracker : trackers_) {
     tracker.Step(bank);
+    tracker.JudgeAccount(bank, trained_);
     if (plan_->judges_fit()) {
       tracker.PushFit(bank, trained_, (odd_ & tracker.path().moved) != 0);
     }

@@ -327,11 +327,8 @@ void StrengthTracker::ClampEstimate() {
 
 void StrengthTracker::UpdateFactor(const ObserverBank& bank) {
   factor_ = 1.0;
-  accounts_ = false;
-  double furthest = 0.0;
-  const bool early = age_ <= plan_->models().decision.isolation_samples;
   const PathPlace place = path_->PlaceOf(strength_);
-  for (std::size_t c = 0; c < channels_ && (early || factor_ > 0.0); ++c) {
+  for (std::size_t c = 0; c < channels_ && factor_ > 0.0; ++c) {
     if (!bank.active(static_cast<int>(c))) {
       continue;
     }
@@ -344,12 +341,37 @@ void StrengthTracker::UpdateFactor(const ObserverBank& bank) {
     // The trapezoid is that of residuals with deviation σ; these have √S.
     const double shrunk = p.residual * nearest.sd / std::sqrt(p.variance);
     factor_ = std::min(factor_, nearest.membership(shrunk));
+  }
+}
+
+PathPlace StrengthTracker::PlaceOfBest(const ObserverEvidence& trained) const {
+  const StrengthPath::Node& best = BestNode(trained);
+  const bool is_trained = trained.total(best.observer) >= total_;
+  return path_->PlaceOf(is_trained ? best.strength : strength_);
+}
+
+void StrengthTracker::JudgeAccount(const ObserverBank& bank,
+                                   const ObserverEvidence& trained) {
+  if (age_ > plan_->models().decision.isolation_samples) {
+    return;
+  }
+  accounts_ = false;
+  double furthest = 0.0;
+  const PathPlace place = PlaceOfBest(trained);
+  for (std::size_t c = 0; c < channels_; ++c) {
+    const auto channel = static_cast<int>(c);
     // The first node is normal operation.
-    const double normal = std::abs(bank.residual(0, static_cast<int>(c)));
-    if (normal > furthest * path_->points[c].sd) {
-      furthest = normal / path_->points[c].sd;
-      accounts_ = std::abs(p.residual) < kAccounted * normal;
+    const double sd = path_->points[c].sd;
+    const double normal = std::abs(bank.residual(0, channel));
+    if (!bank.active(channel) || !(normal > furthest * sd)) {
+      continue;
     }
+    const Prediction p = At(bank, c, SegmentOf(bank, c, place.segment), place);
+    furthest = normal / sd;
+    // No residual: both reading and prediction are beyond the transmitter's
+    // limit, where normal operation is not.
+    accounts_ =
+        std::isnan(p.residual) || std::abs(p.residual) < kAccounted * normal;
   }
 }
 
@@ -378,10 +400,7 @@ void StrengthTracker::PushFit(const ObserverBank& bank,
     accounted_.fill({});
   }
   const bool begins = shown && early;
-  const StrengthPath::Node& best = BestNode(trained);
-  const bool is_trained = trained.total(best.observer) >= total_;
-  const PathPlace place =
-      path_->PlaceOf(is_trained ? best.strength : strength_);
+  const PathPlace place = PlaceOfBest(trained);
   std::array<double, kMaxChannels> z;
   z.fill(std::numeric_limits<double>::quiet_NaN());
   std::array<double, kMaxChannels> u{};

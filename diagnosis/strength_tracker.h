@@ -62,7 +62,9 @@ class StrengthTracker {
   /// does not hide both. A fault that is not yet refutable is not isolated.
   bool refutable() const { return refutable_; }
 
-  /// Of the first t_k samples: whether the fault accounts for what is seen.
+  /// Of the first t_k samples, of the best explanation, tracked or trained:
+  /// whether it accounts for what is seen. Call after Step().
+  void JudgeAccount(const ObserverBank& bank, const ObserverEvidence& trained);
   /// Where the normal observer is furthest off, in deviations, the residual is
   /// less than half of its one. Else the fault only tolerates it, as a rod that
   /// sticks does nearly all.
@@ -128,6 +130,7 @@ class StrengthTracker {
   void Correct(const Prediction& prediction, double strength, double spread);
   void ClampEstimate();
   void UpdateFactor(const ObserverBank& bank);
+  PathPlace PlaceOfBest(const ObserverEvidence& trained) const;
   void PushAccount(const ObserverBank& bank, std::size_t channel,
                    double residual);
   Account AccountOf(int least) const;

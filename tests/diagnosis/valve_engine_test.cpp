@@ -423,5 +423,36 @@ TEST(ValveEngineTest, WhatIsNotRefutedIsNamedOnceAllOthersAre) {
   }
 }
 
+// A reading at the limit of its transmitter, where the fault predicts more, is
+// what it explains: no residual, and normal operation has one.
+TEST(ValveEngineTest, AReadingAtItsLimitIsExplainedAtOnce) {
+  constexpr double kLimit = 55.0;
+  ModelSet models = tests::LinearPlant();
+  models.decision.isolation_samples = 30;
+  models.decision.early_error = 1e-3;
+  for (Observer& observer : models.observers) {
+    observer.channels[1].model.saturation = kLimit;
+  }
+  ValveEngine engine(std::make_shared<const ModelSet>(models));
+  Noise noise(5);
+  std::vector<Transition> names;
+  for (std::uint64_t k = 0; k < 225; ++k) {
+    Sample sample = PlantSample(k, 0.0);
+    noise.Add(sample);
+    if (k >= 205) {
+      AddF6(sample, 1.0);
+    }
+    double& flow = sample.values[Index(Signal::kF)];
+    flow = std::min(flow, kLimit);
+    for (const Transition& t : engine.Step(sample).Transitions()) {
+      if (t.kind != TransitionKind::kDetected) {
+        names.push_back(t);
+      }
+    }
+  }
+  ASSERT_FALSE(names.empty());
+  EXPECT_EQ(names.front().faults, 0b110U);  // f3 and f6
+}
+
 }  // namespace
 }  // namespace fdi
