@@ -78,7 +78,8 @@ struct FaultWords {
 /// The fault catalogue: a text for every fault and for faults unlike any of
 /// them. A TOML file with one table per fault, [f1]..[p2] and [unknown], and
 /// the keys name, check, discipline, namur and severity; and one per figure,
-/// [figure.dead_band] and so on, with lowest and highest instead of severity.
+/// [figure.dead_band] and so on, with unit, lowest and highest instead of
+/// severity.
 /// See monitor/catalogue/faults.toml.
 class FaultTexts {
  public:
