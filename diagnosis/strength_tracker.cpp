@@ -437,6 +437,7 @@ void StrengthTracker::PushFit(const ObserverBank& bank,
       plan_->models().observers[path_->nodes[node].observer].moved;
   const Account account =
       AccountOf(early ? plan_->models().decision.detection_samples + 1 : t_k);
+  // In between there are too few samples since.
   if (early || age_ > 2 * t_k) {
     tolerates_ = account.tolerates;
   }

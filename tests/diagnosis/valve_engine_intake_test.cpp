@@ -155,9 +155,8 @@ TEST(ValveEngineIntakeTest, AnotherFlowUnitIsRefused) {
   EXPECT_EQ(engine.Step(sample).intake, Intake::kUnit);
 }
 
-// Bar for kPa, or a decimal point elsewhere, is no fault of the valve. Any
-// other reading may be one.
-TEST(ValveEngineIntakeTest, APressureInAnotherUnitIsRefused) {
+// P1 is 3500 kPa, from 3200 to 3800 in normal operation.
+std::shared_ptr<const ModelSet> PressurePlant() {
   ModelSet models = tests::LinearPlant();
   models.channels.push_back({"P1", Signal::kP1, -50.0, 50.0});
   for (Observer& observer : models.observers) {
@@ -165,6 +164,12 @@ TEST(ValveEngineIntakeTest, APressureInAnotherUnitIsRefused) {
     observer.channels.back().model.output_max = 4000.0;
   }
   models.validity.p1 = {3200.0, 3800.0};
+  return std::make_shared<const ModelSet>(models);
+}
+
+// Bar for kPa, or a decimal point elsewhere, is no fault of the valve. Any
+// other reading may be one.
+TEST(ValveEngineIntakeTest, APressureInAnotherUnitIsRefused) {
   const struct {
     double p1;
     Intake intake;
@@ -173,7 +178,7 @@ TEST(ValveEngineIntakeTest, APressureInAnotherUnitIsRefused) {
                {0.0, Intake::kAccepted},    {2000.0, Intake::kAccepted},
                {700.0, Intake::kAccepted}};
   for (const auto& read : cases) {
-    ValveEngine engine(std::make_shared<const ModelSet>(models));
+    ValveEngine engine(PressurePlant());
     const Seen seen = StepRange(engine, 0, 100, [&](Sample& sample) {
       sample.Set(Signal::kP1, sample.seq < 50 ? 3500.0 : read.p1);
     });
@@ -186,15 +191,8 @@ TEST(ValveEngineIntakeTest, APressureInAnotherUnitIsRefused) {
 
 // A pump that stops leaves a tenth of the pressure for once, and no flow.
 TEST(ValveEngineIntakeTest, APressureThatFallsWithTheFlowIsNoOtherUnit) {
-  ModelSet models = tests::LinearPlant();
-  models.channels.push_back({"P1", Signal::kP1, -50.0, 50.0});
-  for (Observer& observer : models.observers) {
-    observer.channels.push_back(tests::LinearModel(Signal::kP1, 0.0, 3500.0));
-    observer.channels.back().model.output_max = 4000.0;
-  }
-  models.validity.p1 = {3200.0, 3800.0};
   for (const bool flows : {true, false}) {
-    ValveEngine engine(std::make_shared<const ModelSet>(models));
+    ValveEngine engine(PressurePlant());
     const Seen seen = StepRange(engine, 0, 100, [&](Sample& sample) {
       sample.Set(Signal::kP1, sample.seq < 50 ? 3500.0 : 350.0);
       if (sample.seq >= 50 && !flows) {
@@ -208,14 +206,7 @@ TEST(ValveEngineIntakeTest, APressureThatFallsWithTheFlowIsNoOtherUnit) {
 
 // A pressure that falls passes a tenth of the usual one: no reason to stop.
 TEST(ValveEngineIntakeTest, InAnEpisodeAPressureIsJudgedAsItIs) {
-  ModelSet models = tests::LinearPlant();
-  models.channels.push_back({"P1", Signal::kP1, -50.0, 50.0});
-  for (Observer& observer : models.observers) {
-    observer.channels.push_back(tests::LinearModel(Signal::kP1, 0.0, 3500.0));
-    observer.channels.back().model.output_max = 4000.0;
-  }
-  models.validity.p1 = {3200.0, 3800.0};
-  ValveEngine engine(std::make_shared<const ModelSet>(models));
+  ValveEngine engine(PressurePlant());
   const Seen seen = StepRange(engine, 0, 100, [&](Sample& sample) {
     sample.Set(Signal::kP1, sample.seq < 50   ? 3500.0
                             : sample.seq < 70 ? 2000.0

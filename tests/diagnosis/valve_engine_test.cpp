@@ -426,12 +426,12 @@ TEST(ValveEngineTest, WhatIsNotRefutedIsNamedOnceAllOthersAre) {
 // A reading at the limit of its transmitter, where the fault predicts more, is
 // what it explains: no residual, and normal operation has one.
 TEST(ValveEngineTest, AReadingAtItsLimitIsExplainedAtOnce) {
-  constexpr double kLimit = 55.0;
+  constexpr double kFlowLimit = 55.0;
   ModelSet models = tests::LinearPlant();
   models.decision.isolation_samples = 30;
   models.decision.early_error = 1e-3;
   for (Observer& observer : models.observers) {
-    observer.channels[1].model.saturation = kLimit;
+    observer.channels[1].model.saturation = kFlowLimit;
   }
   ValveEngine engine(std::make_shared<const ModelSet>(models));
   Noise noise(5);
@@ -443,7 +443,7 @@ TEST(ValveEngineTest, AReadingAtItsLimitIsExplainedAtOnce) {
       AddF6(sample, 1.0);
     }
     double& flow = sample.values[Index(Signal::kF)];
-    flow = std::min(flow, kLimit);
+    flow = std::min(flow, kFlowLimit);
     for (const Transition& t : engine.Step(sample).Transitions()) {
       if (t.kind != TransitionKind::kDetected) {
         names.push_back(t);
