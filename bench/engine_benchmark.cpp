@@ -8,8 +8,8 @@
 
 #include "bench/scalar_observers.h"
 #include "bench/synthetic_models.h"
-#include "diagnosis/observer_bank.h"
-#include "diagnosis/valve_engine.h"
+#include "diagnosis/decision/valve_engine.h"
+#include "diagnosis/observers/observer_bank.h"
 
 namespace fdi::bench {
 namespace {

@@ -11,9 +11,9 @@
 #include <malloc.h>
 
 #include "bench/synthetic_models.h"
+#include "diagnosis/decision/valve_engine.h"
+#include "diagnosis/loop/loop_watch.h"
 #include "diagnosis/loop/valve_counters.h"
-#include "diagnosis/loop_watch.h"
-#include "diagnosis/valve_engine.h"
 
 namespace fdi::bench {
 namespace {

@@ -3,8 +3,8 @@
 #include <array>
 #include <vector>
 
-#include "diagnosis/model_set.h"
-#include "diagnosis/sample.h"
+#include "diagnosis/model/model_set.h"
+#include "diagnosis/model/sample.h"
 
 namespace fdi::bench {
 

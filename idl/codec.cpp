@@ -9,7 +9,7 @@
 #include "base/error.h"
 #include "base/field_list.h"
 #include "base/printable.h"
-#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/model/fault_catalogue.h"
 
 // Maps records to messages of fdi_v1.idl and fdi_v2.idl and back:
 //

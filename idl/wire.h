@@ -7,13 +7,13 @@
 #include <vector>
 
 #include "base/printable.h"
-#include "diagnosis/model_set.h"
+#include "diagnosis/model/model_set.h"
+#include "diagnosis/model/sample.h"
+#include "diagnosis/model/verdict.h"
 #include "diagnosis/records/fault_event.h"
 #include "diagnosis/records/monitor_share.h"
 #include "diagnosis/records/operator_action.h"
 #include "diagnosis/records/pair_state.h"
-#include "diagnosis/sample.h"
-#include "diagnosis/verdict.h"
 
 /// The messages on the wire as plain structs, one per topic.
 /// Doubles are transmitted bit for bit, including NaN.

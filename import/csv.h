@@ -18,7 +18,7 @@
 #include "base/log.h"
 #include "base/text_lines.h"
 #include "base/time_text.h"
-#include "diagnosis/sample_series.h"
+#include "diagnosis/model/sample_series.h"
 #include "import/quality.h"
 
 namespace fdi::importer {

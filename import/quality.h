@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "diagnosis/sample.h"
+#include "diagnosis/model/sample.h"
 
 namespace fdi::importer {
 

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "diagnosis/health_hour.h"
-#include "diagnosis/quality_count.h"
+#include "diagnosis/model/quality_count.h"
+#include "diagnosis/records/health_hour.h"
 #include "diagnosis/records/service_records.h"
 
 namespace fdi::monitor {

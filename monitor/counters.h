@@ -7,8 +7,8 @@
 #include <string_view>
 #include <vector>
 
-#include "diagnosis/quality_count.h"
-#include "diagnosis/verdict.h"
+#include "diagnosis/model/quality_count.h"
+#include "diagnosis/model/verdict.h"
 
 namespace fdi::monitor {
 

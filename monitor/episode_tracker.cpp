@@ -5,7 +5,7 @@
 #include <limits>
 #include <utility>
 
-#include "diagnosis/model_set.h"
+#include "diagnosis/model/model_set.h"
 
 namespace fdi::monitor {
 namespace {

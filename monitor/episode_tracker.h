@@ -6,13 +6,13 @@
 #include <string>
 #include <vector>
 
-#include "diagnosis/model_set.h"
+#include "diagnosis/model/model_set.h"
+#include "diagnosis/model/verdict.h"
 #include "diagnosis/records/ended_episode.h"
 #include "diagnosis/records/episode_look.h"
 #include "diagnosis/records/fault_event.h"
 #include "diagnosis/records/service_records.h"
 #include "diagnosis/records/strength_point.h"
-#include "diagnosis/verdict.h"
 #include "monitor/trace.h"
 
 namespace fdi::monitor {

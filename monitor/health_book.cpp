@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "base/time_units.h"
-#include "diagnosis/quality_count.h"
+#include "diagnosis/model/quality_count.h"
 #include "monitor/checkpoint.h"
 #include "monitor/counters.h"
 

@@ -6,11 +6,11 @@
 #include <unordered_map>
 #include <vector>
 
-#include "diagnosis/health_hour.h"
+#include "diagnosis/loop/stroke_watch.h"
 #include "diagnosis/loop/valve_counters.h"
-#include "diagnosis/model_set.h"
-#include "diagnosis/stroke_watch.h"
-#include "diagnosis/verdict.h"
+#include "diagnosis/model/model_set.h"
+#include "diagnosis/model/verdict.h"
+#include "diagnosis/records/health_hour.h"
 #include "monitor/sinks.h"
 
 namespace fdi::monitor {

@@ -7,8 +7,8 @@
 #include <utility>
 
 #include "base/printable.h"
-#include "diagnosis/loop_watch.h"
-#include "diagnosis/quality_count.h"
+#include "diagnosis/loop/loop_watch.h"
+#include "diagnosis/model/quality_count.h"
 #include "diagnosis/records/valve_glob.h"
 #include "monitor/guard.h"
 

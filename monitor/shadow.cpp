@@ -6,7 +6,7 @@
 
 #include "base/printable.h"
 #include "base/time_units.h"
-#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/model/fault_catalogue.h"
 #include "diagnosis/records/valve_glob.h"
 
 namespace fdi::monitor {

@@ -10,7 +10,7 @@
 #include <unordered_map>
 #include <vector>
 
-#include "diagnosis/valve_engine.h"
+#include "diagnosis/decision/valve_engine.h"
 #include "monitor/checkpoint.h"
 #include "monitor/sinks.h"
 #include "monitor/throttled_log.h"

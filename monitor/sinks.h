@@ -9,13 +9,13 @@
 #include <string_view>
 #include <vector>
 
-#include "diagnosis/model_set.h"
+#include "diagnosis/model/model_set.h"
+#include "diagnosis/model/verdict.h"
 #include "diagnosis/records/episode_look.h"
 #include "diagnosis/records/fault_event.h"
 #include "diagnosis/records/service_records.h"
 #include "diagnosis/records/strength_point.h"
 #include "diagnosis/records/trace_point.h"
-#include "diagnosis/verdict.h"
 
 /// The interfaces that the monitor needs; the program implements them with DDS
 /// and SQLite. Each sink is called by a single thread, which its comment names.

@@ -4,10 +4,10 @@
 #include <cstdint>
 #include <vector>
 
-#include "diagnosis/model_set.h"
+#include "diagnosis/model/model_set.h"
+#include "diagnosis/model/sample.h"
+#include "diagnosis/model/verdict.h"
 #include "diagnosis/records/trace_point.h"
-#include "diagnosis/sample.h"
-#include "diagnosis/verdict.h"
 
 namespace fdi::monitor {
 

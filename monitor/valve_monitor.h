@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "diagnosis/valve_engine.h"
+#include "diagnosis/decision/valve_engine.h"
 #include "monitor/checkpoint.h"
 #include "monitor/episode_tracker.h"
 #include "monitor/names/episode_names.h"

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "diagnosis/health_hour.h"
+#include "diagnosis/records/health_hour.h"
 
 namespace fdi::planner {
 

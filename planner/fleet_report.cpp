@@ -12,7 +12,7 @@
 
 #include "base/error.h"
 #include "base/time_text.h"
-#include "diagnosis/severity.h"
+#include "diagnosis/model/severity.h"
 #include "planner/health_view.h"
 #include "planner/work_list.h"
 #include "report/text_table.h"

@@ -10,7 +10,7 @@
 #include "base/error.h"
 #include "base/text.h"
 #include "base/time_units.h"
-#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/model/fault_catalogue.h"
 
 namespace fdi::planner {
 namespace {

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "diagnosis/health_hour.h"
+#include "diagnosis/records/health_hour.h"
 #include "planner/health_trend.h"
 
 namespace fdi::planner {

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "base/median.h"
-#include "diagnosis/student.h"
+#include "diagnosis/model/student.h"
 
 namespace fdi::planner {
 namespace {

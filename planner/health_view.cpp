@@ -5,7 +5,7 @@
 
 #include "base/time_text.h"
 #include "base/time_units.h"
-#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/model/fault_catalogue.h"
 #include "report/stroke_rows.h"
 #include "storage/history/episode.h"
 #include "storage/history/history_database.h"

@@ -12,7 +12,7 @@
 #include "base/text.h"
 #include "base/time_text.h"
 #include "base/time_units.h"
-#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/model/fault_catalogue.h"
 #include "report/text_table.h"
 #include "storage/history/certainty.h"
 #include "storage/history/health.h"

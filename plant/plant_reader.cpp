@@ -16,7 +16,7 @@
 #include "base/stamps.h"
 #include "base/text.h"
 #include "base/time_units.h"
-#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/model/fault_catalogue.h"
 #include "diagnosis/records/valve_glob.h"
 #include "plant/sql.h"
 #include "storage/database/record.h"

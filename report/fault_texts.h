@@ -9,9 +9,9 @@
 #include <string_view>
 #include <vector>
 
-#include "diagnosis/fault_catalogue.h"
 #include "diagnosis/loop/valve_counters.h"
-#include "diagnosis/severity.h"
+#include "diagnosis/model/fault_catalogue.h"
+#include "diagnosis/model/severity.h"
 #include "report/global_options.h"
 #include "report/json_output.h"
 

@@ -4,7 +4,7 @@
 #include <string_view>
 #include <vector>
 
-#include "diagnosis/sample.h"
+#include "diagnosis/model/sample.h"
 #include "report/json_output.h"
 
 namespace fdi::report {

@@ -9,7 +9,7 @@
 #include <variant>
 #include <vector>
 
-#include "diagnosis/sample.h"
+#include "diagnosis/model/sample.h"
 
 namespace fdi::simulator {
 

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <iterator>
 
-#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/model/fault_catalogue.h"
 #include "simulator/valve_parameters.h"
 
 namespace fdi::simulator {

@@ -5,7 +5,7 @@
 #include "base/csv_cells.h"
 #include "base/error.h"
 #include "base/text.h"
-#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/model/fault_catalogue.h"
 #include "simulator/require_range.h"
 
 // The text of a schedule, which ToText() writes and ParseFaultSchedule() reads:

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "diagnosis/sample.h"
+#include "diagnosis/model/sample.h"
 #include "simulator/valve_parameters.h"
 
 /// The algebraic equations of the valve, one function each. SI units; X is the

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "base/field_list.h"
-#include "diagnosis/sample.h"
+#include "diagnosis/model/sample.h"
 
 namespace fdi::simulator {
 

@@ -4,7 +4,7 @@
 #include <memory>
 #include <vector>
 
-#include "diagnosis/sample.h"
+#include "diagnosis/model/sample.h"
 #include "simulator/excitation.h"
 #include "simulator/fault_schedule.h"
 #include "simulator/valve_parameters.h"

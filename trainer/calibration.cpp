@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "base/error.h"
-#include "diagnosis/model_set.h"
-#include "diagnosis/residual_windows.h"
-#include "diagnosis/student.h"
+#include "diagnosis/model/model_set.h"
+#include "diagnosis/model/student.h"
+#include "diagnosis/observers/residual_windows.h"
 #include "trainer/rule_text.h"
 #include "trainer/statistics.h"
 

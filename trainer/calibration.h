@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "diagnosis/model_set.h"
+#include "diagnosis/model/model_set.h"
 
 namespace fdi::trainer {
 

@@ -7,7 +7,7 @@
 #include <random>
 
 #include "base/error.h"
-#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/model/fault_catalogue.h"
 #include "trainer/cluster_antecedents.h"
 #include "trainer/regression.h"
 #include "trainer/statistics.h"

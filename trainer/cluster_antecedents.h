@@ -4,7 +4,7 @@
 
 #include <Eigen/Core>
 
-#include "diagnosis/ts_model.h"
+#include "diagnosis/model/ts_model.h"
 #include "trainer/gustafson_kessel.h"
 #include "trainer/takagi_sugeno_fit.h"
 

@@ -10,8 +10,8 @@
 
 #include "base/error.h"
 #include "base/usual_period.h"
-#include "diagnosis/fault_catalogue.h"
-#include "diagnosis/trained_signals.h"
+#include "diagnosis/model/fault_catalogue.h"
+#include "diagnosis/model/trained_signals.h"
 
 namespace fdi::trainer {
 namespace {

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "diagnosis/sample.h"
+#include "diagnosis/model/sample.h"
 
 namespace fdi::trainer {
 

@@ -7,7 +7,7 @@
 
 #include "base/error.h"
 #include "base/parallel_for.h"
-#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/model/fault_catalogue.h"
 #include "trainer/calibration.h"
 #include "trainer/channel_training.h"
 #include "trainer/model_set_description.h"

@@ -4,7 +4,7 @@
 #include <optional>
 #include <vector>
 
-#include "diagnosis/model_set.h"
+#include "diagnosis/model/model_set.h"
 #include "trainer/channel_training.h"
 #include "trainer/observer_adaptation.h"
 #include "trainer/training.h"

@@ -4,9 +4,9 @@
 #include <cmath>
 
 #include "base/text.h"
-#include "diagnosis/fault_catalogue.h"
-#include "diagnosis/fit_window.h"
-#include "diagnosis/valve_engine.h"
+#include "diagnosis/decision/valve_engine.h"
+#include "diagnosis/model/fault_catalogue.h"
+#include "diagnosis/observers/fit_window.h"
 
 namespace fdi::trainer {
 namespace {

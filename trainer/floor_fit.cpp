@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "diagnosis/floor.h"
+#include "diagnosis/decision/floor.h"
 
 namespace fdi::trainer {
 namespace {

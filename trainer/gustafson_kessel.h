@@ -4,7 +4,7 @@
 
 #include <Eigen/Core>
 
-#include "diagnosis/ts_model.h"
+#include "diagnosis/model/ts_model.h"
 
 namespace fdi::trainer {
 

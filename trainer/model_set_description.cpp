@@ -8,7 +8,7 @@
 #include <string>
 
 #include "base/error.h"
-#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/model/fault_catalogue.h"
 #include "trainer/floor_fit.h"
 
 namespace fdi::trainer {

@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "diagnosis/model_set.h"
+#include "diagnosis/model/model_set.h"
 #include "trainer/dataset.h"
 #include "trainer/training.h"
 

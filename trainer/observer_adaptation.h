@@ -3,7 +3,7 @@
 #include <memory>
 #include <vector>
 
-#include "diagnosis/ts_model.h"
+#include "diagnosis/model/ts_model.h"
 #include "trainer/dataset.h"
 
 namespace fdi::trainer {

@@ -10,12 +10,12 @@
 #include <utility>
 
 #include "base/parallel_for.h"
-#include "diagnosis/fault_bank.h"
-#include "diagnosis/fault_catalogue.h"
-#include "diagnosis/fit_window.h"
-#include "diagnosis/observer_bank.h"
-#include "diagnosis/residual_windows.h"
-#include "diagnosis/student.h"
+#include "diagnosis/decision/fault_bank.h"
+#include "diagnosis/model/fault_catalogue.h"
+#include "diagnosis/model/student.h"
+#include "diagnosis/observers/fit_window.h"
+#include "diagnosis/observers/observer_bank.h"
+#include "diagnosis/observers/residual_windows.h"
 #include "trainer/regression.h"
 #include "trainer/statistics.h"
 

@@ -3,7 +3,7 @@
 #include <span>
 #include <vector>
 
-#include "diagnosis/model_set.h"
+#include "diagnosis/model/model_set.h"
 #include "trainer/calibration.h"
 #include "trainer/channel_training.h"
 #include "trainer/dataset.h"

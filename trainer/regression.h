@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "diagnosis/ts_model.h"
+#include "diagnosis/model/ts_model.h"
 #include "trainer/dataset.h"
 #include "trainer/takagi_sugeno_fit.h"
 

@@ -2,8 +2,8 @@
 
 #include <string>
 
-#include "diagnosis/model_set.h"
-#include "diagnosis/ts_model.h"
+#include "diagnosis/model/model_set.h"
+#include "diagnosis/model/ts_model.h"
 
 namespace fdi::trainer {
 

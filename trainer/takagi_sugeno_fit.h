@@ -5,7 +5,7 @@
 
 #include <Eigen/Core>
 
-#include "diagnosis/ts_model.h"
+#include "diagnosis/model/ts_model.h"
 #include "trainer/gustafson_kessel.h"
 
 namespace fdi::trainer {

@@ -4,7 +4,7 @@
 
 #include "base/error.h"
 #include "base/parallel_for.h"
-#include "diagnosis/drift_watch.h"
+#include "diagnosis/observers/drift_watch.h"
 #include "trainer/calibration.h"
 #include "trainer/model_set_description.h"
 #include "trainer/observer_adaptation.h"

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "base/mutex.h"
-#include "diagnosis/model_set.h"
+#include "diagnosis/model/model_set.h"
 #include "trainer/channel_training.h"
 #include "trainer/dataset.h"
 

@@ -8,7 +8,7 @@
 #include <Eigen/Cholesky>
 
 #include "base/error.h"
-#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/model/fault_catalogue.h"
 #include "trainer/calibration.h"
 #include "trainer/regression.h"
 

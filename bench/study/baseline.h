@@ -7,8 +7,8 @@
 #include <string_view>
 #include <vector>
 
-#include "diagnosis/sample.h"
-#include "diagnosis/ts_model.h"
+#include "diagnosis/model/sample.h"
+#include "diagnosis/model/ts_model.h"
 #include "trainer/dataset.h"
 #include "trainer/evaluation.h"
 

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "base/error.h"
-#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/model/fault_catalogue.h"
 #include "simulator/control_valve.h"
 #include "trainer/campaign/run_input.h"
 

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "diagnosis/sample.h"
+#include "diagnosis/model/sample.h"
 #include "simulator/fault_schedule.h"
 #include "simulator/valve_parameters.h"
 #include "storage/runs/runs.h"

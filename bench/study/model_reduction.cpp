@@ -4,7 +4,7 @@
 #include <cctype>
 
 #include "base/error.h"
-#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/model/fault_catalogue.h"
 
 namespace fdi::trainer::study {
 namespace {

@@ -13,7 +13,7 @@
 #include "base/error.h"
 #include "base/log.h"
 #include "bench/study/verbs.h"
-#include "diagnosis/model_set.h"
+#include "diagnosis/model/model_set.h"
 #include "report/output_folder.h"
 #include "report/plot/figure.h"
 #include "report/program.h"

@@ -9,7 +9,7 @@
 #include "bench/study/studies.h"
 #include "bench/study/study_detectors.h"
 #include "bench/study/verbs.h"
-#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/model/fault_catalogue.h"
 #include "report/program.h"
 #include "storage/database/data_directory.h"
 #include "storage/models/models.h"

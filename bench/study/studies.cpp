@@ -7,7 +7,7 @@
 #include "base/mutex.h"
 #include "base/parallel_for.h"
 #include "bench/study/study_detectors.h"
-#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/model/fault_catalogue.h"
 #include "report/progress.h"
 #include "report/stop_signals.h"
 #include "report/text_table.h"

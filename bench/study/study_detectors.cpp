@@ -7,7 +7,7 @@
 #include "base/error.h"
 #include "bench/study/csv_rows.h"
 #include "bench/study/model_reduction.h"
-#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/model/fault_catalogue.h"
 #include "report/text_table.h"
 #include "trainer/campaign/run_input.h"
 #include "trainer/scoring/evaluation_report.h"

@@ -4,7 +4,7 @@
 #include <array>
 #include <optional>
 
-#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/model/fault_catalogue.h"
 
 namespace fdi {
 namespace {

@@ -4,9 +4,9 @@
 #include <string_view>
 #include <vector>
 
-#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/model/fault_catalogue.h"
+#include "diagnosis/model/verdict.h"
 #include "diagnosis/records/fault_event.h"
-#include "diagnosis/verdict.h"
 
 namespace fdi {
 

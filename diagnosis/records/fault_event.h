@@ -6,15 +6,15 @@
 #include <string>
 #include <vector>
 
-#include "diagnosis/model_set.h"
-#include "diagnosis/verdict.h"
+#include "diagnosis/model/model_set.h"
+#include "diagnosis/model/verdict.h"
 
 namespace fdi {
 
 /// A fault that may explain an episode.
 struct FaultCandidate {
-  int fault{0};        ///< A fault or finding, see diagnosis/fault_catalogue.h.
-  double factor{0.0};  ///< Decision factor d at the transition [-].
+  int fault{0};  ///< A fault or finding, see diagnosis/model/fault_catalogue.h.
+  double factor{0.0};    ///< Decision factor d at the transition [-].
   double strength{0.0};  ///< Estimated; signed [-].
   bool isolated{false};  ///< Member of the isolated set.
 };

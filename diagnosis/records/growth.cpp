@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "base/time_units.h"
-#include "diagnosis/student.h"
+#include "diagnosis/model/student.h"
 
 namespace fdi {
 namespace {

@@ -5,10 +5,10 @@
 #include <string>
 #include <vector>
 
-#include "diagnosis/health_hour.h"
-#include "diagnosis/quality_count.h"
+#include "diagnosis/model/quality_count.h"
+#include "diagnosis/model/verdict.h"
 #include "diagnosis/records/fields.h"
-#include "diagnosis/verdict.h"
+#include "diagnosis/records/health_hour.h"
 
 /// Records of a monitor other than episodes and samples.
 namespace fdi {

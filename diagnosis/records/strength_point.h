@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <optional>
 
-#include "diagnosis/verdict.h"
+#include "diagnosis/model/verdict.h"
 
 namespace fdi {
 

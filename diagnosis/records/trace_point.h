@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "diagnosis/sample.h"
-#include "diagnosis/verdict.h"
+#include "diagnosis/model/sample.h"
+#include "diagnosis/model/verdict.h"
 
 namespace fdi {
 

@@ -4,7 +4,7 @@
 #include <utility>
 
 #include "base/log.h"
-#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/model/fault_catalogue.h"
 #include "diagnosis/records/certainty.h"
 #include "storage/models/models.h"
 

@@ -10,7 +10,7 @@
 #include "base/error.h"
 #include "base/time_text.h"
 #include "base/time_units.h"
-#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/model/fault_catalogue.h"
 #include "import/csv.h"
 #include "monitor/console/api.h"
 #include "report/plot/episode_page.h"

@@ -5,7 +5,7 @@
 #include <string_view>
 
 #include "base/text.h"
-#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/model/fault_catalogue.h"
 #include "storage/database/database.h"
 #include "storage/history/certainty.h"
 

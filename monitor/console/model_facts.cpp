@@ -9,8 +9,8 @@
 
 #include "base/error.h"
 #include "base/text.h"
-#include "diagnosis/fault_catalogue.h"
-#include "diagnosis/residual_windows.h"
+#include "diagnosis/model/fault_catalogue.h"
+#include "diagnosis/observers/residual_windows.h"
 #include "storage/models/models.h"
 
 namespace fdi::console {

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "base/mutex.h"
-#include "diagnosis/model_set.h"
+#include "diagnosis/model/model_set.h"
 #include "diagnosis/records/trace_point.h"
 #include "storage/history/episode.h"
 

@@ -6,7 +6,7 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
-#include "diagnosis/loop_watch.h"
+#include "diagnosis/loop/loop_watch.h"
 
 namespace fdi::monitor {
 namespace {

@@ -7,11 +7,11 @@
 #include <span>
 #include <vector>
 
+#include "diagnosis/decision/second_fault.h"
+#include "diagnosis/model/severity.h"
+#include "diagnosis/model/verdict.h"
 #include "diagnosis/records/fault_event.h"
 #include "diagnosis/records/strength_point.h"
-#include "diagnosis/second_fault.h"
-#include "diagnosis/severity.h"
-#include "diagnosis/verdict.h"
 
 namespace fdi::monitor {
 

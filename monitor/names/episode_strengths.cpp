@@ -6,8 +6,8 @@
 #include <span>
 
 #include "base/time_units.h"
-#include "diagnosis/fault_catalogue.h"
-#include "diagnosis/student.h"
+#include "diagnosis/model/fault_catalogue.h"
+#include "diagnosis/model/student.h"
 
 namespace fdi::monitor {
 namespace {

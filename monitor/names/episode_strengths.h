@@ -5,9 +5,9 @@
 #include <optional>
 #include <vector>
 
-#include "diagnosis/model_set.h"
+#include "diagnosis/model/model_set.h"
+#include "diagnosis/model/verdict.h"
 #include "diagnosis/records/strength_point.h"
-#include "diagnosis/verdict.h"
 
 namespace fdi::monitor {
 

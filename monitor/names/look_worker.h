@@ -15,7 +15,7 @@
 
 #include "base/mutex.h"
 #include "base/worker.h"
-#include "diagnosis/model_set.h"
+#include "diagnosis/model/model_set.h"
 #include "simulator/second_look/episode_looks.h"
 
 namespace fdi::monitor {

@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "diagnosis/loop_watch.h"
+#include "diagnosis/loop/loop_watch.h"
 #include "monitor/names/audit_worker.h"
 
 namespace fdi::monitor {

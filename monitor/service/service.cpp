@@ -23,7 +23,7 @@
 #include "base/text.h"
 #include "base/time_text.h"
 #include "base/time_units.h"
-#include "diagnosis/loop_watch.h"
+#include "diagnosis/loop/loop_watch.h"
 #include "diagnosis/records/partitions.h"
 #include "diagnosis/records/valve_glob.h"
 #include "idl/interface_watch.h"

@@ -5,7 +5,7 @@
 #include "base/error.h"
 #include "base/time_text.h"
 #include "base/toml_reader.h"
-#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/model/fault_catalogue.h"
 
 // groups.toml, and a common cause as `--on-event` delivers it (docs/planner.md,
 // "One cause for many"). An unknown key is an error, because a mistyped

@@ -1,6 +1,6 @@
 #include "programs/monitor/bus_view.h"
 
-#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/model/fault_catalogue.h"
 #include "diagnosis/records/certainty.h"
 #include "diagnosis/records/valve_glob.h"
 #include "monitor/bus/dds_options.h"

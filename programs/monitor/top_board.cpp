@@ -10,7 +10,7 @@
 #include "base/text.h"
 #include "base/time_text.h"
 #include "base/time_units.h"
-#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/model/fault_catalogue.h"
 #include "monitor/console/model_facts.h"
 
 namespace fdi::monitor {

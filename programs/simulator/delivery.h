@@ -11,7 +11,7 @@
 #include <string_view>
 #include <vector>
 
-#include "diagnosis/sample.h"
+#include "diagnosis/model/sample.h"
 #include "programs/simulator/sample_publisher.h"
 #include "report/program.h"
 #include "report/report.h"

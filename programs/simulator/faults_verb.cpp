@@ -1,7 +1,7 @@
 #include <cstdio>
 #include <string>
 
-#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/model/fault_catalogue.h"
 #include "programs/simulator/verbs.h"
 #include "report/report.h"
 #include "simulator/fault_effects.h"

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "diagnosis/sample.h"
+#include "diagnosis/model/sample.h"
 #include "import/csv.h"
 
 namespace fdi::simulator {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "base/log.h"
-#include "diagnosis/sample.h"
+#include "diagnosis/model/sample.h"
 #include "idl/endpoint.h"
 #include "idl/participant.h"
 #include "report/program.h"

@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <string>
 
-#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/model/fault_catalogue.h"
 #include "programs/store/verbs.h"
 #include "report/fault_texts.h"
 

@@ -6,7 +6,7 @@
 #include <filesystem>
 
 #include "base/error.h"
-#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/model/fault_catalogue.h"
 #include "programs/store/verbs.h"
 #include "report/models/lineage_text.h"
 #include "report/text_table.h"

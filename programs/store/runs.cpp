@@ -6,7 +6,7 @@
 #include "base/error.h"
 #include "base/printable.h"
 #include "base/time_units.h"
-#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/model/fault_catalogue.h"
 #include "import/csv.h"
 #include "import/tag_map.h"
 #include "programs/store/verbs.h"

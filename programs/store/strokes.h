@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "diagnosis/sample_series.h"
-#include "diagnosis/stroke_watch.h"
+#include "diagnosis/loop/stroke_watch.h"
+#include "diagnosis/model/sample_series.h"
 #include "report/report.h"
 
 namespace fdi::storage {

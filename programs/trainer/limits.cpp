@@ -7,7 +7,7 @@
 
 #include "base/error.h"
 #include "base/time_text.h"
-#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/model/fault_catalogue.h"
 #include "import/tag_map.h"
 #include "programs/trainer/model_report.h"
 #include "programs/trainer/verbs.h"

@@ -5,7 +5,7 @@
 #include <sstream>
 
 #include "base/error.h"
-#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/model/fault_catalogue.h"
 #include "storage/models/model_codec.h"
 #include "storage/models/models.h"
 #include "trainer/rule_text.h"

@@ -10,7 +10,7 @@
 #include "base/error.h"
 #include "base/text.h"
 #include "base/time_text.h"
-#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/model/fault_catalogue.h"
 #include "import/tag_map.h"
 #include "programs/trainer/model_report.h"
 #include "programs/trainer/onboard_plant.h"

@@ -3,7 +3,7 @@
 #include <CLI/CLI.hpp>
 
 #include "base/time_text.h"
-#include "diagnosis/model_set.h"
+#include "diagnosis/model/model_set.h"
 #include "programs/trainer/model_report.h"
 #include "programs/trainer/verbs.h"
 #include "report/models/lineage_text.h"

@@ -8,7 +8,7 @@
 
 #include "base/error.h"
 #include "base/time_text.h"
-#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/model/fault_catalogue.h"
 #include "programs/trainer/model_report.h"
 #include "report/models/lineage_text.h"
 #include "storage/database/data_directory.h"

@@ -12,7 +12,7 @@
 #include "base/log.h"
 #include "base/text.h"
 #include "base/time_text.h"
-#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/model/fault_catalogue.h"
 #include "programs/trainer/model_report.h"
 #include "programs/trainer/teach.h"
 #include "programs/trainer/verbs.h"

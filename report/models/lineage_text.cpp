@@ -1,7 +1,7 @@
 #include "report/models/lineage_text.h"
 
 #include "base/time_text.h"
-#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/model/fault_catalogue.h"
 #include "report/text_table.h"
 #include "storage/models/model_codec.h"
 

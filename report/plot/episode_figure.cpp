@@ -10,8 +10,8 @@
 
 #include "base/error.h"
 #include "base/time_units.h"
-#include "diagnosis/fault_catalogue.h"
-#include "diagnosis/residual_windows.h"
+#include "diagnosis/model/fault_catalogue.h"
+#include "diagnosis/observers/residual_windows.h"
 #include "storage/models/models.h"
 
 namespace fdi::plot {

@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "diagnosis/model_set.h"
+#include "diagnosis/model/model_set.h"
 #include "report/plot/figure.h"
 #include "storage/history/history.h"
 

@@ -7,7 +7,7 @@
 
 #include "base/error.h"
 #include "base/time_text.h"
-#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/model/fault_catalogue.h"
 #include "report/text_table.h"
 #include "storage/history/certainty.h"
 

@@ -6,7 +6,7 @@
 #include <map>
 
 #include "base/text.h"
-#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/model/fault_catalogue.h"
 
 namespace fdi::plot {
 namespace {

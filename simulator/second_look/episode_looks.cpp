@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "base/time_units.h"
-#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/model/fault_catalogue.h"
 #include "simulator/fault_effects.h"
 
 namespace fdi::simulator {

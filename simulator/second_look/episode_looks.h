@@ -8,9 +8,9 @@
 #include <utility>
 #include <vector>
 
-#include "diagnosis/model_set.h"
-#include "diagnosis/trained_signals.h"
-#include "diagnosis/verdict.h"
+#include "diagnosis/model/model_set.h"
+#include "diagnosis/model/trained_signals.h"
+#include "diagnosis/model/verdict.h"
 #include "simulator/second_look/second_look.h"
 
 namespace fdi::simulator {

@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "base/error.h"
-#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/model/fault_catalogue.h"
 #include "simulator/control_valve.h"
 #include "simulator/fault_effects.h"
 #include "simulator/valve_equations.h"

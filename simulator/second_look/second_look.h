@@ -5,7 +5,7 @@
 #include <stop_token>
 #include <vector>
 
-#include "diagnosis/sample.h"
+#include "diagnosis/model/sample.h"
 #include "simulator/second_look/valve_physics.h"
 
 namespace fdi::simulator {

@@ -5,8 +5,8 @@
 #include <optional>
 #include <vector>
 
-#include "diagnosis/taught.h"
-#include "diagnosis/verdict.h"
+#include "diagnosis/model/taught.h"
+#include "diagnosis/model/verdict.h"
 #include "simulator/second_look/episode_looks.h"
 
 namespace fdi::simulator {

@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "diagnosis/model_set.h"
+#include "diagnosis/model/model_set.h"
 #include "simulator/record_fit.h"
 #include "simulator/valve_equations.h"
 #include "simulator/valve_parameters.h"

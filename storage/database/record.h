@@ -5,8 +5,8 @@
 #include <tuple>
 #include <vector>
 
+#include "diagnosis/model/sample.h"
 #include "diagnosis/records/fields.h"
-#include "diagnosis/sample.h"
 #include "storage/database/database.h"
 
 // SQL and binding of flat records, driven by their single field list,

@@ -8,8 +8,8 @@
 #include <string_view>
 #include <vector>
 
+#include "diagnosis/model/severity.h"
 #include "diagnosis/records/fields.h"
-#include "diagnosis/severity.h"
 #include "storage/database/database.h"
 #include "storage/history/episode.h"
 

@@ -6,8 +6,8 @@
 #include <set>
 
 #include "base/error.h"
+#include "diagnosis/model/verdict.h"
 #include "diagnosis/records/valve_glob.h"
-#include "diagnosis/verdict.h"
 #include "storage/database/record.h"
 #include "storage/history/episode.h"
 #include "storage/history/history_database.h"

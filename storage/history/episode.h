@@ -7,8 +7,8 @@
 #include <string_view>
 #include <vector>
 
+#include "diagnosis/model/verdict.h"
 #include "diagnosis/records/fields.h"
-#include "diagnosis/verdict.h"
 
 namespace fdi::storage {
 

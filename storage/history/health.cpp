@@ -10,8 +10,8 @@
 
 #include "base/error.h"
 #include "base/time_units.h"
-#include "diagnosis/fault_catalogue.h"
-#include "diagnosis/model_set.h"
+#include "diagnosis/model/fault_catalogue.h"
+#include "diagnosis/model/model_set.h"
 #include "diagnosis/records/valve_glob.h"
 #include "storage/database/bytes.h"
 #include "storage/history/sql.h"

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "diagnosis/health_hour.h"
+#include "diagnosis/records/health_hour.h"
 #include "storage/database/database.h"
 
 namespace fdi::storage {

@@ -5,7 +5,7 @@
 
 #include "base/error.h"
 #include "base/time_units.h"
-#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/model/fault_catalogue.h"
 #include "storage/database/record.h"
 #include "storage/history/episode.h"
 #include "storage/history/sql.h"

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "base/error.h"
-#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/model/fault_catalogue.h"
 #include "storage/history/history_reader.h"
 #include "storage/history/history_writer.h"
 #include "storage/history/sql.h"

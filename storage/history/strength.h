@@ -4,9 +4,9 @@
 #include <string>
 #include <vector>
 
+#include "diagnosis/model/severity.h"
 #include "diagnosis/records/growth.h"
 #include "diagnosis/records/strength_point.h"
-#include "diagnosis/severity.h"
 #include "storage/database/database.h"
 #include "storage/history/episode.h"
 

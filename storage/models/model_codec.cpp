@@ -12,8 +12,8 @@
 #include <openssl/evp.h>
 #include <zlib.h>
 
-#include "diagnosis/fault_catalogue.h"
-#include "diagnosis/fit_window.h"
+#include "diagnosis/model/fault_catalogue.h"
+#include "diagnosis/observers/fit_window.h"
 #include "storage/database/bytes.h"
 
 namespace fdi::storage {

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "diagnosis/model_set.h"
+#include "diagnosis/model/model_set.h"
 
 namespace fdi::storage {
 

@@ -7,7 +7,7 @@
 
 #include "base/error.h"
 #include "base/text.h"
-#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/model/fault_catalogue.h"
 #include "storage/database/record.h"
 #include "storage/models/model_codec.h"
 #include "storage/models/sql.h"

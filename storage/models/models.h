@@ -10,8 +10,8 @@
 #include <utility>
 #include <vector>
 
-#include "diagnosis/model_set.h"
-#include "diagnosis/sample_series.h"
+#include "diagnosis/model/model_set.h"
+#include "diagnosis/model/sample_series.h"
 #include "storage/database/database.h"
 
 namespace fdi::storage {

@@ -8,7 +8,7 @@
 #include <unordered_map>
 #include <vector>
 
-#include "diagnosis/sample_series.h"
+#include "diagnosis/model/sample_series.h"
 #include "storage/database/database.h"
 #include "storage/runs/run_rows.h"
 #include "storage/runs/runs.h"

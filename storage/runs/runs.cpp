@@ -6,7 +6,7 @@
 
 #include "base/error.h"
 #include "base/text.h"
-#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/model/fault_catalogue.h"
 #include "storage/database/record.h"
 #include "storage/runs/run_rows.h"
 #include "storage/runs/sql.h"

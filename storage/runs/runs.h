@@ -11,9 +11,9 @@
 #include <string_view>
 #include <vector>
 
-#include "diagnosis/sample.h"
-#include "diagnosis/sample_series.h"
-#include "diagnosis/verdict.h"
+#include "diagnosis/model/sample.h"
+#include "diagnosis/model/sample_series.h"
+#include "diagnosis/model/verdict.h"
 #include "storage/database/database.h"
 #include "storage/runs/sample_codec.h"
 

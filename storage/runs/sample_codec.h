@@ -8,8 +8,8 @@
 #include <string_view>
 #include <vector>
 
-#include "diagnosis/sample.h"
-#include "diagnosis/verdict.h"
+#include "diagnosis/model/sample.h"
+#include "diagnosis/model/verdict.h"
 #include "storage/runs/column_codec.h"
 
 namespace fdi::storage {

@@ -1,4 +1,4 @@
-#include "diagnosis/coverage.h"
+#include "diagnosis/observers/coverage.h"
 
 #include <algorithm>
 #include <cmath>
@@ -10,7 +10,7 @@
 
 #include <gtest/gtest.h>
 
-#include "diagnosis/valve_engine.h"
+#include "diagnosis/decision/valve_engine.h"
 #include "tests/diagnosis/linear_plant.h"
 
 namespace fdi {

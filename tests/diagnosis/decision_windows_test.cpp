@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "diagnosis/episode.h"
+#include "diagnosis/decision/episode.h"
 #include "tests/diagnosis/linear_plant.h"
 
 namespace fdi {

@@ -1,4 +1,4 @@
-#include "diagnosis/detection.h"
+#include "diagnosis/observers/detection.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-#include "diagnosis/valve_engine.h"
+#include "diagnosis/decision/valve_engine.h"
 #include "tests/diagnosis/engine_run.h"
 #include "tests/diagnosis/linear_plant.h"
 

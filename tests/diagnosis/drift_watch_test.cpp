@@ -1,4 +1,4 @@
-#include "diagnosis/drift_watch.h"
+#include "diagnosis/observers/drift_watch.h"
 
 #include <cstdint>
 #include <functional>
@@ -10,9 +10,9 @@
 
 #include <gtest/gtest.h>
 
-#include "diagnosis/fault_catalogue.h"
-#include "diagnosis/snapshot.h"
-#include "diagnosis/valve_engine.h"
+#include "diagnosis/decision/valve_engine.h"
+#include "diagnosis/model/fault_catalogue.h"
+#include "diagnosis/model/snapshot.h"
 #include "tests/diagnosis/linear_plant.h"
 
 namespace fdi {

@@ -1,4 +1,4 @@
-#include "diagnosis/engine_plan.h"
+#include "diagnosis/decision/engine_plan.h"
 
 #include <bit>
 #include <memory>
@@ -9,7 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
-#include "diagnosis/valve_engine.h"
+#include "diagnosis/decision/valve_engine.h"
 #include "tests/diagnosis/linear_plant.h"
 
 namespace fdi {

@@ -4,7 +4,7 @@
 #include <functional>
 #include <vector>
 
-#include "diagnosis/valve_engine.h"
+#include "diagnosis/decision/valve_engine.h"
 #include "tests/diagnosis/linear_plant.h"
 
 namespace fdi::tests {

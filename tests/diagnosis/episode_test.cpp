@@ -1,4 +1,4 @@
-#include "diagnosis/episode.h"
+#include "diagnosis/decision/episode.h"
 
 #include <memory>
 #include <optional>

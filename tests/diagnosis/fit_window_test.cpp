@@ -1,4 +1,4 @@
-#include "diagnosis/fit_window.h"
+#include "diagnosis/observers/fit_window.h"
 
 #include <cmath>
 #include <limits>

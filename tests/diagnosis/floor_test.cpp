@@ -1,4 +1,4 @@
-#include "diagnosis/floor.h"
+#include "diagnosis/decision/floor.h"
 
 #include <algorithm>
 #include <cmath>
@@ -12,8 +12,8 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
-#include "diagnosis/fault_catalogue.h"
-#include "diagnosis/valve_engine.h"
+#include "diagnosis/decision/valve_engine.h"
+#include "diagnosis/model/fault_catalogue.h"
 #include "tests/diagnosis/linear_plant.h"
 
 namespace fdi {

@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "base/time_units.h"
-#include "diagnosis/student.h"
+#include "diagnosis/model/student.h"
 
 namespace fdi {
 namespace {

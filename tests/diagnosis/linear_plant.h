@@ -6,7 +6,7 @@
 #include <numbers>
 #include <random>
 
-#include "diagnosis/model_set.h"
+#include "diagnosis/model/model_set.h"
 
 /// A plant whose residuals can be told by hand. X = CV; F = 100 − CV without
 /// fault; f6 adds 20 s to F, f3 adds s (20 + 0.4 (CV − 50)): the same at

@@ -1,4 +1,4 @@
-#include "diagnosis/loop_watch.h"
+#include "diagnosis/loop/loop_watch.h"
 
 #include <cmath>
 #include <set>
@@ -7,7 +7,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/model/fault_catalogue.h"
 #include "tests/diagnosis/loop/closed_loop.h"
 
 namespace fdi {

@@ -1,11 +1,11 @@
-#include "diagnosis/observer_bank.h"
+#include "diagnosis/observers/observer_bank.h"
 
 #include <cmath>
 
 #include <gtest/gtest.h>
 
-#include "diagnosis/fault_catalogue.h"
-#include "diagnosis/verdict.h"
+#include "diagnosis/model/fault_catalogue.h"
+#include "diagnosis/model/verdict.h"
 #include "tests/diagnosis/linear_plant.h"
 
 namespace fdi {

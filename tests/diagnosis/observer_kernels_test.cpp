@@ -1,4 +1,4 @@
-#include "diagnosis/observer_kernels.h"
+#include "diagnosis/observers/observer_kernels.h"
 
 #include <bit>
 #include <cmath>
@@ -8,7 +8,7 @@
 
 #include <gtest/gtest.h>
 
-#include "diagnosis/observer_bank.h"
+#include "diagnosis/observers/observer_bank.h"
 
 namespace fdi {
 namespace {

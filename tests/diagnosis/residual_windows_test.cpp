@@ -1,4 +1,4 @@
-#include "diagnosis/residual_windows.h"
+#include "diagnosis/observers/residual_windows.h"
 
 #include <array>
 #include <cmath>

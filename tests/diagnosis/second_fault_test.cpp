@@ -1,4 +1,4 @@
-#include "diagnosis/second_fault.h"
+#include "diagnosis/decision/second_fault.h"
 
 #include <cmath>
 #include <functional>
@@ -10,7 +10,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "diagnosis/valve_engine.h"
+#include "diagnosis/decision/valve_engine.h"
 #include "tests/diagnosis/linear_plant.h"
 
 namespace fdi::tests {

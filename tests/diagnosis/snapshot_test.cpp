@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "diagnosis/valve_engine.h"
+#include "diagnosis/decision/valve_engine.h"
 #include "tests/diagnosis/linear_plant.h"
 
 namespace fdi {

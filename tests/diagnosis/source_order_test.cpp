@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "diagnosis/intake.h"
+#include "diagnosis/observers/intake.h"
 
 namespace fdi {
 namespace {

@@ -1,4 +1,4 @@
-#include "diagnosis/strength_tracker.h"
+#include "diagnosis/decision/strength_tracker.h"
 
 #include <algorithm>
 #include <cmath>
@@ -8,7 +8,7 @@
 
 #include <gtest/gtest.h>
 
-#include "diagnosis/fault_bank.h"
+#include "diagnosis/decision/fault_bank.h"
 #include "tests/diagnosis/linear_plant.h"
 
 namespace fdi {

@@ -2,9 +2,9 @@
 
 #include <gtest/gtest.h>
 
-#include "diagnosis/fault_catalogue.h"
-#include "diagnosis/intake.h"
-#include "diagnosis/valve_engine.h"
+#include "diagnosis/decision/valve_engine.h"
+#include "diagnosis/model/fault_catalogue.h"
+#include "diagnosis/observers/intake.h"
 #include "tests/diagnosis/linear_plant.h"
 
 namespace fdi {

@@ -1,4 +1,4 @@
-#include "diagnosis/ts_model.h"
+#include "diagnosis/model/ts_model.h"
 
 #include <cmath>
 #include <limits>

@@ -5,8 +5,8 @@
 
 #include <gtest/gtest.h>
 
-#include "diagnosis/trained_signals.h"
-#include "diagnosis/valve_engine.h"
+#include "diagnosis/decision/valve_engine.h"
+#include "diagnosis/model/trained_signals.h"
 #include "tests/diagnosis/engine_run.h"
 #include "tests/diagnosis/linear_plant.h"
 

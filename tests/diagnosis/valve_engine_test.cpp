@@ -1,4 +1,4 @@
-#include "diagnosis/valve_engine.h"
+#include "diagnosis/decision/valve_engine.h"
 
 #include <cmath>
 #include <memory>

@@ -10,7 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
-#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/model/fault_catalogue.h"
 #include "tests/idl/payload.h"
 
 namespace fdi::idl {

@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include "diagnosis/valve_engine.h"
+#include "diagnosis/decision/valve_engine.h"
 #include "monitor/console/live_board.h"
 #include "tests/monitor/linear_models.h"
 

@@ -11,7 +11,7 @@
 #include <httplib.h>
 
 #include "base/time_text.h"
-#include "diagnosis/valve_engine.h"
+#include "diagnosis/decision/valve_engine.h"
 #include "monitor/console/console.h"
 #include "storage/models/models.h"
 #include "tests/monitor/linear_models.h"

@@ -9,7 +9,7 @@
 
 #include "base/error.h"
 #include "base/time_units.h"
-#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/model/fault_catalogue.h"
 #include "report/plot/gnuplot.h"
 #include "storage/models/plant_loops.h"
 #include "tests/monitor/console_http_fixture.h"

@@ -2,7 +2,7 @@
 #include <limits>
 #include <vector>
 
-#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/model/fault_catalogue.h"
 #include "monitor/console/model_facts.h"
 #include "tests/monitor/console_fixture.h"
 

@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/model/fault_catalogue.h"
 #include "tests/monitor/linear_models.h"
 #include "tests/monitor/test_support.h"
 

@@ -5,7 +5,7 @@
 #include <memory>
 #include <string>
 
-#include "diagnosis/model_set.h"
+#include "diagnosis/model/model_set.h"
 
 /// A plant so simple that every verdict can be told by hand: X = CV without
 /// fault, X = CV − 20 with f7, X = CV + 20 with f1.

@@ -9,7 +9,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/model/fault_catalogue.h"
 #include "monitor/valve_monitor.h"
 #include "storage/history/history_reader.h"
 #include "storage/history/history_writer.h"

@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "diagnosis/student.h"
+#include "diagnosis/model/student.h"
 
 namespace fdi::planner {
 namespace {

@@ -14,7 +14,7 @@
 #include "base/printable.h"
 #include "base/suggestion.h"
 #include "base/toml_reader.h"
-#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/model/fault_catalogue.h"
 #include "report/json_output.h"
 #include "report/logging.h"
 #include "report/text_table.h"

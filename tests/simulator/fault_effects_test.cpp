@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/model/fault_catalogue.h"
 #include "simulator/record_fit.h"
 #include "simulator/valve_simulation.h"
 

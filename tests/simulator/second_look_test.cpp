@@ -10,7 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
-#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/model/fault_catalogue.h"
 #include "diagnosis/records/growth.h"
 #include "simulator/fault_effects.h"
 #include "simulator/second_look/episode_looks.h"

@@ -3,7 +3,7 @@
 #include <random>
 #include <string>
 
-#include "diagnosis/model_set.h"
+#include "diagnosis/model/model_set.h"
 
 namespace fdi::storage {
 

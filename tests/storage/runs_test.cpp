@@ -5,7 +5,7 @@
 #include <gmock/gmock.h>
 
 #include "base/error.h"
-#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/model/fault_catalogue.h"
 #include "import/csv.h"
 #include "storage/runs/run_recorder.h"
 #include "tests/storage/runs_fixture.h"

@@ -12,7 +12,7 @@
 
 #include <gtest/gtest.h>
 
-#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/model/fault_catalogue.h"
 #include "storage/runs/runs.h"
 #include "tests/survival/kill_rounds.h"
 #include "tests/system/monitor_fixture.h"

@@ -14,7 +14,7 @@
 #include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
 
-#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/model/fault_catalogue.h"
 #include "plant/plant_reader.h"
 #include "storage/history/history_reader.h"
 #include "storage/history/retention.h"

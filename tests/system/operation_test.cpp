@@ -9,7 +9,7 @@
 
 #include <gtest/gtest.h>
 
-#include "diagnosis/quality_count.h"
+#include "diagnosis/model/quality_count.h"
 #include "simulator/scenario/scenario_toml.h"
 #include "trainer/evaluation.h"
 #include "trainer/onboarding/onboarding.h"

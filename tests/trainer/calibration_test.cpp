@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-#include "diagnosis/residual_windows.h"
+#include "diagnosis/observers/residual_windows.h"
 #include "tests/trainer/gaussian.h"
 #include "trainer/statistics.h"
 

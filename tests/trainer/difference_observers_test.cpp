@@ -7,9 +7,9 @@
 
 #include <gtest/gtest.h>
 
-#include "diagnosis/fault_catalogue.h"
-#include "diagnosis/observer_bank.h"
-#include "diagnosis/taught.h"
+#include "diagnosis/model/fault_catalogue.h"
+#include "diagnosis/model/taught.h"
+#include "diagnosis/observers/observer_bank.h"
 #include "trainer/evaluation.h"
 #include "trainer/regression.h"
 #include "trainer/statistics.h"

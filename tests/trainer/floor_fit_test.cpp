@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "diagnosis/floor.h"
+#include "diagnosis/decision/floor.h"
 #include "tests/trainer/gaussian.h"
 
 namespace fdi::trainer {

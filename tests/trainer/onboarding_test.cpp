@@ -13,8 +13,8 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
-#include "diagnosis/fault_catalogue.h"
-#include "diagnosis/trained_signals.h"
+#include "diagnosis/model/fault_catalogue.h"
+#include "diagnosis/model/trained_signals.h"
 #include "import/csv.h"
 #include "import/sniff.h"
 #include "import/tag_map.h"

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "diagnosis/valve_engine.h"
+#include "diagnosis/decision/valve_engine.h"
 #include "storage/history/history_database.h"
 #include "storage/history/history_reader.h"
 #include "storage/history/history_writer.h"

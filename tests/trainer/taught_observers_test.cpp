@@ -8,8 +8,8 @@
 #include <gmock/gmock.h>
 
 #include "base/error.h"
-#include "diagnosis/taught.h"
-#include "diagnosis/verdict.h"
+#include "diagnosis/model/taught.h"
+#include "diagnosis/model/verdict.h"
 #include "simulator/second_look/taught_names.h"
 #include "storage/models/model_codec.h"
 #include "tests/diagnosis/linear_plant.h"

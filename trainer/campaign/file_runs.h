@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "diagnosis/sample.h"
+#include "diagnosis/model/sample.h"
 #include "import/csv.h"
 #include "simulator/valve_equations.h"
 #include "storage/database/data_directory.h"

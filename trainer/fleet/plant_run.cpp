@@ -13,7 +13,7 @@
 #include "base/error.h"
 #include "base/mutex.h"
 #include "base/parallel_for.h"
-#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/model/fault_catalogue.h"
 #include "storage/models/model_codec.h"
 #include "trainer/campaign/campaign_runs.h"
 #include "trainer/fleet/plant_record.h"

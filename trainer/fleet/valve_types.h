@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-#include "diagnosis/model_set.h"
+#include "diagnosis/model/model_set.h"
 #include "storage/models/plant_loops.h"
 #include "trainer/onboarding/fault_synthesis.h"
 #include "trainer/onboarding/onboarding.h"

@@ -5,9 +5,9 @@
 #include <optional>
 
 #include "base/error.h"
-#include "diagnosis/coverage.h"
-#include "diagnosis/observer_bank.h"
-#include "diagnosis/trained_signals.h"
+#include "diagnosis/model/trained_signals.h"
+#include "diagnosis/observers/coverage.h"
+#include "diagnosis/observers/observer_bank.h"
 #include "trainer/campaign/run_input.h"
 #include "trainer/floor_fit.h"
 #include "trainer/scoring/rescore.h"

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "diagnosis/model_set.h"
-#include "diagnosis/quality_count.h"
+#include "diagnosis/model/model_set.h"
+#include "diagnosis/model/quality_count.h"
 #include "storage/runs/runs.h"
 
 namespace fdi::trainer {

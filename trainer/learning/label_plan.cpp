@@ -7,7 +7,7 @@
 
 #include "base/error.h"
 #include "base/text.h"
-#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/model/fault_catalogue.h"
 #include "storage/models/models.h"
 #include "storage/runs/runs.h"
 #include "trainer/campaign/campaign_fields.h"

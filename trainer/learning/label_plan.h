@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "diagnosis/model_set.h"
+#include "diagnosis/model/model_set.h"
 #include "storage/database/data_directory.h"
 #include "storage/models/models.h"
 #include "trainer/learning/labelled_episodes.h"

@@ -8,7 +8,7 @@
 
 #include "base/error.h"
 #include "base/median.h"
-#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/model/fault_catalogue.h"
 #include "diagnosis/records/valve_glob.h"
 #include "storage/models/models.h"
 #include "storage/runs/runs.h"

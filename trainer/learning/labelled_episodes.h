@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "diagnosis/model_set.h"
+#include "diagnosis/model/model_set.h"
 #include "storage/history/history_reader.h"
 #include "storage/models/models.h"
 #include "storage/runs/runs.h"

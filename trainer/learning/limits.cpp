@@ -10,9 +10,9 @@
 
 #include "base/error.h"
 #include "base/time_text.h"
-#include "diagnosis/fault_catalogue.h"
-#include "diagnosis/observer_bank.h"
-#include "diagnosis/residual_windows.h"
+#include "diagnosis/model/fault_catalogue.h"
+#include "diagnosis/observers/observer_bank.h"
+#include "diagnosis/observers/residual_windows.h"
 #include "trainer/calibration.h"
 #include "trainer/rule_text.h"
 

@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "diagnosis/model_set.h"
+#include "diagnosis/model/model_set.h"
 #include "trainer/learning/healthy_residuals.h"
 
 namespace fdi::trainer {

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "diagnosis/model_set.h"
+#include "diagnosis/model/model_set.h"
 #include "storage/database/data_directory.h"
 #include "storage/models/models.h"
 #include "storage/runs/runs.h"

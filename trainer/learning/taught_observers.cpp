@@ -8,11 +8,11 @@
 #include <utility>
 
 #include "base/error.h"
-#include "diagnosis/fault_catalogue.h"
-#include "diagnosis/fault_plan.h"
-#include "diagnosis/fit_window.h"
-#include "diagnosis/observer_kernels.h"
-#include "diagnosis/taught.h"
+#include "diagnosis/decision/fault_plan.h"
+#include "diagnosis/model/fault_catalogue.h"
+#include "diagnosis/model/taught.h"
+#include "diagnosis/observers/fit_window.h"
+#include "diagnosis/observers/observer_kernels.h"
 #include "trainer/model_set_description.h"
 #include "trainer/observer_adaptation.h"
 #include "trainer/observer_calibration.h"

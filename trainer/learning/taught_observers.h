@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "diagnosis/model_set.h"
+#include "diagnosis/model/model_set.h"
 #include "trainer/dataset.h"
 
 namespace fdi::trainer {

@@ -5,8 +5,8 @@
 #include <optional>
 #include <vector>
 
-#include "diagnosis/model_set.h"
-#include "diagnosis/sample.h"
+#include "diagnosis/model/model_set.h"
+#include "diagnosis/model/sample.h"
 #include "trainer/dataset.h"
 #include "trainer/difference_observers.h"
 

@@ -6,7 +6,7 @@
 #include <iterator>
 
 #include "base/error.h"
-#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/model/fault_catalogue.h"
 #include "simulator/record_fit.h"
 #include "simulator/valve_simulation.h"
 

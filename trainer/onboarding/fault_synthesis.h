@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "base/mutex.h"
-#include "diagnosis/model_set.h"
-#include "diagnosis/sample.h"
+#include "diagnosis/model/model_set.h"
+#include "diagnosis/model/sample.h"
 #include "simulator/excitation.h"
 #include "simulator/valve_parameters.h"
 #include "trainer/difference_observers.h"

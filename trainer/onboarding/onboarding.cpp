@@ -11,7 +11,7 @@
 
 #include "base/error.h"
 #include "base/parallel_for.h"
-#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/model/fault_catalogue.h"
 #include "simulator/fault_effects.h"
 #include "simulator/record_fit.h"
 #include "simulator/second_look/valve_physics.h"

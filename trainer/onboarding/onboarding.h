@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "base/error.h"
-#include "diagnosis/model_set.h"
+#include "diagnosis/model/model_set.h"
 #include "simulator/valve_identification.h"
 #include "trainer/onboarding/coverage.h"
 #include "trainer/onboarding/fault_synthesis.h"

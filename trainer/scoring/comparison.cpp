@@ -5,7 +5,7 @@
 #include <sstream>
 #include <utility>
 
-#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/model/fault_catalogue.h"
 #include "report/text_table.h"
 #include "storage/models/model_codec.h"
 #include "trainer/scoring/evaluation_report.h"

@@ -3,8 +3,8 @@
 #include <vector>
 
 #include "base/parallel_for.h"
-#include "diagnosis/fault_catalogue.h"
-#include "diagnosis/quality_count.h"
+#include "diagnosis/model/fault_catalogue.h"
+#include "diagnosis/model/quality_count.h"
 #include "monitor/names/episode_names.h"
 #include "simulator/second_look/episode_looks.h"
 #include "simulator/second_look/valve_physics.h"

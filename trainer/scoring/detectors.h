@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "diagnosis/model_set.h"
+#include "diagnosis/model/model_set.h"
 #include "trainer/scoring/evaluated_run.h"
 #include "trainer/scoring/scored_runs.h"
 

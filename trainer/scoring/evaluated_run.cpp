@@ -5,7 +5,7 @@
 #include <string>
 
 #include "base/text.h"
-#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/model/fault_catalogue.h"
 
 namespace fdi::trainer {
 namespace {

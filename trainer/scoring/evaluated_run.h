@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "diagnosis/quality_count.h"
+#include "diagnosis/model/quality_count.h"
 #include "trainer/evaluation.h"
 
 namespace fdi::trainer {

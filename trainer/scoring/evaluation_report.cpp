@@ -7,7 +7,7 @@
 
 #include "base/csv_cells.h"
 #include "base/text.h"
-#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/model/fault_catalogue.h"
 #include "report/text_table.h"
 #include "trainer/statistics.h"
 

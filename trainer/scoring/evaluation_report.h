@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "diagnosis/model_set.h"
-#include "diagnosis/verdict.h"
+#include "diagnosis/model/model_set.h"
+#include "diagnosis/model/verdict.h"
 #include "report/report.h"
 #include "report/text_table.h"
 #include "trainer/scoring/detectors.h"

@@ -7,7 +7,7 @@
 #include <set>
 #include <utility>
 
-#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/model/fault_catalogue.h"
 #include "report/plot/figure.h"
 #include "report/plot/gnuplot.h"
 #include "report/report.h"

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "diagnosis/model_set.h"
+#include "diagnosis/model/model_set.h"
 #include "report/fault_texts.h"
 #include "trainer/scoring/detectors.h"
 

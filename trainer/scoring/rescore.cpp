@@ -7,7 +7,7 @@
 
 #include "base/error.h"
 #include "base/usual_period.h"
-#include "diagnosis/valve_engine.h"
+#include "diagnosis/decision/valve_engine.h"
 #include "trainer/campaign/run_input.h"
 
 namespace fdi::trainer {

@@ -4,7 +4,7 @@
 #include <memory>
 #include <vector>
 
-#include "diagnosis/second_fault.h"
+#include "diagnosis/decision/second_fault.h"
 #include "storage/runs/runs.h"
 #include "trainer/evaluation.h"
 

@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/model/fault_catalogue.h"
 #include "import/csv.h"
 #include "simulator/scenario/scenario_toml.h"
 #include "storage/runs/runs.h"

@@ -5,7 +5,7 @@
 
 #include <gmock/gmock.h>
 
-#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/model/fault_catalogue.h"
 #include "storage/models/models.h"
 #include "storage/runs/runs.h"
 #include "tests/programs/store/store_program_fixture.h"

@@ -7,7 +7,7 @@
 
 #include <gmock/gmock.h>
 
-#include "diagnosis/valve_engine.h"
+#include "diagnosis/decision/valve_engine.h"
 #include "storage/models/models.h"
 #include "storage/runs/run_recorder.h"
 #include "storage/runs/runs.h"

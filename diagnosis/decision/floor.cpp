@@ -1,0 +1,236 @@
+#include "diagnosis/decision/floor.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <vector>
+
+#include "diagnosis/model/fault_catalogue.h"
+
+namespace fdi {
+namespace {
+
+constexpr double kShut = 98.0;       // of CV and X [%]
+constexpr double kStop = 2.0;        // from an end of the travel [%]
+constexpr int kBreakaway = 5;        // samples that a rod may stay at rest
+constexpr int kStuckSamples = 10;    // for the position; twice as many for F
+constexpr double kLeastDp = 0.5;     // of the usual pressure drop
+constexpr double kFlowBorder = 0.9;  // of the largest flow: not saturated
+
+}  // namespace
+
+double NextRodPosition(const FloorLimits::Rod& rod, double x, double command) {
+  return x + std::clamp(rod.share * (command - x), -rod.rate, rod.rate);
+}
+
+void RodBand::Restart(double x) {
+  quick_ = slow_ = std::clamp(x, 0.0, 100.0);
+  commands_.fill(quick_);
+  resting_ = true;
+  wait_ = kBreakaway;
+}
+
+void RodBand::Step(double command) {
+  std::shift_right(commands_.begin(), commands_.end(), 1);
+  commands_[0] = std::clamp(command, 0.0, 100.0);
+  const double target = commands_[static_cast<std::size_t>(limits_->delay)];
+  quick_ = NextRodPosition(limits_->quick, quick_, target);
+  wait_ = resting_ && wait_ > 0 && std::abs(target - slow_) > kStop ? wait_ - 1
+                                                                    : wait_;
+  if (!resting_ || wait_ == 0) {
+    slow_ = NextRodPosition(limits_->slow, slow_, target);
+    resting_ = slow_ < kStop || slow_ > 100.0 - kStop;
+    const bool left = std::abs(target - slow_) > kStop;
+    wait_ = resting_ && !left ? kBreakaway : wait_;
+  }
+}
+
+double RodBand::Beyond(double x) const {
+  return x - std::clamp(x, std::min(quick_, slow_), std::max(quick_, slow_));
+}
+
+double FlowShapeAt(const FloorLimits& floor, double x) {
+  const std::vector<double>& f = floor.flow_shape;
+  if (f.empty()) {
+    return std::exp(-0.01 * floor.flow_exponent * x);
+  }
+  const double at =
+      std::clamp(0.01 * x, 0.0, 1.0) * static_cast<double>(f.size() - 1);
+  const auto i = std::min(static_cast<std::size_t>(at), f.size() - 2);
+  return std::lerp(f[i], f[i + 1], at - static_cast<double>(i));
+}
+
+double FlowAt(const FloorLimits& floor, double x, double dp) {
+  return floor.flow_gain * FlowShapeAt(floor, x) * std::sqrt(std::max(dp, 0.0));
+}
+
+double LeastFlowAt(const FloorLimits& floor, double x, double dp) {
+  const double share = std::clamp(dp / floor.dp_level, 0.0, 1.0);
+  return std::min(FlowAt(floor, x + 0.5 * floor.deviation, dp),
+                  floor.flow_high * std::sqrt(share));
+}
+
+bool IsShut(double x, double cv) {
+  return x >= kShut && cv >= kShut;
+}
+
+Floor::Floor(const ModelSet& models)
+    : limits_(models.floor ? &*models.floor : nullptr),
+      first_(static_cast<std::size_t>(
+          std::max(FaultIndex(models, kFirstFinding), 0))) {
+  if (limits_ != nullptr) {
+    rod_.emplace(*limits_);
+  }
+}
+
+void Floor::Restart() {
+  follows_ = false;
+  tests_ = {};
+  position_ = {};
+  flow_ = {};
+  findings_ = 0;
+  beginning_ = 0;
+}
+
+void Floor::Push(const Sample& sample) {
+  if (limits_ == nullptr) {
+    return;
+  }
+  const bool has_x = sample.Has(Signal::kX);
+  if (sample.mode != ValveMode::kAuto || !sample.Has(Signal::kCv) ||
+      !(has_x || (sample.Has(Signal::kF) && limits_->flow_share > 0.0))) {
+    Restart();
+    return;
+  }
+  if (!follows_) {
+    rod_->Restart(sample[has_x ? Signal::kX : Signal::kCv]);
+    follows_ = true;
+  }
+  rod_->Step(sample[Signal::kCv]);
+  const SignalMask uncertain = sample.uncertain();
+  if ((uncertain & (MaskOf(Signal::kCv) | MaskOf(Signal::kX))) != 0) {
+    return;
+  }
+  if (has_x) {
+    PushTravel(sample);
+  }
+  if (limits_->flow_gain > 0.0 && sample.Has(Signal::kF) &&
+      (uncertain & MaskOf(Signal::kF)) == 0) {
+    PushFlow(sample);
+  }
+  findings_ = 0;
+  beginning_ = 0;
+  for (std::size_t i = 0; i < kTests; ++i) {
+    const FaultSet bit = FaultSet{1} << (first_ + i);
+    findings_ |= tests_[i].found ? bit : 0;
+    beginning_ |= !tests_[i].found && tests_[i].length > 0 ? bit : 0;
+  }
+}
+
+void Floor::Count(int finding, bool beyond, double size, int needed,
+                  std::int64_t stamp_ns) {
+  Test& test = tests_[static_cast<std::size_t>(finding - kTravelDeviation)];
+  test.since_ns = beyond && test.length == 0 ? stamp_ns : test.since_ns;
+  test.length = beyond ? std::min(test.length + 1, needed) : 0;
+  test.size = std::clamp(size, -1.0, 1.0);
+  test.found = test.length >= needed;
+}
+
+// Finds a reading that repeats while its expected value moves by more than
+// `most`.
+void Floor::Watch(int finding, double reading, Expectations expected,
+                  double most, bool counts, const Sample& sample,
+                  Repeat& repeat) {
+  if (repeat.length == 0 || !counts || reading != repeat.reading) {
+    repeat = {reading, sample.stamp_ns, 0, expected, expected};
+  }
+  const int needed =
+      finding == kPositionStuck ? kStuckSamples : 2 * kStuckSamples;
+  repeat.length = std::min(repeat.length + 1, needed);
+  double travel = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < expected.size(); ++i) {
+    repeat.lowest[i] = std::min(repeat.lowest[i], expected[i]);
+    repeat.highest[i] = std::max(repeat.highest[i], expected[i]);
+    travel = std::min(travel, repeat.highest[i] - repeat.lowest[i]);
+  }
+  Test& test = tests_[static_cast<std::size_t>(finding - kTravelDeviation)];
+  test.found = repeat.length >= needed && travel > most;
+  test.since_ns = repeat.since_ns;
+  test.size = test.found ? 1.0 : 0.0;
+}
+
+void Floor::PushTravel(const Sample& sample) {
+  const double x = sample[Signal::kX];
+  const double deviation = rod_->Beyond(x);
+  // Each side counts separately: noise beyond both limits in turn is no
+  // finding.
+  Test& test = tests_[0];
+  if (test.length > 0 && std::signbit(test.size) != std::signbit(deviation)) {
+    test.length = 0;
+  }
+  Count(kTravelDeviation, std::abs(deviation) > limits_->deviation,
+        0.01 * deviation, limits_->deviation_samples, sample.stamp_ns);
+  // At a stop the rod does not move, whatever the command.
+  const auto within = [](double at) {
+    return std::clamp(at, kStop, 100.0 - kStop);
+  };
+  Watch(kPositionStuck, x, {within(rod_->quick()), within(rod_->slow())},
+        limits_->stuck_travel, true, sample, position_);
+}
+
+double Floor::DpOf(const Sample& sample) const {
+  return sample.Has(Signal::kP1) && sample.Has(Signal::kP2)
+             ? sample[Signal::kP1] - sample[Signal::kP2]
+             : limits_->dp_level;
+}
+
+// A valve in control that has lost its pressure has lost its flow with it, and
+// that is a finding. One that stands wide open without pressure is parked.
+double Floor::LeastFlow(double x, const Sample& sample) const {
+  const double least_dp =
+      sample[Signal::kCv] > kStop ? kLeastDp * limits_->dp_level : 0.0;
+  return limits_->flow_share *
+             LeastFlowAt(*limits_, x, std::max(DpOf(sample), least_dp)) -
+         limits_->flow_margin * limits_->flow_high;
+}
+
+void Floor::PushFlow(const Sample& sample) {
+  // Without a position the rod is where the flow is largest and smallest.
+  const bool has_x = sample.Has(Signal::kX);
+  const double x = has_x ? sample[Signal::kX] : rod_->most_open();
+  const double least_open = has_x ? x : rod_->least_open();
+  const double flow = sample[Signal::kF];
+  const double dp = DpOf(sample);
+  const double margin = limits_->flow_margin * limits_->flow_high;
+  const bool shut = IsShut(x, sample[Signal::kCv]);
+  Count(kShutFlow, shut && flow > margin, flow / limits_->flow_high,
+        limits_->flow_samples, sample.stamp_ns);
+  const double most = limits_->flow_factor *
+                          FlowAt(*limits_, x - 0.5 * limits_->deviation, dp) +
+                      margin;
+  Count(kExcessFlow, !shut && flow > most, (flow - most) / limits_->flow_high,
+        limits_->flow_samples, sample.stamp_ns);
+  const double least = LeastFlow(least_open, sample);
+  const bool follows = std::abs(rod_->Beyond(x)) <= limits_->deviation;
+  Count(kLowFlow, limits_->flow_share > 0.0 && !shut && follows && flow < least,
+        (least - flow) / limits_->flow_high, limits_->flow_samples,
+        sample.stamp_ns);
+  const bool within = flow > margin && flow < kFlowBorder * limits_->flow_high;
+  const double expected = FlowAt(*limits_, x, dp);
+  Watch(kFlowStuck, flow,
+        {expected, has_x ? expected : FlowAt(*limits_, least_open, dp)}, margin,
+        within, sample, flow_);
+}
+
+std::optional<std::int64_t> Floor::stamp_ns() const {
+  std::optional<std::int64_t> stamp;
+  for (const Test& test : tests_) {
+    if (test.found) {
+      stamp = std::min(stamp.value_or(test.since_ns), test.since_ns);
+    }
+  }
+  return stamp;
+}
+
+}  // namespace fdi

@@ -1,0 +1,86 @@
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "diagnosis/decision/engine_plan.h"
+#include "diagnosis/decision/second_fault.h"
+#include "diagnosis/model/model_set.h"
+#include "diagnosis/model/sample.h"
+#include "diagnosis/model/verdict.h"
+
+namespace fdi {
+
+/// Diagnoses one valve. Pure: what Step() returns depends on the samples given
+/// so far alone; no clock, no I/O, and no allocation after construction but
+/// for what a named fault needs (SecondFaultWatch). The monitor and
+/// `fdi-trainer evaluate` run this very class.
+///
+/// Not thread safe: one thread at a time per engine, and for all engines that
+/// share EngineParts. Model sets are shared.
+class ValveEngine {
+ public:
+  /// @throws DataError if `models` is not usable (Validate).
+  explicit ValveEngine(std::shared_ptr<const ModelSet> models);
+  /// For many valves of one model set, which share its parts: they belong to
+  /// one thread, all of them.
+  explicit ValveEngine(EngineParts parts);
+  ~ValveEngine();
+  ValveEngine(ValveEngine&&) noexcept;
+  ValveEngine& operator=(ValveEngine&&) noexcept;
+  ValveEngine(const ValveEngine&) = delete;
+  ValveEngine& operator=(const ValveEngine&) = delete;
+
+  /// Takes the next sample in order of arrival. The result stands until the
+  /// next call.
+  const Verdict& Step(const Sample& sample);
+
+  /// Ends an open episode for a reason from outside (stream ended, stale,
+  /// ...); the engine settles anew. @returns its kClosed transition, or
+  /// nothing if no episode was open.
+  std::optional<Transition> EndEpisode(EndReason reason);
+
+  /// Continues with another model set from the next sample on; order and
+  /// source of the samples stay known. As EndEpisode(kModelChanged).
+  std::optional<Transition> Adopt(std::shared_ptr<const ModelSet> models);
+  std::optional<Transition> Adopt(EngineParts parts);
+
+  /// While held, episodes are detected and stay unknown: for a valve whose
+  /// baseline is not trusted. Stays over Adopt().
+  void HoldIsolation(bool hold);
+
+  /// What is known of the valve outside of the engine is abnormal, or is not
+  /// any more: while it is, a valve that is judged has an episode, which does
+  /// not clear. Ends with EndEpisode() and Adopt().
+  void Suspect(bool suspected);
+
+  /// What the open episode is called where that is not the engine's name: a
+  /// second fault is on top of it (SecondFaultWatch).
+  void TakeName(const NameBeside& name);
+
+  /// The slow accumulators, for Restore() after a restart of the program:
+  /// windows of detection and whether the valve is armed (Coverage), with the
+  /// stamp of the last sample and the content hash of the model set. An open
+  /// episode is not among them.
+  std::vector<std::byte> Save() const;
+
+  /// Goes on with what Save() gave, if the next sample that reaches the
+  /// observers is at most 10 minutes younger; otherwise it counts for nothing.
+  /// @returns false and changes nothing if the bytes are damaged, of another
+  ///   format or of another model set.
+  bool Restore(std::span<const std::byte> bytes);
+
+  /// What Step() gave last.
+  const Verdict& verdict() const;
+  const ModelSet& models() const;
+  bool episode_open() const;
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace fdi

@@ -1,0 +1,70 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <span>
+
+#include "diagnosis/observers/observer_bank.h"
+#include "diagnosis/observers/residual_windows.h"
+
+namespace fdi {
+
+/// What is left of the residual of normal operation where its extrapolation and
+/// `margin` are taken away.
+double CertainResidual(const ObserverBank& bank, int channel,
+                       double margin = 0.0);
+
+/// Detects a fault: equation (1) on the residuals of the normal observer, and
+/// alike on their windows. Each test counts for itself, as its limits were
+/// fitted: noise that passes one limit now and another one next is no
+/// detection. What extrapolation put into a residual is taken away first.
+///
+/// Limits stay where training put them: a change over days is the growth of a
+/// fault, or that of a transmitter, and counts like any other.
+class Detection {
+ public:
+  /// `models` must outlive the detection.
+  explicit Detection(const ModelSet& models);
+
+  /// Runs and windows begin anew.
+  void Restart();
+
+  /// Samples are missing: runs end, the windows stay.
+  void Interrupt() { runs_.fill({}); }
+
+  /// Takes one sample and its residuals. Returns whether a single residual is
+  /// beyond its threshold.
+  /// @param margins that residuals of each channel may have anyway; empty: 0.
+  bool Push(const ObserverBank& bank, const Sample& sample,
+            std::span<const double> margins = {});
+
+  void Save(SnapshotWriter& writer) const;
+  /// @returns false, leaving it undefined, if there is nothing to be read.
+  bool Restore(SnapshotReader& reader);
+
+  /// True if some residual or window was beyond its limit, if only just.
+  bool pending() const;
+
+  /// The channels, by bit, with a run beyond a limit that is n_d long.
+  std::uint32_t beyond() const;
+
+  /// First sample of the earliest run beyond a limit that is n_d long.
+  std::optional<std::int64_t> stamp_ns() const;
+
+ private:
+  struct Run {  // samples beyond one limit, without a break
+    int length{0};
+    std::int64_t since_ns{0};
+  };
+  // Below and above of the residual; of each window below, above and energy.
+  static constexpr std::size_t kTestsPerChannel = 2 + 3 * kMaxWindows;
+
+  void Count(std::size_t test, bool beyond, std::int64_t stamp_ns);
+
+  const ModelSet* models_;
+  ResidualWindows windows_;
+  std::array<Run, kTestsPerChannel * kMaxChannels> runs_{};
+};
+
+}  // namespace fdi

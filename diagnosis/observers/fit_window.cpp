@@ -1,0 +1,117 @@
+#include "diagnosis/observers/fit_window.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "diagnosis/observers/observer_kernels.h"
+
+namespace fdi {
+
+bool JudgesFit(const ModelSet& models) {
+  return std::ranges::any_of(models.observers, [](const Observer& observer) {
+    return std::ranges::any_of(observer.channels,
+                               [](const ChannelObserver& channel) {
+                                 return channel.fit != FitBounds{};
+                               });
+  });
+}
+
+FitWindow::FitWindow(int length, std::size_t channels)
+    : length_(length),
+      channels_(channels),
+      ring_(static_cast<std::size_t>(length) * channels),
+      sums_(channels) {}
+
+// The ring needs no clearing: a row is taken off only once it is full again.
+void FitWindow::Restart() {
+  filled_ = 0;
+  next_ = 0;
+  std::ranges::fill(sums_, Sums{});
+}
+
+namespace {
+
+constexpr double kMostOff = 0.1;  // of the effect: two deviations
+
+// α, least squares within its bounds.
+double ShareOff(double zu, double uu) {
+  return uu > 0.0 ? std::clamp(zu / uu, -kMostOff, kMostOff) : 0.0;
+}
+
+}  // namespace
+
+void FitWindow::Add(const Entry& entry, int sign, Sums& sums) {
+  const double z = entry.z;
+  const double u = entry.u;
+  if (!std::isnan(z)) {
+    sums.z += sign * z;
+    sums.u += sign * u;
+    sums.zz += sign * z * z;
+    sums.zu += sign * z * u;
+    sums.uu += sign * u * u;
+    sums.count += sign;
+  }
+}
+
+// What is taken off has the bits that were added: the ring holds what counts.
+void FitWindow::Push(std::span<const double> z, std::span<const double> u) {
+  static const double kMost = std::sqrt(kMaxSquaredDistance);
+  Entry* row = &ring_[static_cast<std::size_t>(next_) * channels_];
+  for (std::size_t c = 0; c < channels_; ++c) {
+    if (full()) {
+      Add(row[c], -1, sums_[c]);
+    }
+    const double effect = u.empty() ? 0.0 : u[c];
+    const double most = kMost + kMostOff * std::abs(effect);
+    row[c] = {static_cast<float>(std::clamp(z[c], -most, most)),
+              static_cast<float>(effect)};
+    Add(row[c], 1, sums_[c]);
+  }
+  next_ = (next_ + 1) % length_;
+  filled_ = std::min(filled_ + 1, length_);
+}
+
+double FitWindow::mean(std::size_t channel) const {
+  const Sums& sums = sums_[channel];
+  return 2 * sums.count < filled_
+             ? std::numeric_limits<double>::quiet_NaN()
+             : (sums.z - ShareOff(sums.zu, sums.uu) * sums.u) / sums.count;
+}
+
+double FitWindow::square(std::size_t channel) const {
+  const Sums& sums = sums_[channel];
+  if (2 * sums.count < filled_) {
+    return std::numeric_limits<double>::quiet_NaN();
+  }
+  const double off = ShareOff(sums.zu, sums.uu);
+  return std::max(0.0, sums.zz - off * (2.0 * sums.zu - off * sums.uu)) /
+         sums.count;
+}
+
+double FitWindow::Excess(std::size_t channel, const FitBounds& limits) const {
+  const double m = mean(channel);
+  if (std::isnan(m) || limits == FitBounds{}) {
+    return 0.0;
+  }
+  // Both scatter with the root of the number of samples.
+  return std::sqrt(static_cast<double>(filled_) / length_) *
+         std::max(m / (m < 0.0 ? limits.lower_mean : limits.upper_mean),
+                  square(channel) / limits.upper_square);
+}
+
+void AccountedShare::Fade(double memory) {
+  for (double* sum : {&seen_, &left_, &noise_, &count_}) {
+    *sum *= memory;
+  }
+}
+
+void AccountedShare::Push(double normal, double residual) {
+  const double most = std::max(normal * normal, residual * residual);
+  const double weight = std::min(1.0, kMaxSquaredDistance / most);
+  seen_ += weight * normal * normal;
+  left_ += weight * residual * residual;
+  noise_ += weight;
+  count_ += 1.0;
+}
+
+}  // namespace fdi

@@ -1,0 +1,106 @@
+#pragma once
+
+#include <cstddef>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include "diagnosis/model/model_set.h"
+
+namespace fdi {
+
+/// Extrapolation excuses a residual of some deviations, not any: an observer
+/// far from where it was trained cannot be said to fit. In variances.
+inline constexpr double kMaxFitVariance = 10.0;
+
+/// The set says how faults that act fit (FitBounds).
+bool JudgesFit(const ModelSet& models);
+
+/// How an explanation fits, over the last t_k samples: the mean m and the mean
+/// square q of z = r/√S by channel, |z| bounded at 5. A reading of which
+/// nothing is known, or that is beyond a limit of its transmitter as predicted,
+/// has no z; a channel with a z in less than half of the samples says nothing.
+///
+/// The effect of a fault may be off by a share α, the same in all samples of
+/// the window: with u the effect in units of √S, m and q are those of z − α u,
+/// α being the best in [−0.1, 0.1].
+class FitWindow {
+ public:
+  FitWindow(int length, std::size_t channels);
+
+  void Restart();
+
+  /// @param z by channel; NaN abstains.
+  /// @param u the effect by channel; empty: none may be off.
+  void Push(std::span<const double> z, std::span<const double> u = {});
+
+  bool full() const { return filled_ == length_; }
+
+  /// How far beyond its limits m or q of a channel is: 1 at a limit, 0 where
+  /// nothing is known. Of fewer than t_k samples the limits are wider.
+  double Excess(std::size_t channel, const FitBounds& limits) const;
+
+  /// m; NaN where the channel says nothing.
+  double mean(std::size_t channel) const;
+  double square(std::size_t channel) const;
+
+ private:
+  struct Entry {
+    float z{0.0F};
+    float u{0.0F};
+  };
+  struct Sums {  // over the window
+    double z{0.0};
+    double u{0.0};
+    double zz{0.0};
+    double zu{0.0};
+    double uu{0.0};
+    int count{0};
+  };
+
+  static void Add(const Entry& entry, int sign, Sums& sums);
+
+  int length_;
+  std::size_t channels_;
+  int filled_{0};
+  int next_{0};
+  std::vector<Entry> ring_;  // by sample and channel
+  std::vector<Sums> sums_;
+};
+
+/// How much of what normal operation does not explain in a channel another
+/// explanation accounts for. With r_0 and r their residuals in deviations of
+/// the normal one, both scaled down where one of them is beyond 5,
+///
+///     (Σ r_0² − Σ r²)/(Σ r_0² − n).
+///
+/// An explanation that only tolerates what it sees has about 0, the right one
+/// 1, one whose effect is off by half 3/4.
+class AccountedShare {
+ public:
+  static constexpr double kLeast = 0.5;      ///< Of one that explains,
+  static constexpr double kLeastOwn = 0.75;  ///< in the data of its own fault.
+
+  /// What is gathered counts less from now on.
+  void Fade(double memory);
+  void Push(double normal, double residual);
+
+  /// Normal operation is off by more than another day would make it, over
+  /// `least` samples or more.
+  bool tells(int least) const {
+    return count_ >= 0.9 * least && seen_ > kTelling * count_;
+  }
+  /// Mean of r_0².
+  double normal() const { return seen_ / count_; }
+  double share() const { return (seen_ - left_) / (seen_ - noise_); }
+
+ private:
+  static constexpr double kTelling = 3.0;  // mean of r_0²
+
+  double seen_{0.0};
+  double left_{0.0};
+  double noise_{0.0};
+  double count_{0.0};
+};
+
+}  // namespace fdi
