@@ -550,8 +550,13 @@ void CsvReader::Finish() const {
   if (rows_ == 0 && !pending_.empty()) {
     throw DataError(pending_);
   }
-  if (rows_ == 0 && !tag_column_) {
-    throw DataError(options_.source + ": has a header but no rows");
+  if (tag_column_ && !options_.scan && options_.map.columns.empty()) {
+    throw DataError(options_.source + ": no tag of column " +
+                    Quoted(names_[*tag_column_]) +
+                    " is mapped to a signal; the tags are " +
+                    Quoted(Listed(header_.ignored_columns)) +
+                    "; try column under [signal.CV] and under [signal.X] or "
+                    "[signal.F] of --map");
   }
   for (std::size_t i = 0; i < used_.size(); ++i) {
     if (!used_[i]) {
@@ -563,6 +568,9 @@ void CsvReader::Finish() const {
                       std::string(SignalName(conversions_[i].mapping.signal)) +
                       "] of --map");
     }
+  }
+  if (rows_ == 0) {
+    throw DataError(options_.source + ": has a header but no rows");
   }
 }
 

@@ -523,6 +523,33 @@ TEST(CsvTest, RepeatsOfALongTableAreThoseOfATag) {
   EXPECT_EQ(table.runs[0].samples[1].sample[Signal::kX], 43.0);
 }
 
+// A long table names its signals in rows: without a map of tags it has none.
+TEST(CsvTest, ALongTableWithoutAMappedTagIsRefusedWithItsTags) {
+  for (const bool resampled : {false, true}) {
+    CsvOptions options;
+    options.map.long_table = LongTable{"Tag", "Value", ""};
+    options.map.time_column = "Time";
+    if (resampled) {
+      options.map.resampling = Resampling{5.0, true, 600.0};
+    }
+    const auto read = [&](const std::string& rows) {
+      try {
+        ReadCsv("Time,Tag,Value\n" + rows, options);
+      } catch (const DataError& error) {
+        return std::string(error.what());
+      }
+      return std::string();
+    };
+
+    EXPECT_THAT(
+        read("2026-03-10T08:00:00Z,FIC23.OP,45.11\n"
+             "2026-03-10T08:00:00Z,FIC23.PV,4.929\n"),
+        AllOf(HasSubstr("no tag of column \"Tag\" is mapped"),
+              HasSubstr("FIC23.OP,FIC23.PV"), HasSubstr("[signal.CV]")));
+    EXPECT_THAT(read(""), Not(IsEmpty()));
+  }
+}
+
 TEST(CsvTest, FilesThatCannotBeReadAreNamedWithTheReason) {
   const storage::TemporaryDirectory directory;
   const auto message = [](const std::filesystem::path& path) {
