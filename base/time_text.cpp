@@ -8,9 +8,12 @@
 #include <cstdio>
 #include <cstdlib>
 #include <ctime>
-#include <filesystem>
+#include <limits>
 #include <optional>
 #include <regex>
+#include <stdexcept>
+
+#include <date/tz.h>
 
 #include "base/csv_cells.h"
 #include "base/error.h"
@@ -128,7 +131,7 @@ std::optional<int> MonthOf(std::string_view word) {
   return std::nullopt;
 }
 
-// mktime() and timegm() would turn 31 February into 3 March without an error.
+// timegm() would turn 31 February into 3 March without an error.
 bool TakeDate(int year, int month, int day, std::tm& fields) {
   fields.tm_year = year - 1900;
   fields.tm_mon = month - 1;
@@ -519,15 +522,18 @@ std::optional<CivilTime> ScanTime(std::string_view text, DateOrder order) {
 
 namespace {
 
-// glibc takes an unknown TZ for UTC without an error. The name must therefore
-// be a file of the zone database, inside its folder.
-bool IsZoneFile(const std::string& zone) {
-  return zone.find("..") == std::string::npos &&
-         std::filesystem::is_regular_file("/usr/share/zoneinfo/" + zone);
+// The zone of this name in the time zone database of the machine, or nothing.
+const date::time_zone* FindZone(const std::string& name) {
+  try {
+    return date::locate_zone(name);
+  } catch (const std::runtime_error&) {
+    return nullptr;
+  }
 }
 
-// Debian 13 has moved names that are no places to the package tzdata-legacy.
-// Those of the time zone database 2024b (file backward) for what plants use.
+// Debian 13 moved the names that are not places to the package tzdata-legacy.
+// The places are those of the time zone database 2024b (file backward), for the
+// names that plants use.
 std::string PlaceOf(std::string zone) {
   static constexpr std::pair<std::string_view, const char*> kPlaces[] = {
       {"CET", "Europe/Brussels"},        {"MET", "Europe/Brussels"},
@@ -537,7 +543,7 @@ std::string PlaceOf(std::string zone) {
       {"MST7MDT", "America/Denver"},     {"HST", "Pacific/Honolulu"},
       {"PST8PDT", "America/Los_Angeles"}};
   for (const auto& [name, place] : kPlaces) {
-    if (name == zone && !IsZoneFile(zone)) {
+    if (name == zone && FindZone(zone) == nullptr) {
       return place;
     }
   }
@@ -549,11 +555,16 @@ std::string PlaceOf(std::string zone) {
 LocalClock::LocalClock(std::string zone) : zone_(PlaceOf(std::move(zone))) {
   CivilTime offset;
   Scanner scanner(zone_);
-  // "CET" is a file with summer time, and a fixed offset only behind a time.
-  if (!zone_.empty() && ZoneOf(zone_).value_or(0) == 0 &&
-      ScanOffset(scanner, offset)) {
+  // "CET" is a zone with summer time, and a fixed offset only behind a time.
+  if (zone_.empty()) {
+    return;
+  }
+  if (ZoneOf(zone_).value_or(0) == 0 && ScanOffset(scanner, offset)) {
     fixed_s_ = offset.offset_s;
-  } else if (!zone_.empty() && !IsZoneFile(zone_)) {
+    return;
+  }
+  rules_ = FindZone(zone_);
+  if (rules_ == nullptr) {
     throw ConfigError("zone '" + zone_ +
                       "' is not known here; accepted are UTC, offsets such as "
                       "+01:00 and, with the package tzdata, names such as "
@@ -562,90 +573,58 @@ LocalClock::LocalClock(std::string zone) : zone_(PlaceOf(std::move(zone))) {
   }
 }
 
-// The offsets from UTC, in summer and in standard time, with which the clock
-// showed `fields`: none in the hour that is skipped in spring, two in the hour
-// that is repeated in autumn, else one. Summer time comes first, because it is
-// the earlier of the two.
-//
-// The C library has one time zone per process, so TZ is exchanged and restored.
-// setenv() and tzset() are not thread-safe: no other thread may read the
-// environment or convert local times meanwhile.
-void LocalClock::FindOffsets(const std::tm& fields) {
-  const char* before = std::getenv("TZ");
-  const std::optional<std::string> saved =
-      before != nullptr ? std::optional<std::string>(before) : std::nullopt;
-  if (!zone_.empty()) {
-    setenv("TZ", zone_.c_str(), 1);
-    tzset();
+int LocalClock::OffsetAt(std::time_t utc_s) const {
+  if (fixed_s_) {
+    return *fixed_s_;
   }
-  offsets_s_.clear();
-  for (const int summer : {1, 0}) {
-    std::tm trial = fields;
-    trial.tm_isdst = summer;
-    mktime(&trial);
-    // Otherwise mktime() changed it to a time that the clock did show.
-    if (trial.tm_isdst == summer && trial.tm_hour == fields.tm_hour &&
-        trial.tm_min == fields.tm_min) {
-      offsets_s_.push_back(static_cast<int>(trial.tm_gmtoff));
-    }
+  if (rules_ != nullptr) {
+    const date::sys_seconds instant{std::chrono::seconds(utc_s)};
+    return static_cast<int>(rules_->get_info(instant).offset.count());
   }
-  if (!zone_.empty()) {
-    saved ? setenv("TZ", saved->c_str(), 1) : unsetenv("TZ");
-    tzset();
-  }
+  std::tm fields{};
+  localtime_r(&utc_s, &fields);
+  return static_cast<int>(fields.tm_gmtoff);
 }
 
 std::optional<std::int64_t> LocalClock::Utc(const CivilTime& time,
-                                            std::int64_t last_ns) {
-  constexpr std::time_t kHalfHour = 1800;
+                                            std::int64_t last_ns) const {
+  constexpr std::time_t kDay = 86'400;
+  constexpr std::time_t kLimit = 9'223'372'000;  // int64 ns overflow in 2262.
   std::tm fields = time.fields;
   const std::time_t shown = timegm(&fields);
-  if (fields.tm_year < 0 || fields.tm_year > 2261 - 1900) {
-    return std::nullopt;
-  }
-  std::vector<int> offsets{time.offset_s.value_or(fixed_s_.value_or(0))};
-  if (!time.offset_s && !fixed_s_) {
-    // Asking the C library anew for every row would be slow. Today's zones
-    // change their offsets at full or half hours, so those of half an hour are
-    // kept.
-    if (std::time_t half = shown / kHalfHour; half != known_) {
-      FindOffsets(fields);  // Of 23:59:60 those of the next day.
-      known_ = half;
-    }
-    offsets = offsets_s_;
-  }
   std::optional<std::int64_t> found;
-  // stamp = shown - offset. The offsets descend, so the stamps ascend, and the
-  // first one that is not before the previous row is taken. If all are before
-  // it, it is the last.
-  for (const int offset : offsets) {
-    const std::int64_t stamp =
-        (shown - offset) * kNsPerSecond + time.fraction_ns;
+  // A clock is changed at most once in two days, so its offset is the one of
+  // the day before or the one of the day after. An offset counts if it was in
+  // force at the instant that it leads to: neither was in the hour that is
+  // skipped in spring, both were in the hour that is repeated in autumn. The
+  // one of the day before leads to the earlier instant of the two.
+  for (const std::time_t other_day : {shown - kDay, shown + kDay}) {
+    const int offset = time.offset_s ? *time.offset_s : OffsetAt(other_day);
+    const std::time_t utc = shown - offset;
+    if (utc < -kLimit || utc > kLimit ||
+        (!time.offset_s && OffsetAt(utc) != offset)) {
+      continue;
+    }
     if (!found || *found < last_ns) {
-      found = stamp;
+      found = utc * kNsPerSecond + time.fraction_ns;
     }
   }
   return found;
 }
 
+std::int64_t ParseTime(std::string_view text, const LocalClock& clock) {
+  const auto time = ScanTime(text);
+  const auto stamp =
+      time ? clock.Utc(*time, std::numeric_limits<std::int64_t>::min())
+           : std::nullopt;
+  if (!stamp) {
+    RefuseTime(text);
+  }
+  return *stamp;
+}
+
 std::int64_t ParseTime(std::string_view text, bool utc) {
-  const std::optional<CivilTime> time = ScanTime(text);
-  if (!time) {
-    RefuseTime(text);
-  }
-  std::tm fields = time->fields;
-  std::time_t seconds = 0;
-  if (time->offset_s || utc) {
-    seconds = timegm(&fields) - time->offset_s.value_or(0);
-  } else {
-    fields.tm_isdst = -1;  // mktime() determines daylight saving time.
-    seconds = mktime(&fields);
-  }
-  constexpr std::time_t kLimit = 9'223'372'000;  // int64 ns overflow in 2262.
-  if (seconds < -kLimit || seconds > kLimit) {
-    RefuseTime(text);
-  }
-  return seconds * kNsPerSecond + time->fraction_ns;
+  return ParseTime(text, LocalClock(utc ? "UTC" : ""));
 }
 
 std::int64_t ParseTimeOrAgo(std::string_view text, bool utc,

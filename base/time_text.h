@@ -5,7 +5,10 @@
 #include <optional>
 #include <string>
 #include <string_view>
-#include <vector>
+
+namespace date {
+class time_zone;
+}
 
 namespace fdi {
 
@@ -29,7 +32,7 @@ enum class DateOrder { kNotSaid, kDayFirst, kMonthFirst, kYearFirst };
 std::optional<CivilTime> ScanTime(std::string_view text,
                                   DateOrder order = DateOrder::kNotSaid);
 
-/// Converts local time to UTC.
+/// Converts local time to UTC. Threads may share one.
 class LocalClock {
  public:
   /// @param zone "Europe/Warsaw", "UTC", "+01:00"; empty: the machine's zone.
@@ -38,24 +41,27 @@ class LocalClock {
 
   /// An ambiguous time (in autumn) is resolved to the first one that is not
   /// before `last_ns`. A time with an offset needs no zone.
-  /// @returns nothing for a time that does not exist (in spring), or outside
-  ///   the years 1900 to 2261.
-  std::optional<std::int64_t> Utc(const CivilTime& time, std::int64_t last_ns);
+  /// @returns nothing for a time that does not exist (in spring), or that a
+  ///   stamp cannot hold (before 1678, after 2261).
+  std::optional<std::int64_t> Utc(const CivilTime& time,
+                                  std::int64_t last_ns) const;
 
   const std::string& zone() const { return zone_; }
 
  private:
-  void FindOffsets(const std::tm& fields);
+  /// Seconds that the clock is ahead of UTC.
+  int OffsetAt(std::time_t utc_s) const;
 
   std::string zone_;
   std::optional<int> fixed_s_;
-  std::time_t known_{-1};       // Index of a half hour
-  std::vector<int> offsets_s_;  // with these offsets.
+  const date::time_zone* rules_{nullptr};  // Null: fixed, or the machine's.
 };
 
 /// Parses RFC 3339; "T" may be a blank, time of day and seconds are optional.
-/// Without an offset it is local time, or UTC if `utc`.
+/// A time without an offset is one of `clock`.
 /// @throws ConfigError naming the accepted forms.
+std::int64_t ParseTime(std::string_view text, const LocalClock& clock);
+/// The same; without an offset it is local time, or UTC if `utc`.
 std::int64_t ParseTime(std::string_view text, bool utc);
 
 /// Parses a time, a duration ("2h") before `now_ns`, or "now".

@@ -17,7 +17,7 @@ packages=(
   libeigen3-dev libsundials-dev
   libsqlite3-dev libsqlitecpp-dev sqlite3 zlib1g-dev libssl-dev libcrypt-dev libpq-dev
   libcpp-httplib-dev libsystemd-dev
-  libcli11-dev libtomlplusplus-dev libspdlog-dev nlohmann-json3-dev
+  libcli11-dev libtomlplusplus-dev libspdlog-dev nlohmann-json3-dev libhowardhinnant-date-dev
   gnuplot-nox
 )
 for_package=(dpkg-dev file gzip help2man)

@@ -31,6 +31,8 @@ forbid '^((diagnosis|idl|simulator|trainer|monitor)/[^/]+$|(base|plant|storage)/
   'command line, logging and JSON belong to the programs'
 forbid '^(diagnosis|idl|import|simulator|storage|trainer|monitor|planner|plant|programs)/' 'toml\+\+' \
   'TOML belongs to base and to the options'
+forbid '^(diagnosis|idl|import|report|simulator|storage|trainer|monitor|planner|plant|programs|bench)/' 'date/' \
+  'time zones belong to base'
 forbid '^((base|diagnosis|idl|import|report|simulator|trainer|storage|plant|programs)/|planner/[^/]+$)' 'httplib\.h' \
   'HTTP belongs to the monitor and to what planner/live adds to its page'
 forbid '^(diagnosis|idl|import|simulator|storage|trainer|monitor|planner|plant|programs|bench)/' '(shared_)?mutex>' \

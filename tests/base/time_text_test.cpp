@@ -2,7 +2,10 @@
 
 #include <cstdlib>
 #include <ctime>
+#include <future>
 #include <limits>
+#include <span>
+#include <string>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -96,6 +99,79 @@ TEST_F(TimeTextTest, TimesAreReadAsHistoriansAndSpreadsheetsWriteThem) {
 TEST_F(TimeTextTest, ANameOfAZoneKeepsItsSummerTime) {
   EXPECT_EQ(LocalClock("CET").Utc(*ScanTime("2026-07-10 09:00"), 0),
             LocalClock("Europe/Berlin").Utc(*ScanTime("2026-07-10 09:00"), 0));
+  EXPECT_THROW(LocalClock("Europe/Atlantis"), ConfigError);
+  EXPECT_THROW(LocalClock("../zoneinfo/UTC"), ConfigError);
+}
+
+// A time that a clock of a zone shows, and the instant that it is.
+struct Shown {
+  const char* text;
+  const char* utc;    // "none": the clock never showed it.
+  const char* after;  // Of an hour that is shown twice: the row before.
+};
+
+std::string UtcOf(const LocalClock& clock, const Shown& shown) {
+  const auto stamp =
+      clock.Utc(*ScanTime(shown.text), ParseTime(shown.after, true));
+  return stamp ? FormatTime(*stamp, true) : "none";
+}
+
+constexpr Shown kNewYork[] = {
+    {"2026-03-08 01:59:59", "2026-03-08T06:59:59Z", "2026-01-01"},
+    {"2026-03-08 02:30", "none", "2026-01-01"},
+    {"2026-03-08 03:00", "2026-03-08T07:00:00Z", "2026-01-01"},
+    {"2026-07-10 09:00", "2026-07-10T13:00:00Z", "2026-01-01"},
+    {"2026-11-01 01:30", "2026-11-01T05:30:00Z", "2026-01-01"},
+    {"2026-11-01 01:30", "2026-11-01T06:30:00Z", "2026-11-01 05:45"},
+    {"2026-11-01 02:00", "2026-11-01T07:00:00Z", "2026-01-01"}};
+
+// Its summer is half an hour ahead, and ends in April.
+constexpr Shown kLordHowe[] = {
+    {"2026-04-05 01:45", "2026-04-04T14:45:00Z", "2026-01-01"},
+    {"2026-04-05 01:45", "2026-04-04T15:15:00Z", "2026-04-04 14:50"},
+    {"2026-07-10 09:00", "2026-07-09T22:30:00Z", "2026-01-01"},
+    {"2026-10-04 02:15", "none", "2026-01-01"},
+    {"2026-10-04 02:30", "2026-10-03T15:30:00Z", "2026-01-01"}};
+
+TEST_F(TimeTextTest, GapAndOverlapAreThoseOfTheZone) {
+  for (const Shown& shown : kNewYork) {
+    EXPECT_EQ(UtcOf(LocalClock("America/New_York"), shown), shown.utc);
+  }
+  for (const Shown& shown : kLordHowe) {
+    EXPECT_EQ(UtcOf(LocalClock("Australia/Lord_Howe"), shown), shown.utc);
+  }
+  // Those of the machine, which is in Warsaw here.
+  EXPECT_EQ(UtcOf(LocalClock(""), {"2026-03-29 02:30", "", "1970-01-01"}),
+            "none");
+  EXPECT_EQ(UtcOf(LocalClock(""), {"2026-10-25 02:30", "", "1970-01-01"}),
+            "2026-10-25T00:30:00Z");
+  EXPECT_EQ(UtcOf(LocalClock(""), {"2026-10-25 02:30", "", "2026-10-25 00:45"}),
+            "2026-10-25T01:30:00Z");
+  // Samoa has skipped a whole day.
+  const LocalClock samoa("Pacific/Apia");
+  EXPECT_EQ(UtcOf(samoa, {"2011-12-30 12:00", "", "1970-01-01"}), "none");
+  EXPECT_EQ(UtcOf(samoa, {"2011-12-31 00:00", "", "1970-01-01"}),
+            "2011-12-30T10:00:00Z");
+}
+
+// Records of a plant are read by several threads at a time.
+TEST_F(TimeTextTest, ThreadsConvertInZonesOfTheirOwn) {
+  const auto wrong = [](const char* zone, std::span<const Shown> all) {
+    int count = 0;
+    LocalClock clock(zone);
+    for (int i = 0; i < 2000; ++i) {
+      for (const Shown& shown : all) {
+        count += UtcOf(clock, shown) == shown.utc ? 0 : 1;
+      }
+    }
+    return count;
+  };
+  auto east = std::async(std::launch::async, wrong, "Australia/Lord_Howe",
+                         std::span(kLordHowe));
+  auto west = std::async(std::launch::async, wrong, "America/New_York",
+                         std::span(kNewYork));
+  EXPECT_EQ(east.get(), 0);
+  EXPECT_EQ(west.get(), 0);
 }
 
 TEST_F(TimeTextTest, ALeapSecondIsTheFirstOfTheNextDay) {
