@@ -381,8 +381,12 @@ SessionStart HistoryWriter::BeginSession(
 
 void HistoryWriter::EndSession(std::int64_t now_ns, bool clean) {
   traces_.EndAll();
-  CommitBatch(
-      [&] { database_.Run(sql::end_session, clean, StoreSignOfLife(now_ns)); });
+  CommitBatch([&] {
+    // There is none if the file was replaced and did not take another one.
+    if (session_id_) {
+      database_.Run(sql::end_session, clean, StoreSignOfLife(now_ns));
+    }
+  });
   session_id_.reset();
   database_.Checkpoint();
 }

@@ -61,7 +61,8 @@ class HistoryWriter {
       std::int64_t now_ns, const std::string& software,
       const std::string& config,
       const std::map<std::string, std::string>& fault_names = {});
-  /// Commits everything pending and checkpoints the file.
+  /// Commits everything pending and checkpoints the file. Ends no session if
+  /// none was begun in this file.
   void EndSession(std::int64_t now_ns, bool clean);
 
   /// Runs `batch`, which calls Record() and Resume(), in one transaction

@@ -66,6 +66,24 @@ TEST_F(HistoryWriterTest, ViewHasTheNamesOfTheMonitorThatStartedLast) {
             "Travel blocked or Flow wrong");
 }
 
+// A file that was replaced and took no session, as on a full disk, has none to
+// end: the one in it, of before the copy, died.
+TEST_F(HistoryWriterTest, WithoutASessionNobodysIsEnded) {
+  HistoryWriter writer(path_);
+  writer.BeginSession(kDetected, "test", "");
+  const std::filesystem::path copy = path_.string() + ".copy";
+  writer.database().BackupTo(copy);
+  std::filesystem::rename(copy, path_);
+  ASSERT_TRUE(writer.Refresh());
+
+  writer.EndSession(kDetected + 60 * kSecond, true);
+
+  EXPECT_EQ(Sql("SELECT count(*) FROM monitor_session WHERE stop_ns IS NULL"),
+            "1");
+  EXPECT_EQ(writer.BeginSession(kDetected + 90 * kSecond, "test", "").died_ns,
+            kDetected);
+}
+
 TEST_F(HistoryWriterTest, WhatTheSetKnowsIsKeptWithItsSigns) {
   auto models = std::make_shared<ModelSet>(*Event(Kind::kDetected, 0).models);
   models->faults = {2, 5, 19};
