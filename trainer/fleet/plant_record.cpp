@@ -47,7 +47,7 @@ std::string WithHint(const PlantJob& job, const RowSource& source,
 
 // Seconds from the start of the table; a bound that is not stated is `open`.
 double BoundOf(const std::string& text, const importer::CsvTable& table,
-               bool utc, double open) {
+               const std::string& zone, double open) {
   if (text.empty()) {
     return open;
   }
@@ -59,15 +59,18 @@ double BoundOf(const std::string& text, const importer::CsvTable& table,
                       ", and the times of the file have no date; type seconds "
                       "of the file");
   }
-  return static_cast<double>(ParseTime(text, utc) - table.start_ns) * 1e-9;
+  return static_cast<double>(ParseTime(text, LocalClock(zone)) -
+                             table.start_ns) *
+         1e-9;
 }
 
 storage::RunSelector WindowOf(const PlantJob& job, const RowSource& source,
-                              const importer::CsvTable& table, bool utc) {
+                              const importer::CsvTable& table,
+                              const std::string& zone) {
   storage::RunSelector selector;
   selector.id = source.path.filename().string();
-  selector.from_s = BoundOf(job.row.from, table, utc, selector.from_s);
-  selector.to_s = BoundOf(job.row.to, table, utc, selector.to_s);
+  selector.from_s = BoundOf(job.row.from, table, zone, selector.from_s);
+  selector.to_s = BoundOf(job.row.to, table, zone, selector.to_s);
   return selector;
 }
 
@@ -105,7 +108,8 @@ std::vector<storage::StoredRun> ReadRuns(const PlantJob& job,
       throw DataError(WithHint(job, source, error.what()));
     }
     seen += (seen.empty() ? "" : ", ") + PeriodOf(table, utc);
-    storage::RunSelector window = WindowOf(job, source, table, utc);
+    storage::RunSelector window =
+        WindowOf(job, source, table, texts[i].form.zone);
     storage::StoredRun run = RunOf(std::move(table), std::move(window));
     if (!run.samples.empty()) {
       runs.push_back(std::move(run));

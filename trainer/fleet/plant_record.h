@@ -26,7 +26,7 @@ std::uint64_t InputHash(const PlantJob& job, const std::vector<RowText>& texts,
                         const std::string& kind);
 
 /// The healthy record of a valve.
-/// @param utc times of the row without a zone are UTC.
+/// @param utc messages show times in UTC.
 /// @throws DataError, ConfigError with what was seen and what to type.
 std::vector<TrainingRun> ReadValve(const PlantJob& job,
                                    const std::vector<RowText>& texts, bool utc);

@@ -16,7 +16,7 @@ struct PlantSettings {
   std::filesystem::path folder;  ///< That files and types of rows start from.
   int shard{1};                  ///< 1..shards
   int shards{1};
-  bool utc{false};               ///< Times of rows without a zone are UTC.
+  bool utc{false};               ///< Messages show times in UTC.
   OnboardingOptions onboarding;  ///< Of every row, but for name and type.
   std::function<bool()> stop{};  ///< Asked often; any thread.
 };

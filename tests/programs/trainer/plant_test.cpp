@@ -1,6 +1,7 @@
 // onboard --plant: rows that cannot be used, and that the others go on. What it
 // makes of valves with a type is measured by bench/plant_table.sh.
 #include <cmath>
+#include <cstdio>
 #include <map>
 
 #include <gmock/gmock.h>
@@ -27,6 +28,7 @@ class PlantTest : public TrainerProgram {
       }
     }
     csv += ",D.MODE,D.MODE2\n";
+    std::string dated = "time,A.OP,A.PV,A.SP\n";
     double pv = 20.0;
     double integral = 40.0;
     for (int k = 0; k < 900; ++k) {
@@ -37,8 +39,13 @@ class PlantTest : public TrainerProgram {
       const std::string one = Cells(op, pv, sp);
       csv += std::to_string(k) + one + one + Cells(op, 7.5, sp) + one +
              Cells(pv, op, sp) + ",PROG,PROG\n";
+      char time[32];
+      std::snprintf(time, sizeof time, "2026-03-10 09:%02d:%02d", k / 60,
+                    k % 60);
+      dated += time + one + '\n';
     }
     Write("day.csv", csv);
+    Write("dated.csv", dated);
   }
 
   static std::string Cells(double op, double pv, double sp) {
@@ -97,6 +104,26 @@ TEST_F(PlantTest, WhatIsWrongWithARowIsSaidAndTheOthersGoOn) {
 TEST_F(PlantTest, WordsOfThePlantAreModes) {
   const auto rows = Onboard("D,,,,D.MODE,,,,,\"prog, auto\"\n");
   EXPECT_EQ(rows.at("D")["state"], "data_only") << rows.at("D");
+}
+
+TEST_F(PlantTest, FromAndToAreInTheZoneOfTheTimesOfTheFile) {
+  Write("plant.toml",
+        "files = [\"dated.csv\"]\n"
+        "zone = \"Asia/Tokyo\"\n"
+        "[defaults]\n"
+        "op = \"A.OP\"\npv = \"A.PV\"\nsp = \"A.SP\"\nservice = \"F\"\n"
+        "[[loop]]\nname = \"LOCAL\"\n"
+        "from = \"2026-03-10 09:02\"\nto = \"2026-03-10 09:14\"\n"
+        "[[loop]]\nname = \"UTC\"\n"
+        "from = \"2026-03-10T00:02Z\"\nto = \"2026-03-10T00:14Z\"\n"
+        "[[loop]]\nname = \"LATE\"\nfrom = \"2026-03-10 10:00\"\n");
+  // --utc is for the times of files and tables that state no zone.
+  const json rows = RunJson("onboard --plant plant.toml --utc")["rows"];
+  ASSERT_EQ(rows.size(), 3U);
+  EXPECT_EQ(rows[0]["state"], "data_only") << rows[0];
+  EXPECT_EQ(rows[0]["finding"], rows[1]["finding"]);
+  EXPECT_THAT(rows[2]["finding"].get<std::string>(),
+              HasSubstr("the record is from 2026-03-10T00:00:00Z"));
 }
 
 TEST_F(PlantTest, ASecondRunDoesOnlyRowsThatChanged) {
