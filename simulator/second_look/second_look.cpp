@@ -137,7 +137,7 @@ class Looker {
   ChannelFit FitWithoutFault() const;
   std::vector<Hypothesis> Hypotheses() const;
   std::vector<Hypothesis> FitHypotheses(const std::stop_token& stop);
-  double ObservedStop() const;
+  std::optional<double> ObservedStop() const;
   void Try(Hypothesis& hypothesis, double strength);
   void TryCourse(Hypothesis& hypothesis, Course course);
   Hypothesis PerforationLike(const Hypothesis& supply_drop, Course course);
@@ -562,12 +562,19 @@ std::vector<Hypothesis> Looker::Hypotheses() const {
 }
 
 // The strength of f1 whose stop, X = 100 (1 - s) %, X does not pass in 98 % of
-// the rows behind the detection. Between two stops, one passed and one not, X
-// is not linear, so that the search by itself may miss the right one.
-double Looker::ObservedStop() const {
+// its readings behind the detection. Between two stops, one passed and one not,
+// X is not linear, so that the search by itself may miss the right one. Nothing
+// if X was never read there.
+std::optional<double> Looker::ObservedStop() const {
   std::vector<double> x;
   for (int k = detection_; k < rows_; ++k) {
-    x.push_back(window_.rows[static_cast<std::size_t>(k)].x_pct);
+    const RecordRow& row = window_.rows[static_cast<std::size_t>(k)];
+    if (row.x_measured) {
+      x.push_back(row.x_pct);
+    }
+  }
+  if (x.empty()) {
+    return std::nullopt;
   }
   const auto most = x.begin() + static_cast<std::ptrdiff_t>(x.size() * 49 / 50);
   std::nth_element(x.begin(), most, x.end());
@@ -755,8 +762,10 @@ std::vector<Hypothesis> Looker::FitHypotheses(const std::stop_token& stop) {
       Try(h, strength);
     }
     const Onset onset = FaultFactsOf(h.fault).onset;
-    if (onset == Onset::kStop && Measures(Signal::kX)) {
-      Try(h, ObservedStop());
+    if (onset == Onset::kStop) {
+      if (const std::optional<double> stop_seen = ObservedStop()) {
+        Try(h, *stop_seen);
+      }
     } else if (onset == Onset::kThreshold) {
       for (const double strength : {0.5, 0.7, 0.8, 0.9}) {
         Try(h, strength);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -262,6 +263,24 @@ TEST(SecondLookTest, WhatIsNotMeasuredSaysNothing) {
     EXPECT_EQ(best.fault == 19 && std::abs(best.strength - 0.25) < 0.05,
               marked);
   }
+}
+
+// A travel stop is first sought where X was seen to end. X is lost for the last
+// 20 of 200 rows: what stands in its place must not change the answer.
+TEST(SecondLookTest, ATravelStopIsSoughtInReadingsAlone) {
+  const auto look = [](double held_pct) {
+    LookWindow window = Window({Abrupt(1, 0.47)});
+    for (RecordRow& row : std::span(window.rows).last(20)) {
+      row.x_pct = held_pct;
+      row.x_measured = false;
+    }
+    const SecondLook result = RunSecondLook(Physics(), window);
+    return *std::ranges::find(result.ranked, 1, &Explanation::fault);
+  };
+  const Explanation low = look(0.0);
+  const Explanation high = look(97.0);
+  EXPECT_EQ(low.strength, high.strength);
+  EXPECT_EQ(low.distance, high.distance);
 }
 
 // Without the pressures, one that changed is seen in the flow alone.
