@@ -1,6 +1,7 @@
 #include "monitor/names/episode_strengths.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <numeric>
 #include <span>
@@ -53,10 +54,8 @@ bool EpisodeStrengths::UpdateTracks(const Verdict& engine, FaultSet named) {
   bool complete = false;
   std::erase_if(tracks_,
                 [&](const Track& track) { return !Has(named, track.bit); });
-  for (std::size_t bit = 0; named >> bit != 0; ++bit) {
-    if (!Has(named, bit)) {
-      continue;
-    }
+  for (FaultSet left = named; left != 0; left &= left - 1) {
+    const auto bit = static_cast<std::size_t>(std::countr_zero(left));
     auto track = std::ranges::find(tracks_, bit, &Track::bit);
     if (track == tracks_.end()) {
       track = tracks_.insert(track, Track{bit});

@@ -70,6 +70,17 @@ TEST_F(EpisodeStrengthsTest, ThePointIsTheMeanOfTheMinutes) {
   EXPECT_NEAR(0.44 - points[0].lowest, 2.447 * 0.0216 / std::sqrt(7.0), 1e-5);
 }
 
+TEST_F(EpisodeStrengthsTest, TheLastFaultThatASetCanHoldIsFollowed) {
+  models_.faults.resize(kMaxFaults, 7);
+  models_.faults.back() = 1;
+  for (int k = 0; k < 240; ++k) {
+    Step(k, FaultSet{1} << (kMaxFaults - 1), 0.5);
+  }
+  const std::vector<StrengthPoint> points = strengths_.Observed(models_);
+  ASSERT_EQ(points.size(), 1U);
+  EXPECT_EQ(points[0].fault, 1);
+}
+
 TEST_F(EpisodeStrengthsTest, AFaultCountsFromWhenItWasIsolatedByObservers) {
   for (int k = 0; k < 300; ++k) {
     Step(k, k < 200 ? 0b10 : 0b11, 0.5);
