@@ -1,10 +1,18 @@
 #include "monitor/names/episode_name.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
+
+#include "simulator/second_look/episode_looks.h"
 
 namespace fdi::monitor {
 namespace {
+
+// Four looks are due in the first 300 s of an episode (simulator::EpisodeLooks)
+// and the fifth at 600 s. Where none has had an answer that counts by then,
+// looks fail or say nothing, and there is no reason to expect better.
+constexpr double kLookPatienceS = 600.0;
 
 FaultSet SetOf(const std::vector<NamedFault>& faults) {
   FaultSet set = 0;
@@ -20,7 +28,10 @@ EpisodeName::EpisodeName(std::shared_ptr<const ModelSet> models,
                          std::shared_ptr<const SeverityCatalogue> severities)
     : models_(std::move(models)),
       severities_(std::move(severities)),
-      findings_(FindingsOf(*models_)) {
+      findings_(FindingsOf(*models_)),
+      look_patience_(std::llround(kLookPatienceS / models_->sample_period_s *
+                                  static_cast<double>(simulator::SlownessOf(
+                                      models_->sample_period_s)))) {
   Reset();
 }
 
@@ -30,6 +41,7 @@ void EpisodeName::Inherit(const OpenEpisode* episode) {
   } else {
     inherited_ = *episode;
   }
+  waited_ = 0;
 }
 
 void EpisodeName::SetAnnounced(FaultSet faults) {
@@ -71,6 +83,7 @@ const Verdict& EpisodeName::Step(const Inputs& inputs) {
   // A sample out of order must not date a change of the name: that comes with
   // the next one.
   if (open_ && !OutOfOrder(inputs.engine.intake)) {
+    ++waited_;
     const Choice choice = Choose(inputs);
     now_.unknown = choice.unknown;
     now_.source = choice.source;
@@ -178,7 +191,8 @@ bool EpisodeName::InheritedStands(const Inputs& inputs) const {
   if (!inherited_ || !inherited_->isolated) {
     return false;
   }
-  if (inherited_->layer == Layer::kPhysics && inputs.can_look) {
+  if (inherited_->layer == Layer::kPhysics && inputs.can_look &&
+      waited_ <= look_patience_) {
     return true;
   }
   const FaultSet observed = inputs.engine.isolated;

@@ -52,9 +52,10 @@ struct EpisodeNow {
 ///
 /// 1. a second look whose answer counts (simulator::LookBook);
 /// 2. the name that an earlier session or the leader of a pair gave: one by a
-///    look until a look of this session has an answer; another one until the
-///    observers name a fault, for which the floor is not enough; with a second
-///    fault on top, both until the first one is named by itself;
+///    look until a look of this session has an answer, or for ten minutes;
+///    then, like any other, until the observers name a fault, for which the
+///    floor is not enough; with a second fault on top, both until the first one
+///    is named by itself;
 /// 3. the observers, with their memory, and the floor until they have a name.
 ///
 /// The engine is an input and never changed: its transitions that name a fault
@@ -135,8 +136,10 @@ class EpisodeName {
 
   std::shared_ptr<const ModelSet> models_;
   std::shared_ptr<const SeverityCatalogue> severities_;
-  FaultSet findings_;  // Bits of what the floor finds.
+  FaultSet findings_;           // Bits of what the floor finds.
+  std::int64_t look_patience_;  // Samples that an inherited look waits.
   std::optional<OpenEpisode> inherited_;
+  std::int64_t waited_{0};  // Samples since it was inherited.
   std::int64_t detection_ns_{0};
   bool open_{false};
   bool named_{false};  // The episode has had a name.

@@ -258,6 +258,19 @@ TEST_F(EpisodeNameTest, AnInheritedLookWaitsForALookWhereThereAreAny) {
   }
 }
 
+TEST_F(EpisodeNameTest, AnInheritedLookDoesNotWaitForEver) {
+  const OpenEpisode left = Left(kF7, Layer::kPhysics);
+  can_look_ = true;
+  name_.Inherit(&left);
+  Step(0, {Kind::kDetected});
+  Step(kF1, {Kind::kIsolated});
+  for (int k = 3; k <= 600; ++k) {
+    ASSERT_EQ(Step(kF1).isolated, kF7) << k;
+  }
+  EXPECT_EQ(Step(kF1).isolated, kF1);
+  EXPECT_EQ(name_.now().source, NameSource::kObservers);
+}
+
 TEST_F(EpisodeNameTest, AFaultThatGetsMoreSevereIsAnnouncedOnce) {
   engine_.strengths[1] = 0.025;
   Step(0, {Kind::kDetected});
