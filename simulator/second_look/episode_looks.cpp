@@ -650,7 +650,14 @@ void ObserversMemory::Step(std::int64_t detection_stamp_ns,
   if (std::exchange(detection_stamp_ns_, detection_stamp_ns) !=
       detection_stamp_ns) {
     seen_ = 0;
+    set_back_ns_ = 0;
+    last_stamp_ns_ = stamp_ns;
   }
+  // A clock that is set back would make the episode younger, and the stamps of
+  // before newer than all that follow. So the time since the detection goes on.
+  set_back_ns_ += std::max<std::int64_t>(0, last_stamp_ns_ - stamp_ns);
+  last_stamp_ns_ = stamp_ns;
+  stamp_ns += set_back_ns_;
   seen_ |= faults;
   faults_ = faults;
   // last_ns_ still holds stamps of earlier episodes. It is read only for bits

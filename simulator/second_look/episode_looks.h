@@ -266,6 +266,8 @@ class ObserversMemory {
 
  private:
   std::int64_t detection_stamp_ns_{0};
+  std::int64_t last_stamp_ns_{0};           // Of the last sample.
+  std::int64_t set_back_ns_{0};             // As of LookTask.
   std::array<std::int64_t, 64> last_ns_{};  // When each was isolated.
   FaultSet seen_{0};                        // Those that ever were.
   FaultSet faults_{0};

@@ -1026,6 +1026,28 @@ TEST(ObserversMemoryTest, HoldsTheSecondHalfOfAnEpisodeFromTenMinutesOn) {
   EXPECT_EQ(memory.faults(), 0b010U);
 }
 
+// Set back by an hour after 700 s: nothing in the memory changes but for the
+// stamps.
+TEST(ObserversMemoryTest, AClockThatIsSetBackChangesNothing) {
+  ObserversMemory memory;
+  constexpr std::int64_t kDetection = 10'000;
+  const auto step = [&](int age, FaultSet faults) {
+    const std::int64_t back = age < 700 ? 0 : 3600;
+    memory.Step(kDetection * kSecond, (kDetection + age - back) * kSecond,
+                faults);
+    return memory.faults();
+  };
+  for (int age = 0; age < 650; ++age) {
+    step(age, 0b001);
+  }
+  for (int age = 650; age < 1290; ++age) {
+    EXPECT_EQ(step(age, 0b010), 0b011U) << age;
+  }
+  for (int age = 1310; age < 1400; ++age) {
+    EXPECT_EQ(step(age, 0b010), 0b010U) << age;
+  }
+}
+
 TEST(LookBookTest, CountsAfterItsDelayAndDoesNotHearAWorseFit) {
   LookBook book;
   LookTask task;
