@@ -15,14 +15,14 @@ packages=(
   g++ cmake ninja-build pkg-config git ca-certificates
   libfastrtps-dev libfastcdr-dev fastddsgen
   libeigen3-dev libsundials-dev
-  libsqlite3-dev libsqlitecpp-dev sqlite3 zlib1g-dev libssl-dev libcrypt-dev libpq-dev
+  libsqlite3-dev libsqlitecpp-dev sqlite3 zlib1g-dev libssl-dev libpq-dev
   libcpp-httplib-dev libsystemd-dev
   libcli11-dev libtomlplusplus-dev libspdlog-dev nlohmann-json3-dev libhowardhinnant-date-dev
   gnuplot-nox
 )
 for_package=(dpkg-dev file gzip help2man)
 for_tests=(libgtest-dev libgmock-dev libbenchmark-dev cyclonedds-dev cyclonedds-tools chromium
-  libmodbus-dev postgresql make procps iproute2)
+  libmodbus-dev postgresql nginx make procps iproute2)
 testing=OFF
 packaging=OFF
 case $purpose in

@@ -41,7 +41,8 @@ for file in etc/default/fdi-monitor usr/lib/systemd/system/fdi-monitor.service \
   usr/lib/sysusers.d/fdi.conf usr/share/fdi/campaigns/paper.toml \
   usr/share/fdi/faults.toml usr/share/fdi/idl/fdi_v{1,2}.idl \
   usr/share/doc/fdi/{copyright,changelog.gz,changelog.Debian.gz,README.md} \
-  usr/share/doc/fdi/docs/tutorial.md usr/share/fdi/console/index.html; do
+  usr/share/doc/fdi/docs/tutorial.md usr/share/fdi/console/index.html \
+  usr/share/fdi/nginx/fdi.conf; do
   [ -s "$root/$file" ] || fail "$file is missing"
 done
 grep -q '^ExecStart=/usr/bin/fdi-monitor run' \

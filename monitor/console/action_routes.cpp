@@ -25,11 +25,11 @@ std::string TextOf(const Json& body, const char* key) {
   return found->get<std::string>();
 }
 
-// With users, `body` already holds the name of the logged-in one.
+// `body` already holds the name of the user.
 storage::OperatorNote NoteOf(const Json& body, const httplib::Request& request,
                              const Api& api) {
   return {TextOf(body, "who"), TextOf(body, "comment"),
-          "console " + request.remote_addr, api.sources.utc_now_ns()};
+          "console " + api.access.AddressOf(request), api.sources.utc_now_ns()};
 }
 
 // The current state of the alarm.
@@ -144,7 +144,7 @@ void Perform(const Api& api, const Action& action,
   }
   const Json result = action.perform(api, request, body);
   SendJson(response, result);
-  api.access.LogAction(request, action.name, who, SubjectOf(request, result));
+  api.access.LogAction(request, action.name, SubjectOf(request, result));
   api.stream.Wake();
 }
 

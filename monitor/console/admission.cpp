@@ -1,18 +1,25 @@
 #include "monitor/console/admission.h"
 
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <fstream>
 #include <utility>
 
 #include <httplib.h>
 
 #include "base/error.h"
 #include "monitor/console/api.h"
+#include "monitor/http/http_server.h"
 
 namespace fdi::console {
 namespace {
 
-constexpr const char* kApi = "/api/";
-constexpr const char* kLogIn = "/api/v1/login";
-constexpr const char* kNoSession = "expected a session: POST /api/v1/login";
+constexpr const char* kSecretHeader = "X-FDI-Secret";
+constexpr std::array<const char*, 3> kRoles{"view", "acknowledge", "engineer"};
+constexpr std::size_t kMaxName = 64;
+constexpr std::size_t kMinSecret = 32;  // 128 bits in hexadecimal digits.
+constexpr std::size_t kMaxSecret = 256;
 constexpr std::size_t kShownPath = 200;
 
 // Quotes untrusted text as one word of a log line.
@@ -20,251 +27,174 @@ std::string Quoted(const std::string& text) {
   return Json(text).dump(-1, ' ', true, Json::error_handler_t::replace);
 }
 
-// "10.0.0.1" for "::ffff:10.0.0.1", the form used by dual-stack sockets.
-std::string_view PlainAddress(std::string_view address) {
-  constexpr std::string_view kMapped = "::ffff:";
-  return address.starts_with(kMapped) ? address.substr(kMapped.size())
-                                      : address;
+std::string ReadSecret(const std::filesystem::path& path) {
+  if (path.empty()) {
+    return {};
+  }
+  const std::string name = "--console-proxy " + path.string();
+  std::ifstream file(path);
+  std::string secret;
+  if (!std::getline(file, secret)) {
+    throw DataError(name + ": cannot be read, or is empty");
+  }
+  using std::filesystem::perms;
+  constexpr perms kOfOthers = perms::group_write | perms::others_all;
+  if ((std::filesystem::status(path).permissions() & kOfOthers) !=
+      perms::none) {
+    throw ConfigError(name +
+                      ": others can read or change it; expected a file "
+                      "with mode 0640 or 0600");
+  }
+  if (secret.size() < kMinSecret || secret.size() > kMaxSecret ||
+      !std::ranges::all_of(
+          secret, [](unsigned char c) { return std::isalnum(c) != 0; })) {
+    throw ConfigError(name +
+                      ": expected one line of 32 to 256 letters and "
+                      "digits, as openssl rand -hex 32 makes it");
+  }
+  return secret;
+}
+
+// In a time that does not tell how much of a guess is right.
+bool SameSecret(const std::string& given, const std::string& secret) {
+  unsigned differs = given.size() == secret.size() ? 0 : 1;
+  for (std::size_t i = 0; i < given.size(); ++i) {
+    differs |= static_cast<unsigned char>(given[i]) ^
+               static_cast<unsigned char>(secret[i % secret.size()]);
+  }
+  return differs == 0;
+}
+
+// Whether a page of this server sent the request: browsers state the origin of
+// each POST, and scripts cannot forge it. Where the browser uses https, a page
+// of http is another one, which anybody on the way can fill.
+bool IsSameOrigin(const httplib::Request& request) {
+  const std::string origin = request.get_header_value("Origin");
+  const std::string host = request.get_header_value("Host");
+  const bool https = request.get_header_value("X-Forwarded-Proto") == "https";
+  return origin == "https://" + host || (!https && origin == "http://" + host);
 }
 
 }  // namespace
 
-Admission::Admission(const AdmissionOptions& options, LogSink log)
-    : options_(options), log_(std::move(log)) {
-  Reload();
+const char* RoleName(Role role) {
+  return kRoles[static_cast<std::size_t>(role)];
 }
 
-void Admission::Reload() {
-  if (!options_.users_file) {
-    return;
-  }
-  Users users = LoadUsers(*options_.users_file);
-  log_(LogLevel::kInfo, "console_users file=" + options_.users_file->string() +
-                            " users=" + std::to_string(users.size()));
-  if (logins_) {
-    logins_->Take(std::move(users));
-  } else {
-    logins_.emplace(std::move(users));
-  }
-}
+Admission::Admission(const std::filesystem::path& secret_file, LogSink log)
+    : secret_(ReadSecret(secret_file)), log_(std::move(log)) {}
 
-void Admission::AddTo(httplib::Server& server, const std::string& cookie,
-                      bool https) {
-  // Without users nothing can be changed, so no page has to prove its origin.
-  if (!logins_) {
-    return;
-  }
-  cookie_ = cookie;
-  https_ = https;
-  using Handler = httplib::Server::HandlerResponse;
-  server.set_pre_routing_handler(
-      [this](const httplib::Request& request, httplib::Response& response) {
-        return Admit(request, response) ? Handler::Unhandled : Handler::Handled;
-      });
-  server.Post(kLogIn, [this](const httplib::Request& request,
-                             httplib::Response& response) {
-    Guarded(response, [&] { LogIn(request, response); });
-  });
-  server.Post("/api/v1/logout", [this](const httplib::Request& request,
-                                       httplib::Response& response) {
-    Guarded(response, [&] { LogOut(request, response); });
-  });
-}
-
-// The order of the checks: the header of a stranger is only logged, and the
-// request then counts as one without it. The origin is checked before the
-// exception for the login, because a foreign page could otherwise log its
-// visitor in under another name. Only POST changes anything, so GET needs no
-// origin.
+// A proxy whose secret is wrong must not pass for a program of this machine:
+// what it asks is refused, not answered without a user.
 bool Admission::Admit(const httplib::Request& request,
                       httplib::Response& response) {
-  if (!UserHeader(request).empty() && !FromProxy(request)) {
-    LogRefusal(request, "proxy_header", UserHeader(request));
-  }
-  if (request.method == "POST" && !IsSameOrigin(request)) {
-    Refuse(request, response, 403, "origin",
-           "Origin: expected the address of this page, " +
-               request.get_header_value("Host") + ", with its https or http");
-    return false;
-  }
-  if (!request.path.starts_with(kApi) || request.path == kLogIn ||
-      Authenticate(request)) {
+  if (FromProxy(request)) {
+    if (!VisitorOf(request)) {
+      Refuse(request, response, "proxy_user",
+             "the proxy names no user with a role of view, acknowledge or "
+             "engineer");
+      return false;
+    }
+    // Without the proxy nothing can be changed, whoever asks.
+    if (request.method == "POST" && !IsSameOrigin(request)) {
+      Refuse(request, response, "origin",
+             "Origin: expected the address of this page, " +
+                 request.get_header_value("Host") + ", with its https or http");
+      return false;
+    }
     return true;
   }
-  if (FromProxy(request)) {
-    Refuse(request, response, 403, "proxy_user",
-           "the proxy names a user who is not in the file of --console-users");
-  } else {
-    Refuse(request, response, 401, "no_session", kNoSession);
+  if (request.has_header(kSecretHeader)) {
+    Refuse(request, response, "proxy_secret",
+           "X-FDI-Secret: expected the secret of --console-proxy");
+    return false;
   }
-  return false;
-}
-
-// Whether a page of this server sent the request: browsers state the origin of
-// each POST, and scripts cannot forge it. Where the browser uses https, to us
-// or to a proxy that says so, a page of http is another one, which anybody on
-// the way can fill. The HTTP server has checked Host before (HostAllowed()).
-bool Admission::IsSameOrigin(const httplib::Request& request) const {
-  const std::string origin = request.get_header_value("Origin");
-  const std::string host = request.get_header_value("Host");
-  const bool https =
-      https_ || request.get_header_value("X-Forwarded-Proto") == "https";
-  return origin == "https://" + host || (!https && origin == "http://" + host);
+  if (!monitor::IsLoopback(request.get_header_value("Host"))) {
+    Refuse(request, response, "host",
+           "Host: expected localhost or an address of loopback");
+    return false;
+  }
+  return true;
 }
 
 bool Admission::FromProxy(const httplib::Request& request) const {
-  return !UserHeader(request).empty() &&
-         PlainAddress(request.remote_addr) ==
-             PlainAddress(options_.proxy_address);
+  return !secret_.empty() &&
+         SameSecret(request.get_header_value(kSecretHeader), secret_);
 }
 
-std::string Admission::UserHeader(const httplib::Request& request) const {
-  return options_.proxy_header.empty()
-             ? std::string()
-             : request.get_header_value(options_.proxy_header.c_str());
-}
-
-// "a=1; NAME=SECRET; b=2"
-std::string Admission::SessionOf(const httplib::Request& request) const {
-  // The separator in front makes the first cookie look like the others: a
-  // cookie whose name only ends in ours is not found.
-  const std::string cookies = "; " + request.get_header_value("Cookie");
-  const std::size_t begin = cookies.find("; " + cookie_ + "=");
-  if (begin == std::string::npos) {
-    return {};
-  }
-  const std::size_t from = begin + cookie_.size() + 3;
-  return cookies.substr(from, cookies.find(';', from) - from);
-}
-
-std::optional<Visitor> Admission::Authenticate(
-    const httplib::Request& request) {
-  if (!logins_) {
+std::optional<Visitor> Admission::VisitorOf(
+    const httplib::Request& request) const {
+  if (!FromProxy(request)) {
     return std::nullopt;
   }
-  return FromProxy(request) ? logins_->OfName(UserHeader(request))
-                            : logins_->OfSession(SessionOf(request));
-}
-
-std::function<bool()> Admission::AdmissionCheck(
-    const httplib::Request& request) {
-  if (!logins_) {
-    return [] { return true; };
+  const std::string name = request.get_header_value("X-FDI-User");
+  const auto* const role =
+      std::ranges::find(kRoles, request.get_header_value("X-FDI-Role"));
+  if (name.empty() || name.size() > kMaxName || role == kRoles.end()) {
+    return std::nullopt;
   }
-  // By value: the function is called long after the request has gone.
-  if (FromProxy(request)) {
-    return [this, name = UserHeader(request)] {
-      return logins_->OfName(name).has_value();
-    };
-  }
-  return [this, session = SessionOf(request)] {
-    return logins_->OfSession(session).has_value();
-  };
+  return Visitor{name, static_cast<Role>(role - kRoles.begin())};
 }
 
-bool Admission::HasSession(const httplib::Request& request) const {
-  return logins_ && !FromProxy(request);
-}
-
-bool Admission::MayWrite(const httplib::Request& request) {
-  const std::optional<Visitor> visitor = Authenticate(request);
+bool Admission::MayWrite(const httplib::Request& request) const {
+  const std::optional<Visitor> visitor = VisitorOf(request);
   return visitor && visitor->role >= Role::kAcknowledge;
 }
 
-void Admission::LogIn(const httplib::Request& request,
-                      httplib::Response& response) {
-  const Json body = Json::parse(request.body, nullptr, false);
-  const bool texts = body.is_object() && body.contains("user") &&
-                     body["user"].is_string() && body.contains("password") &&
-                     body["password"].is_string();
-  if (!texts) {
-    throw ConfigError(R"(the body: expected {"user": TEXT, "password": TEXT})");
-  }
-  const std::string name = body["user"];
-  std::string session;
-  switch (logins_->LogIn(name, body["password"].get<std::string>(),
-                         request.remote_addr, session)) {
-    case Logins::Outcome::kTooMany:
-      response.set_header("Retry-After", "1");
-      return Refuse(request, response, 429, "slowed",
-                    "too many wrong passwords for this name came from this "
-                    "address: one attempt per second is looked at");
-    case Logins::Outcome::kWrong:
-      LogRefusal(request, "password", name);
-      return SendError(response, 401, "the name or the password is wrong");
-    case Logins::Outcome::kAdmitted:
-      break;
-  }
-  // A browser that logs in again replaces its cookie. Its old session would be
-  // usable until it expires and take one of the places.
-  logins_->LogOut(SessionOf(request));
-  // https may end at a proxy that does not say so.
-  const bool secure =
-      request.get_header_value("Origin").starts_with("https://");
-  response.set_header("Set-Cookie", cookie_ + "=" + session +
-                                        "; Path=/; HttpOnly; SameSite=Strict" +
-                                        (secure ? "; Secure" : ""));
-  LogAction(request, "login", name, "");
-  SendJson(response, {{"user", name}});
-}
-
-void Admission::LogOut(const httplib::Request& request,
-                       httplib::Response& response) {
-  const std::optional<Visitor> visitor = Authenticate(request);
-  logins_->LogOut(SessionOf(request));
-  LogAction(request, "logout", visitor ? visitor->name : "", "");
-  response.set_header("Set-Cookie", cookie_ + "=; Path=/; Max-Age=0; HttpOnly");
-  SendJson(response, Json::object());
+std::string Admission::AddressOf(const httplib::Request& request) const {
+  const std::string behind = request.get_header_value("X-Real-IP");
+  return FromProxy(request) && !behind.empty() &&
+                 behind.find_first_not_of("0123456789abcdefABCDEF.:") ==
+                     std::string::npos
+             ? behind
+             : request.remote_addr;
 }
 
 bool Admission::Authorize(const httplib::Request& request,
                           httplib::Response& response, Role needed,
                           std::string& who) {
-  if (const std::optional<Visitor> visitor = Authenticate(request)) {
-    if (visitor->role < needed) {
-      Refuse(request, response, 403, "role",
-             visitor->name + " has the role " + RoleName(visitor->role) +
-                 "; expected " + RoleName(needed));
-      return false;
-    }
-    if (!who.empty() && who != visitor->name) {
-      Refuse(request, response, 403, "name",
-             "who: expected " + visitor->name + ", who is logged in");
-      return false;
-    }
-    who = visitor->name;
-    return true;
+  const std::optional<Visitor> visitor = VisitorOf(request);
+  if (!visitor) {
+    Refuse(request, response, "read_only",
+           "this address is read-only: whoever acts comes through the proxy "
+           "(docs/console.md, The page beyond this host)");
+    return false;
   }
-  if (logins_) {  // The session has ended since Admit().
-    Refuse(request, response, 401, "no_session", kNoSession);
-  } else {
-    Refuse(request, response, 403, "read_only",
-           "this console is read-only: start the monitor with "
-           "--console-users FILE");
+  if (visitor->role < needed) {
+    Refuse(request, response, "role",
+           visitor->name + " has the role " + RoleName(visitor->role) +
+               "; expected " + RoleName(needed));
+    return false;
   }
-  return false;
+  if (!who.empty() && who != visitor->name) {
+    Refuse(request, response, "name",
+           "who: expected " + visitor->name + ", who is logged in");
+    return false;
+  }
+  who = visitor->name;
+  return true;
 }
 
 // `action`, and `reason` below, are string literals: the counts keep views of
 // them.
 void Admission::LogAction(const httplib::Request& request, const char* action,
-                          const std::string& who, const std::string& subject) {
-  const auto visitor = logins_ ? logins_->OfName(who) : std::nullopt;
-  std::string line = "console_action user=" + Quoted(who) + " role=";
-  line.append(visitor ? RoleName(visitor->role) : "none")
+                          const std::string& subject) {
+  const Visitor visitor = VisitorOf(request).value();
+  std::string line = "console_action user=" + Quoted(visitor.name) + " role=";
+  line.append(RoleName(visitor.role))
       .append(" action=")
       .append(action)
-      .append(subject.empty() ? "" : " ")
+      .append(" ")
       .append(subject)
       .append(" from=")
-      .append(request.remote_addr);
+      .append(AddressOf(request));
   log_(LogLevel::kInfo, line);
   const MutexLock lock(mutex_);
   ++counts_.actions[action];
 }
 
 void Admission::LogRefusal(const httplib::Request& request,
-                           std::string_view reason, const std::string& user) {
+                           std::string_view reason) {
   {
     const MutexLock lock(mutex_);
     ++counts_.refused[reason];
@@ -277,13 +207,14 @@ void Admission::LogRefusal(const httplib::Request& request,
   std::string line = "console_refused reason=";
   line.append(reason)
       .append(" user=")
-      .append(Quoted(user.substr(0, kShownPath)))
+      .append(
+          Quoted(request.get_header_value("X-FDI-User").substr(0, kShownPath)))
       .append(" method=")
       .append(request.method)
       .append(" path=")
       .append(Quoted(request.path.substr(0, kShownPath)))
       .append(" from=")
-      .append(request.remote_addr);
+      .append(AddressOf(request));
   if (not_shown > 0) {
     line.append(" not_shown=").append(std::to_string(not_shown));
   }
@@ -291,27 +222,16 @@ void Admission::LogRefusal(const httplib::Request& request,
 }
 
 void Admission::Refuse(const httplib::Request& request,
-                       httplib::Response& response, int status,
-                       std::string_view reason, const std::string& what) {
-  const std::optional<Visitor> visitor = Authenticate(request);
-  LogRefusal(request, reason,
-             visitor              ? visitor->name
-             : FromProxy(request) ? UserHeader(request)
-                                  : "");
+                       httplib::Response& response, std::string_view reason,
+                       const std::string& what) {
+  LogRefusal(request, reason);
   response.set_header("Cache-Control", "no-store");
-  SendError(response, status, what);
+  SendError(response, 403, what);
 }
 
 AdmissionCounts Admission::counts() const {
-  AdmissionCounts counts;
-  {
-    const MutexLock lock(mutex_);
-    counts = counts_;
-  }
-  if (logins_) {
-    counts.sessions = logins_->sessions();
-  }
-  return counts;
+  const MutexLock lock(mutex_);
+  return counts_;
 }
 
 }  // namespace fdi::console

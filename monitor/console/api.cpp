@@ -1,8 +1,11 @@
 #include "monitor/console/api.h"
 
+#include <algorithm>
 #include <cctype>
 #include <chrono>
 #include <exception>
+#include <iterator>
+#include <memory>
 
 #include <httplib.h>
 
@@ -34,6 +37,29 @@ std::string PlainName(const report::FaultTexts& texts, std::string_view fault) {
   }
   return name;
 }
+
+// The places that a request takes one of; null: it needs none.
+std::counting_semaphore<>* PlacesFor(const Api& api, std::string_view path) {
+  const bool episode = path.starts_with("/api/v1/episodes/");
+  if (episode && (path.ends_with(".svg") || path.ends_with(".png") ||
+                  path.ends_with(".html"))) {
+    return &api.picture_places;
+  }
+  constexpr std::string_view kLive[] = {"/api/v1/status", "/api/v1/faults",
+                                        "/api/v1/groups"};
+  const bool valve =
+      path.starts_with("/api/v1/valves") && !path.ends_with("/health");
+  return valve || std::ranges::find(kLive, path) != std::end(kLive)
+             ? nullptr
+             : &api.history_places;
+}
+
+// Gives back the place, if there is one.
+struct Leave {
+  void operator()(std::counting_semaphore<>* places) const {
+    places->release();
+  }
+};
 
 }  // namespace
 
@@ -84,6 +110,12 @@ void AddRoutes(httplib::Server& server, const Api& api,
   for (const Route& route : routes) {
     server.Get(route.path, [&api, route](const httplib::Request& request,
                                          httplib::Response& response) {
+      std::counting_semaphore<>* const places = PlacesFor(api, request.path);
+      if (places != nullptr && !places->try_acquire()) {
+        response.set_header("Retry-After", "5");
+        return SendError(response, 503, "too many such requests wait already");
+      }
+      const std::unique_ptr<std::counting_semaphore<>, Leave> place(places);
       Guarded(response, [&] {
         if (route.json) {
           SendJson(response, route.json(api, request));

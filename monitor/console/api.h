@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <functional>
 #include <optional>
+#include <semaphore>
 #include <span>
 #include <stop_token>
 #include <string>
@@ -58,6 +59,13 @@ struct ConsoleSources {
   std::function<std::vector<MonitorLine>()> monitors{};
 };
 
+/// Answers from a history, and pictures, that are made at once; further
+/// requests are answered 503 with Retry-After. A history may be on another host
+/// that answers slowly, and a picture takes a program a second of a processor:
+/// they hold up no other request.
+inline constexpr int kHistoryPlaces = 8;
+inline constexpr int kPicturePlaces = 2;
+
 /// What responses are made from; everything referenced outlives the server.
 struct Api {
   ConsoleSources sources;
@@ -69,6 +77,8 @@ struct Api {
   Admission& access;
   std::string instance;  ///< Differs after a restart.
   std::stop_token stopping{};
+  mutable std::counting_semaphore<> history_places{kHistoryPlaces};
+  mutable std::counting_semaphore<> picture_places{kPicturePlaces};
 
   /// @throws storage::HistoryAwayError immediately while that of a plant is
   ///   away.

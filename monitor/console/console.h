@@ -20,9 +20,7 @@ struct ConsoleOptions {
   monitor::HttpAddress address;
   /// Folder of the page; empty: the one installed with the program.
   std::filesystem::path files;
-  std::vector<std::string> names;  ///< See monitor::HostAllowed().
-  AdmissionOptions admission;
-  std::optional<monitor::TlsFiles> tls;
+  std::filesystem::path proxy_secret{};  ///< See Admission.
   std::vector<Route> routes{};  ///< Beside its own: of optional components.
 };
 
@@ -61,9 +59,6 @@ class Console {
   /// If it throws, no thread is left behind. The history of a plant may be
   /// unavailable.
   void Start(ConsoleSources sources);
-  /// Reloads the certificate and the users. Errors are logged, and the old ones
-  /// stay in use.
-  void Reload();
   /// Ends all streams and stops accepting connections. Does not block.
   void Stop();
   /// Stops, and waits for all threads: `sources` are not called any more.
@@ -71,13 +66,10 @@ class Console {
 
   StreamCounts streams() const { return stream_.counts(); }
   std::size_t board_bytes() const { return board_.bytes(); }
-  monitor::HttpServer::Counts requests() const { return server_->counts(); }
   AdmissionCounts admissions() const { return access_.counts(); }
 
  private:
   void SetDefaultResponses();
-  void RenewTls();
-  void LogListenAddress() const;
 
   std::unique_ptr<monitor::HttpServer> server_;
   std::filesystem::path files_;

@@ -18,7 +18,7 @@ constexpr double kStalePeriods = 3.0;
 constexpr std::chrono::milliseconds kPingPeriod{5000};
 
 Json Status(const Api& api, const httplib::Request& request) {
-  const std::optional<Visitor> visitor = api.access.Authenticate(request);
+  const std::optional<Visitor> visitor = api.access.VisitorOf(request);
   const MonitorFacts facts = api.sources.facts();
   Json counters = Json::object();
   for (const auto& [name, value] : facts.counters) {
@@ -58,7 +58,6 @@ Json Status(const Api& api, const httplib::Request& request) {
           {"write", !api.sources.monitors && api.access.MayWrite(request)},
           {"user", visitor ? Json(visitor->name) : Json()},
           {"role", visitor ? Json(RoleName(visitor->role)) : Json()},
-          {"session", api.access.HasSession(request)},
           {"stale_after_s", kStalePeriods * period_s},
           {"counters", std::move(counters)},
           {"valves",
@@ -196,14 +195,10 @@ void Stream(const Api& api, const httplib::Request& request,
   response.set_header("Cache-Control", "no-store");
   response.set_chunked_content_provider(
       "text/event-stream",
-      [&stream = api.stream, client,
-       admitted = api.access.AdmissionCheck(request)](std::size_t /*offset*/,
-                                                      httplib::DataSink& sink) {
+      [&stream = api.stream, client](std::size_t /*offset*/,
+                                     httplib::DataSink& sink) {
         Message message;
         const auto outcome = stream.Next(*client, kPingPeriod, message);
-        if (!admitted()) {
-          return false;
-        }
         switch (outcome) {
           case LiveStream::Outcome::kMessage:
             return sink.write(message->data(), message->size());

@@ -130,9 +130,9 @@ std::string MonotonicMicroseconds() {
 Service::Service(const ServiceOptions& options, const report::Context& context)
     : options_(options),
       context_(context),
-      http_(options.http ? std::make_unique<HttpServer>(
-                               ProbeServer(*options.http, options.http_names))
-                         : nullptr),
+      http_(options.http
+                ? std::make_unique<HttpServer>(HttpServerOptions{*options.http})
+                : nullptr),
       console_(options.console
                    ? std::make_unique<console::Console>(
                          *options.console, context.options, context.log)
@@ -526,9 +526,6 @@ void Service::Serve(report::StopSignals& signals) {
       // the reload as finished at READY=1.
       Notify("RELOADING=1\nMONOTONIC_USEC=" + MonotonicMicroseconds());
       Reload("signal");
-      if (console_) {
-        console_->Reload();
-      }
       Notify("READY=1");
     }
   }
@@ -643,13 +640,9 @@ StatusFacts Service::Facts() const {
 std::string Service::Metrics() const {
   MetricsFacts facts{context_.software, started_ns_, data_,
                      heartbeat_.members()};
-  facts.requests = http_->counts();
   if (console_) {
     facts.streams = console_->streams();
     facts.board_bytes = console_->board_bytes();
-    for (const auto& [outcome, count] : console_->requests()) {
-      facts.requests[outcome] += count;
-    }
     facts.admissions = console_->admissions();
   }
   try {

@@ -52,8 +52,7 @@ struct ServiceOptions {
   std::string shadow_valves{"*"};
   /// Serve metrics and probes over HTTP.
   std::optional<HttpAddress> http;
-  std::vector<std::string> http_names;  ///< See HostAllowed().
-  MakeFollower follower;                ///< Of the history; see there.
+  MakeFollower follower;  ///< Of the history; see there.
   /// Notify a program or a web server of events; empty: disabled.
   std::string on_event;
   int on_event_per_minute{60};

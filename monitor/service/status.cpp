@@ -83,7 +83,7 @@ void AddThreads(const std::vector<Heartbeat::Member>& threads,
 
 void AddAdmissions(const console::AdmissionCounts& counts, Exposition& page) {
   page.Family("fdi_console_actions_total", Type::kCounter,
-              "What people did at the console, and when they came and went");
+              "What people did at the console");
   for (const auto& [action, count] : counts.actions) {
     page.Value(count, {"action", action});
   }
@@ -91,10 +91,6 @@ void AddAdmissions(const console::AdmissionCounts& counts, Exposition& page) {
               "Requests that the console refused, by reason");
   for (const auto& [reason, count] : counts.refused) {
     page.Value(count, {"reason", reason});
-  }
-  if (counts.sessions) {
-    page.Family("fdi_console_sessions", Type::kGauge, "People logged in");
-    page.Value(std::uint64_t{*counts.sessions});
   }
 }
 
@@ -129,15 +125,6 @@ std::vector<Measure> ConsoleMeasures(const MetricsFacts& facts) {
       {"", "fdi_console_bytes", Type::kGauge,
        "Memory of the trends that the console shows", "", "",
        facts.board_bytes}};
-}
-
-void AddRequests(const HttpServer::Counts& requests, Exposition& page) {
-  page.Family("fdi_http_requests_total", Type::kCounter,
-              "Requests to --http and --console that were answered, refused "
-              "before any page saw them, or given up by the client");
-  for (const auto& [outcome, count] : requests) {
-    page.Value(count, {"outcome", outcome});
-  }
 }
 
 void AddProcess(const MetricsFacts& facts, Exposition& page) {
@@ -410,21 +397,8 @@ std::string MetricsPage(const StatusFacts& status, const MetricsFacts& facts) {
     page.Add(ConsoleMeasures(facts));
     AddAdmissions(facts.admissions, page);
   }
-  AddRequests(facts.requests, page);
   AddProcess(facts, page);
   return page.text();
-}
-
-HttpServerOptions ProbeServer(const HttpAddress& address,
-                              const std::vector<std::string>& names) {
-  return {.address = address,
-          .lanes = {{.threads = 1,
-                     .takes =
-                         [](std::string_view path) {
-                           return path == "/healthz" || path == "/readyz";
-                         }},
-                    {.threads = 1}},
-          .names = names};
 }
 
 HttpServer::Pages ProbePages(const Heartbeat& heartbeat, ProbeSources sources) {

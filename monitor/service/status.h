@@ -84,7 +84,6 @@ struct MetricsFacts {
   std::optional<console::StreamCounts> streams{};  ///< Nothing: no console.
   std::uint64_t board_bytes{0};                    ///< Of the console.
   console::AdmissionCounts admissions{};           ///< Of the console.
-  HttpServer::Counts requests{};
   /// Nothing: the history does not tell.
   std::optional<storage::AlarmCounts> alarms{};
 };
@@ -97,11 +96,6 @@ struct ProbeSources {
   std::function<std::string()> metrics;
   std::function<Readiness()> readiness;
 };
-
-/// Probes have a thread of their own, so that slow metrics requests do not make
-/// a healthy service look dead.
-HttpServerOptions ProbeServer(const HttpAddress& address,
-                              const std::vector<std::string>& names);
 
 /// /metrics; /healthz: 200 while all threads make progress; /readyz: 200 while
 /// there are models, databases and a publisher. Otherwise 503 with the reason

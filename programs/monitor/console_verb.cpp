@@ -18,7 +18,7 @@
 #include "plant/live/plant_feed.h"
 #include "plant/plant_reader.h"
 #include "programs/monitor/bus_view.h"
-#include "programs/monitor/console_access.h"
+#include "programs/monitor/console_options.h"
 #include "programs/monitor/planner.h"
 #include "programs/monitor/verbs.h"
 #include "report/program.h"
@@ -31,7 +31,6 @@ struct PlantConsoleOptions {
   std::string from;
   std::string listen{"127.0.0.1:8081"};
   console::ConsoleOptions console;
-  ConsoleAccess access;
   BusOptions bus{.program = "fdi-monitor console"};
 };
 
@@ -80,13 +79,10 @@ void ExpectSeenValves(const std::stop_token& stop,
 int RunConsole(const PlantConsoleOptions& given,
                const report::Context& context) {
   PlantConsoleOptions options = given;
-  options.access.ApplyTo(options.console);
   options.console.address = ParseHttpAddress(options.listen, "--listen");
   options.console.routes = PlannerRoutes({}, context);
   const LogSink log = LimitLog(context.log);
-  using Signals = report::StopSignals;
-  Signals signals(options.access.given() ? Signals::HangUp::kReload
-                                         : Signals::HangUp::kStop);
+  report::StopSignals signals(report::StopSignals::HangUp::kStop);
   std::stop_source stopping;
   const std::int64_t started_ns = NowNs();
   std::optional<PlantFeed> feed;  // Outlives the console's threads.
@@ -108,10 +104,6 @@ int RunConsole(const PlantConsoleOptions& given,
     ExpectSeenValves(stop, options, console.live());
   });
   while (!signals.stop_requested()) {
-    if (signals.WaitFor(std::chrono::milliseconds(0)) ==
-        Signals::Event::kReload) {
-      console.Reload();
-    }
     bus.Take(
         [&](const auto& message, const idl::Reception& reception) {
           using Message = std::decay_t<decltype(message)>;
@@ -152,22 +144,18 @@ void AddConsoleVerb(report::Program& program) {
                   "free one")
       ->capture_default_str()
       ->type_name("ADDRESS:PORT");
-  AddConsoleAccess(console, options.access);
+  AddConsoleProxyOption(console, options.console);
   console
       .add_option("--console-files", options.console.files,
                   "Folder of the page instead of the installed one")
       ->type_name("DIR");
-  console
-      .add_option("--allow-host", options.console.names,
-                  "Answer under this name, too, and not only under localhost, "
-                  "addresses and the name of the machine")
-      ->type_name("NAME");
   console.add_option("--valves", options.bus.valves,
                      "Only ids that match GLOB");
   console
       .add_option("--max-valves", options.bus.max_valves,
                   "Maximum number of valves")
       ->check(CLI::Range(1, 100000));
+  AddRemovedConsoleOptions(program, "console");
 }
 
 }  // namespace fdi::monitor

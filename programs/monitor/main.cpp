@@ -21,18 +21,10 @@ std::vector<fdi::report::VerbExamples> Examples() {
         {"One set for the valves FV-1..., open to the plant network",
          "fdi-monitor run --model-set paper@2 --valves 'FV-1*' --interface "
          "all"},
-        {"A page on which people may acknowledge and label",
-         "fdi-monitor run --console=127.0.0.1:8080 --console-users users"},
-        {"The page for the control room, over https and with logins",
-         "fdi-monitor run --console=0.0.0.0:8443 --console-tls console.pem "
-         "--console-users users"},
+        {"A page behind nginx, through which people acknowledge and label",
+         "fdi-monitor run --console --console-proxy proxy-secret"},
         {"See what a new set would say, beside the old one",
          "fdi-monitor run --shadow paper@3"}}},
-      {"console-user",
-       {{"Add a user; the password is asked for twice",
-         "fdi-monitor console-user anna --role acknowledge --users users"},
-        {"Remove one",
-         "fdi-monitor console-user anna --remove --users users"}}},
       {"watch",
        {{"All fault events as JSON lines", "fdi-monitor watch --events --json"},
         {"How many vectors come in ten seconds",
@@ -44,9 +36,9 @@ std::vector<fdi::report::VerbExamples> Examples() {
       {"console",
        {{"One page of all monitors, with the plant's history",
          "fdi-monitor console --from postgresql://screen@db.example/plant"},
-        {"Open to the plant network, of one hall",
+        {"On another port, of one hall",
          "fdi-monitor console --from postgresql://screen@db.example/plant "
-         "--listen 10.1.2.9:8081 --valves 'H1-*'"}}},
+         "--listen 8082 --valves 'H1-*'"}}},
   };
 }
 
@@ -60,10 +52,13 @@ int main(int argc, char** argv) {
   program.MapError<fdi::storage::SqliteError>(fdi::report::kExitData);
   program.MapError<fdi::idl::TransportError>(fdi::report::kExitTransport);
   fdi::monitor::AddRunVerb(program);
-  fdi::monitor::AddConsoleUserVerb(program);
   fdi::monitor::AddWatchVerb(program);
   fdi::monitor::AddTopVerb(program);
   fdi::monitor::AddConsoleVerb(program);
+  program.AddRemoved("", "console-user",
+                     "users are in a file of nginx, which htpasswd makes, and "
+                     "their roles in a second one (docs/console.md, The page "
+                     "beyond this host)");
   program.AddExamples(Examples());
   return program.Run(argc, argv);
 }

@@ -8,7 +8,7 @@
 #include "base/headroom.h"
 #include "monitor/service/service.h"
 #include "monitor/throttled_log.h"
-#include "programs/monitor/console_access.h"
+#include "programs/monitor/console_options.h"
 #include "programs/monitor/planner.h"
 #include "programs/monitor/verbs.h"
 #include "report/program.h"
@@ -27,7 +27,6 @@ struct RunArguments {
   std::string http{"off"};
   std::string console{"off"};
   console::ConsoleOptions console_options;
-  ConsoleAccess console_access;
   PairOptions pair;
   std::filesystem::path groups;
   ServiceOptions service;
@@ -63,10 +62,10 @@ std::function<std::string(std::string)> AddressOr(const std::string& usual) {
 
 void TakeConsole(const RunArguments& arguments, ServiceOptions& options) {
   if (arguments.console == "off") {
-    if (arguments.console_access.given() ||
+    if (!arguments.console_options.proxy_secret.empty() ||
         !arguments.console_options.files.empty()) {
       throw ConfigError(
-          "--console-users, --console-tls and --console-files need "
+          "--console-proxy and --console-files need "
           "--console[=[ADDRESS:]PORT]");
     }
     return;
@@ -74,8 +73,6 @@ void TakeConsole(const RunArguments& arguments, ServiceOptions& options) {
   console::ConsoleOptions& console =
       options.console.emplace(arguments.console_options);
   console.address = ParseHttpAddress(arguments.console, "--console");
-  console.names = options.http_names;
-  arguments.console_access.ApplyTo(console);
 }
 
 void AddConsoleOptions(CLI::App& run, RunArguments& arguments) {
@@ -85,7 +82,7 @@ void AddConsoleOptions(CLI::App& run, RunArguments& arguments) {
       ->default_str("127.0.0.1:8080")
       ->transform(AddressOr("127.0.0.1:8080"))
       ->type_name("[=[ADDRESS:]PORT]");
-  AddConsoleAccess(run, arguments.console_access);
+  AddConsoleProxyOption(run, arguments.console_options);
   run.add_option("--console-files", arguments.console_options.files,
                  "Folder of the page instead of the installed one")
       ->type_name("DIR");
@@ -148,9 +145,6 @@ int Run(const RunArguments& arguments, const report::Context& context) {
     options.http = ParseHttpAddress(arguments.http, "--http");
   }
   TakeConsole(arguments, options);
-  if (!options.http_names.empty() && !options.http && !options.console) {
-    throw ConfigError("--allow-host needs --http or --console");
-  }
   options.follower = FollowCauses(arguments.groups, context);
   if (options.console) {
     options.console->routes = PlannerRoutes(arguments.groups, context);
@@ -238,15 +232,7 @@ void AddRunVerb(report::Program& program) {
       ->transform(AddressOr("127.0.0.1:9464"))
       ->type_name("[=[ADDRESS:]PORT]");
   AddConsoleOptions(run, arguments);
-  program.AddRemoved("run", "--console-write",
-                     "name who may act with fdi-monitor console-user NAME "
-                     "--role acknowledge --users FILE, and give "
-                     "--console-users FILE; scripts have fdi-store history "
-                     "ack, label and shelve");
-  run.add_option("--allow-host", service.http_names,
-                 "Answer --http and --console under this name, too, and not "
-                 "only under localhost, addresses and the name of the machine")
-      ->type_name("NAME");
+  AddRemovedConsoleOptions(program, "run");
   run.add_option("--status-period", service.status_period_s,
                  "Time between status lines in the log [s]")
       ->check(CLI::Range(1.0, 86400.0))

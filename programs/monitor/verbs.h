@@ -9,9 +9,6 @@ namespace fdi::monitor {
 /// `run`: diagnoses the valves on the bus.
 void AddRunVerb(report::Program& program);
 
-/// `console-user`: adds, changes or removes a user of the console.
-void AddConsoleUserVerb(report::Program& program);
-
 /// `watch`: prints or counts what monitors publish.
 void AddWatchVerb(report::Program& program);
 

@@ -1,9 +1,11 @@
 // Our programs as children of a test.
 
-import {execFile, execFileSync, spawn} from 'node:child_process';
-import {mkdtempSync, rmSync, writeFileSync} from 'node:fs';
+import {execFile, spawn} from 'node:child_process';
+import {mkdirSync, mkdtempSync, rmSync, writeFileSync} from 'node:fs';
+import {connect, createServer} from 'node:net';
 import {tmpdir} from 'node:os';
 import path from 'node:path';
+import {fileURLToPath} from 'node:url';
 import {promisify} from 'node:util';
 
 const kPatienceMs = 30000;
@@ -20,19 +22,41 @@ export async function until(condition, what, patienceMs = kPatienceMs) {
   }
 }
 
+/** A port of this machine that nobody uses at the moment. */
+function freePort() {
+  return new Promise((resolve) => {
+    const server = createServer().listen(0, '127.0.0.1', () => {
+      const {port} = server.address();
+      server.close(() => resolve(port));
+    });
+  });
+}
+
+function listens(port) {
+  return new Promise((resolve) => {
+    const socket = connect(port, '127.0.0.1');
+    socket.once('connect', () => resolve(true));
+    socket.once('error', () => resolve(false));
+    socket.once('close', () => socket.destroy());
+    socket.once('connect', () => socket.end());
+  });
+}
+
 /** A data directory, a domain and the programs in it; all end with stop(). */
 export class Plant {
   data = mkdtempSync(path.join(tmpdir(), 'fdi-console-'));
-  // A proxy, which the browser plays, names anna.
-  access = ['--console-users', path.join(this.data, 'proxied'),
-    '--console-proxy-user', 'X-User', '--console-proxy-from', '127.0.0.1'];
   modelSet = 'quick';
   #domain = process.env.FDI_DOMAIN;
   #children = new Set();
+  #proxy = path.join(this.data, 'proxy');
+  #pagePort = 0;
+  #address = '';
 
   constructor() {
     process.once('exit', () => this.#kill());
-    writeFileSync(this.access[1], 'anna:engineer:*\n', {mode: 0o600});
+    mkdirSync(this.#proxy);
+    writeFileSync(path.join(this.#proxy, 'proxy-secret'),
+        '0123456789abcdef0123456789abcdef\n', {mode: 0o600});
   }
 
   #kill() {
@@ -50,18 +74,14 @@ export class Plant {
     return stdout;
   }
 
-  /** A user of the console, with the name of the role, and `password`. */
-  addUser(file, role, password) {
-    execFileSync(path.join(bin, 'fdi-monitor'),
-        ['console-user', role, '--role', role, '--users', file],
-        {input: password + '\n'});
-  }
-
   /** Starts a program; `errors` is what it has said on stderr. */
   start(program, ...words) {
-    const child = spawn(path.join(bin, program),
-        ['--data', this.data, '--domain', this.#domain, '--transport', 'udp',
-          ...words], {stdio: ['ignore', 'ignore', 'pipe']});
+    return this.#spawn(path.join(bin, program), ['--data', this.data,
+      '--domain', this.#domain, '--transport', 'udp', ...words]);
+  }
+
+  #spawn(program, words) {
+    const child = spawn(program, words, {stdio: ['ignore', 'ignore', 'pipe']});
     child.errors = '';
     child.stderr.on('data', (text) => child.errors += text);
     child.ended = new Promise((resolve) => child.once('exit', resolve));
@@ -74,16 +94,28 @@ export class Plant {
       campaign, '--log-level', 'warning']);
   }
 
-  /** A monitor with a console on `port`, and the address of its page. */
-  async startMonitor(port = 0, ...words) {
+  /** A monitor, on the same port as any before, and nginx in front of it. */
+  async startMonitor() {
+    this.#pagePort ||= await freePort();
     const monitor = this.start('fdi-monitor', 'run', '--model-set', this.modelSet,
-        `--console=127.0.0.1:${port}`, ...this.access, ...words);
+        `--console=127.0.0.1:${this.#pagePort}`, '--console-proxy',
+        path.join(this.#proxy, 'proxy-secret'));
     await until(() => monitor.errors.includes('monitor_ready') ||
         monitor.exitCode !== null, `monitor_ready\n${monitor.errors}`);
-    const found = /console\S* .*?(127\.0\.0\.1:\d+)/.exec(monitor.errors);
-    if (!found) throw new Error(`no address of a console:\n${monitor.errors}`);
-    const scheme = this.access.includes('--console-tls') ? 'https' : 'http';
-    return {monitor, address: `${scheme}://${found[1]}`};
+    this.#address ||= await this.#startProxy();
+    return {monitor, address: this.#address};
+  }
+
+  async #startProxy() {
+    const [https, http, metrics] =
+        [await freePort(), await freePort(), await freePort()];
+    const nginx = this.#spawn(
+        fileURLToPath(new URL('nginx.sh', import.meta.url)),
+        [this.#proxy, https, http, this.#pagePort, metrics].map(String));
+    await until(() => listens(https), 'nginx').catch((error) => {
+      throw new Error(`${error.message}\n${nginx.errors}`);
+    });
+    return `https://localhost:${https}`;
   }
 
   /** A simulator of the conditions that the model set was trained in. */

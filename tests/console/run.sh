@@ -16,6 +16,11 @@ command -v node >/dev/null || {
   echo "skipped: node is not found (Debian: apt install nodejs)"
   exit 77
 }
+PATH=$PATH:/usr/sbin
+command -v nginx >/dev/null || {
+  echo "skipped: nginx is not found (Debian: apt install nginx)"
+  exit 77
+}
 [ -d "$2/playwright-core" ] || {
   echo "skipped: npm has not fetched what drives the browser (see the build)"
   exit 77
@@ -29,6 +34,6 @@ export FDI_CAMPAIGN=$PWD/../survival/quick.toml
 # measured alone.
 node --test csv.test.mjs route.test.mjs stream.test.mjs \
   trend_data.test.mjs
-for file in console load login views; do
+for file in console load roles views; do
   node --test "$file.test.mjs"
 done

@@ -30,7 +30,7 @@ TEST_F(ConsoleActionsTest, AnAlarmIsAcknowledgedLabelledAndShelved) {
   const Json action = Get(episode)["events"][4];
   EXPECT_EQ(action["kind"], "ACK");
   EXPECT_EQ(action["comment"], "seen");
-  EXPECT_EQ(action["origin"], "console 127.0.0.1");
+  EXPECT_EQ(action["origin"], "console 10.1.2.3");
   const std::int64_t from_ms = shelf["until_ms"].get<std::int64_t>() + 1000;
   const Json planned = Post("/api/v1/shelf", {{"who", "bo"},
                                               {"valve", "LV-1"},
@@ -45,11 +45,14 @@ TEST_F(ConsoleActionsTest, AnAlarmIsAcknowledgedLabelledAndShelved) {
        400);
 }
 
-TEST_F(ConsoleActionsTest, WithoutUsersNothingIsChanged) {
+TEST_F(ConsoleActionsTest, WithoutAProxyNothingIsChanged) {
   RecordEpisode(writer_, 4);
-  Start(AdmissionOptions());
+  Start(std::filesystem::path());
 
-  Post("/api/v1/episodes/" + IdText() + "/ack", {{"who", "anna"}}, 403);
+  const auto answer = client_->Post("/api/v1/episodes/" + IdText() + "/ack",
+                                    {{"Origin", Origin()}}, R"({"who":"eve"})",
+                                    "application/json");
+  EXPECT_EQ(answer->status, 403);
   EXPECT_THAT(TakeLog(),
               testing::HasSubstr("console_refused reason=read_only"));
   EXPECT_EQ(Get("/api/v1/status")["write"], false);
@@ -74,7 +77,7 @@ TEST_F(ConsoleActionsTest, BodiesThatCannotBeAreRefused) {
   }
   Post("/api/v1/shelf/77/end", {{"who", "bo"}}, 404);
   const httplib::Result large =
-      client_->Post(episode + "/ack", {{"Origin", "x"}},
+      client_->Post(episode + "/ack", {{"Origin", Origin()}},
                     std::string(20'000, 'x'), "application/json");
   EXPECT_TRUE(!large || large->status == 413);
 }

@@ -19,7 +19,16 @@
 
 namespace fdi::console {
 
-inline constexpr const char* kUserHeader = "X-User";
+/// The secret of the proxy, which the tests play.
+inline constexpr const char* kSecret = "0123456789abcdef0123456789abcdef";
+
+inline httplib::Headers ProxyHeaders(const std::string& user,
+                                     const std::string& role) {
+  return {{"X-FDI-Secret", kSecret},
+          {"X-FDI-User", user},
+          {"X-FDI-Role", role},
+          {"X-Real-IP", "10.1.2.3"}};
+}
 
 /// The console over real HTTP, beside a history, without a pipeline.
 class ConsoleRoutesTest : public storage::HistoryFixture {
@@ -34,23 +43,23 @@ class ConsoleRoutesTest : public storage::HistoryFixture {
                         storage::Access::kOccasionalWriter);
   }
 
-  /// With engineers anna and bo, whom a proxy names; anna asks.
-  void Start() {
-    AdmissionOptions admission;
-    admission.users_file = directory_.path() / "engineers";
-    admission.proxy_header = kUserHeader;
-    admission.proxy_address = "127.0.0.1";
-    for (const char* name : {"anna", "bo"}) {
-      StoreUser(*admission.users_file, name, User{Role::kEngineer});
-    }
-    Start(admission);
-    client_->set_default_headers({{kUserHeader, "anna"}});
+  std::filesystem::path WriteSecret(const std::string& text = kSecret) const {
+    const auto file = directory_.path() / "proxy-secret";
+    std::ofstream(file) << text << "\n";
+    std::filesystem::permissions(file, std::filesystem::perms(0640));
+    return file;
   }
-  void Start(const AdmissionOptions& admission) {
+  /// Behind a proxy, which names the engineer anna.
+  void Start() {
+    Start(WriteSecret());
+    client_->set_default_headers(ProxyHeaders("anna", "engineer"));
+  }
+  /// @param secret file of the proxy's secret; empty: no proxy.
+  void Start(const std::filesystem::path& secret) {
     ConsoleOptions options;
     options.address.host = "127.0.0.1";
     options.files = directory_.path() / "page";
-    options.admission = admission;
+    options.proxy_secret = secret;
     console_.emplace(options, report::GlobalOptions{},
                      [this](LogLevel, std::string_view line) {
                        const std::lock_guard lock(log_mutex_);
@@ -99,17 +108,20 @@ class ConsoleRoutesTest : public storage::HistoryFixture {
   Json Post(const std::string& path, const Json& body, int status = 200) {
     const std::string who =
         body.is_object() ? body.value("who", "anna") : "anna";
+    httplib::Client client("127.0.0.1", port_);
+    httplib::Headers headers = ProxyHeaders(who, "engineer");
+    headers.emplace("Origin", Origin());
     const httplib::Result answer =
-        client_->Post(path,
-                      {{kUserHeader, who},
-                       {"Origin", "http://127.0.0.1:" + std::to_string(port_)}},
-                      body.dump(), "application/json");
+        client.Post(path, headers, body.dump(), "application/json");
     EXPECT_TRUE(answer) << path;
     if (!answer) {
       return {};
     }
     EXPECT_EQ(answer->status, status) << path << answer->body;
     return Json::parse(answer->body);
+  }
+  std::string Origin() const {
+    return "http://127.0.0.1:" + std::to_string(port_);
   }
   /// What was logged since this was called last.
   std::string TakeLog() {

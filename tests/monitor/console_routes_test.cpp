@@ -38,14 +38,16 @@ TEST_F(ConsoleRoutesTest, EveryAnswerForbidsWhatThePageDoesNotNeed) {
 }
 
 TEST_F(ConsoleRoutesTest, AForeignHostNameIsRefused) {
-  Start();
-
-  EXPECT_EQ(
-      client_->Get("/api/v1/valves", {{"Host", "evil.example:80"}})->status,
-      403);
+  Start(WriteSecret());
+  httplib::Headers headers{{"Host", "evil.example:80"}};
+  EXPECT_EQ(client_->Get("/api/v1/valves", headers)->status, 403);
+  EXPECT_EQ(client_->Get("/", headers)->status, 403);
   EXPECT_EQ(
       client_->Get("/api/v1/valves", {{"Host", "localhost:9000"}})->status,
       200);
+  // A proxy has names of its own.
+  headers.merge(ProxyHeaders("anna", "view"));
+  EXPECT_EQ(client_->Get("/api/v1/valves", headers)->status, 200);
 }
 
 TEST_F(ConsoleRoutesTest, ValvesAndTrendsOfAnyId) {

@@ -253,20 +253,19 @@ class PlantPageTest : public PlantFixture {
       std::ofstream(Folder("page") / "index.html") << "<title>page</title>";
     }
   }
-  void Start(const std::vector<std::string>& more = {}) {
-    std::vector<std::string> arguments{FDI_MONITOR_PROGRAM,
-                                       "--domain",
-                                       std::to_string(domain_.id()),
-                                       "console",
-                                       "--from",
-                                       Url(),
-                                       "--listen",
-                                       "127.0.0.1:0",
-                                       "--console-files",
-                                       Folder("page").string(),
-                                       "--log-level",
-                                       "info"};
-    arguments.insert(arguments.end(), more.begin(), more.end());
+  void Start() {
+    const std::vector<std::string> arguments{FDI_MONITOR_PROGRAM,
+                                             "--domain",
+                                             std::to_string(domain_.id()),
+                                             "console",
+                                             "--from",
+                                             Url(),
+                                             "--listen",
+                                             "127.0.0.1:0",
+                                             "--console-files",
+                                             Folder("page").string(),
+                                             "--log-level",
+                                             "info"};
     console_ = std::make_unique<ChildProcess>(arguments);
     ASSERT_TRUE(console_->AwaitLine("console_listening")) << console_->errors();
     const std::string& log = console_->errors();
@@ -305,22 +304,6 @@ TEST_F(PlantPageTest, AForeignLockHoldsUpNeitherThePageNorItsEnd) {
   console_->Signal(SIGTERM);
   EXPECT_EQ(console_->AwaitExit(), 0);
   EXPECT_LT(Clock::now() - start, milliseconds(4000));
-}
-
-TEST_F(PlantPageTest, UsersHaveToLogIn) {
-  const std::string users = (directory_.path() / "users").string();
-  ASSERT_EQ(std::system(("echo a-long-password | \"" FDI_MONITOR_PROGRAM
-                         "\" console-user anna --role view --users " +
-                         users + " >/dev/null")
-                            .c_str()),
-            0);
-  Start({"--console-users", users});
-  EXPECT_EQ(Status("valves"), 401);
-  EXPECT_EQ(Status("history"), 401);
-  console_->Signal(SIGHUP);  // Reads the users anew.
-  EXPECT_EQ(Status("status"), 401);
-  console_->Signal(SIGTERM);
-  EXPECT_EQ(console_->AwaitExit(), 0);
 }
 
 }  // namespace

@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # What surrounds a monitor on real hosts, in a network namespace: two monitors
 # in containers, peers without multicast, keys before the clock is set, a clock
-# that is set back, prune with the clock years ahead, users behind nginx. Needs
-# root; what needs faketime or nginx is left out where that is missing.
+# that is set back, prune with the clock years ahead. Needs root; what needs faketime
+# is left out where that is missing.
 # Usage: world.sh BIN_DIRECTORY      77 where namespaces are not permitted.
 set -euo pipefail
 if [ "${FDI_IN_NAMESPACE:-}" = "" ]; then
@@ -140,49 +140,3 @@ else
   echo "world: without faketime, clocks are left out"
 fi
 
-if command -v nginx >/dev/null; then
-  for each in a b; do
-    printf 'correct horse\ncorrect horse\n' |
-      "$bin/fdi-monitor" console-user anna --role view --users "$out/users" >/dev/null 2>&1
-    printf 'correct horse\ncorrect horse\n' |
-      "$bin/fdi-monitor" console-user bo --role view --users "$out/users" >/dev/null 2>&1
-  done
-  monitor hall-1 --valves 'A*' --console=127.0.0.1:8095 \
-    --console-users "$out/users" --allow-host plant.example
-  monitor hall-2 --valves 'B*' --console=127.0.0.2:8095 \
-    --console-users "$out/users" --allow-host plant.example
-  ready hall-1
-  ready hall-2
-  cat >"$out/nginx.conf" <<NGINX
-daemon off; error_log $out/nginx.log; pid $out/nginx.pid; events {}
-http { access_log off; client_body_temp_path $out/1; proxy_temp_path $out/2;
- fastcgi_temp_path $out/3; uwsgi_temp_path $out/4; scgi_temp_path $out/5;
- server { listen 127.0.0.1:9480;
-  location /hall-1/ { proxy_pass http://127.0.0.1:8095/; proxy_set_header Host \$http_host; }
-  location /hall-2/ { proxy_pass http://127.0.0.2:8095/; proxy_set_header Host \$http_host; } } }
-NGINX
-  start nginx nginx -c "$out/nginx.conf"
-  url=http://plant.example:9480
-  ask() {
-    curl -s -m 8 --resolve plant.example:9480:127.0.0.1 -H "Origin: $url" \
-      -o /dev/null -w '%{http_code}' "$@"
-  }
-  login() {  # JAR USER PASSWORD HALL
-    ask -c "$1" -b "$1" -d "{\"user\":\"$2\",\"password\":\"$3\"}" "$url/$4/api/v1/login"
-  }
-  up() { [ "$(ask "$url/hall-1/")" = 200 ]; }
-  await 10 up || fail "nginx does not answer"
-  [ "$(login "$out/jar" anna 'correct horse' hall-1)" = 200 ] || fail "no login at hall-1"
-  [ "$(login "$out/jar" anna 'correct horse' hall-2)" = 200 ] || fail "no login at hall-2"
-  [ "$(ask -b "$out/jar" "$url/hall-1/api/v1/valves")" = 200 ] ||
-    fail "the login at hall-2 ended that at hall-1"
-  for ((i = 0; i < 12; ++i)); do
-    login "$out/other" bo 'old password' hall-2 >/dev/null
-    [ "$(login "$out/again" anna 'correct horse' hall-2)" = 200 ] ||
-      fail "the wrong passwords of one user lock out another"
-  done
-  end_all
-  echo "world: users behind a proxy do not disturb each other"
-else
-  echo "world: without nginx, proxies are left out"
-fi

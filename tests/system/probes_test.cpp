@@ -1,14 +1,11 @@
 // /metrics, /healthz and /readyz of the built fdi-monitor, over real HTTP.
 
-#include <csignal>
 #include <regex>
 #include <set>
 #include <sstream>
 
-#include <arpa/inet.h>
 #include <gmock/gmock.h>
 #include <httplib.h>
-#include <sys/socket.h>
 
 #include "tests/system/monitor_fixture.h"
 
@@ -170,56 +167,6 @@ TEST_F(ProbesTest, AnAddressThatCannotBeIsRefusedWithTheAcceptedForm) {
     EXPECT_EQ(monitor.AwaitExit(), 2) << word;
     EXPECT_THAT(monitor.errors(), HasSubstr("[IPv6]:PORT")) << word;
   }
-}
-
-// A connection that never asks; the sockets close with the object.
-class IdleClients {
- public:
-  IdleClients(int count, int port) {
-    sockaddr_in address{};
-    address.sin_family = AF_INET;
-    address.sin_port = htons(static_cast<std::uint16_t>(port));
-    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    for (int i = 0; i < count; ++i) {
-      const int client = socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK, 0);
-      // In progress once the backlog is full.
-      [[maybe_unused]] const int result = connect(
-          client, reinterpret_cast<const sockaddr*>(&address), sizeof address);
-      sockets_.push_back(client);
-    }
-  }
-  ~IdleClients() {
-    for (const int client : sockets_) {
-      close(client);
-    }
-  }
-  IdleClients(const IdleClients&) = delete;
-  IdleClients& operator=(const IdleClients&) = delete;
-
- private:
-  std::vector<int> sockets_;
-};
-
-TEST_F(ProbesTest, ManySilentClientsHoldNeitherDiagnosisNorTheEndUp) {
-  StoreModels(data_, LinearModels());
-  const auto monitor = StartWithHttp();
-  const double descriptors = Scrape()["process_open_fds"];
-  const auto start = std::chrono::steady_clock::now();
-  std::optional<IdleClients> idle(std::in_place, 400, port_);
-  Publish(0, 1000);
-  ASSERT_TRUE(AwaitVectors(1000));
-  const std::chrono::duration<double> diagnosed =
-      std::chrono::steady_clock::now() - start;
-  idle.reset();
-  ASSERT_TRUE(Await([this] { return Get("/healthz"); }));
-
-  EXPECT_LT(diagnosed.count(), 5.0);
-  EXPECT_LT(Scrape()["process_open_fds"], descriptors + 100.0);
-  idle.emplace(400, port_);
-  const auto stop = std::chrono::steady_clock::now();
-  monitor->Signal(SIGTERM);
-  EXPECT_EQ(monitor->AwaitExit(), 0) << monitor->errors();
-  EXPECT_LT(std::chrono::steady_clock::now() - stop, std::chrono::seconds(3));
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
 // What an operator does to alarms: acknowledge, shelve, label. Each is a dialog
-// that asks why; who it was is known from the login.
+// that asks why; who it was is known from the proxy.
 
 import {path, post} from './api.js';
 import {button, field, h, replace, select, showDialog} from './dom.js';

@@ -57,7 +57,7 @@ export async function get(where, query, signal) {
     else notes.delete(where);
     return answer;
   } catch (error) {
-    if (error.status === 401) location.reload();  // The session has ended.
+    if (error.status === 401) location.reload();  // The proxy asks again.
     throw error;
   }
 }
@@ -75,7 +75,6 @@ export async function getOptional(where, query) {
 export async function post(where, body) {
   const response = await request(url(where), {
     method: 'POST',
-    // Authorization belongs to a proxy with passwords of its own.
     headers: {'Content-Type': 'application/json'},
     body: JSON.stringify(body),
   });

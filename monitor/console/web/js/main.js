@@ -1,7 +1,6 @@
 // Starts the page: what is on top, which view a link means.
 
 import {replace} from './dom.js';
-import {logIn} from './login.js';
 import {parseRoute} from './route.js';
 import {applyTheme, settings} from './settings.js';
 import {createShell, startAnnouncements} from './shell.js';
@@ -40,7 +39,6 @@ function show(byUser) {
 
 applyTheme();
 startShortcuts();
-await logIn(main);
 const shell = createShell(document.getElementById('top'),
     document.getElementById('banner'));
 startAnnouncements(document.getElementById('announcer'));

@@ -7,7 +7,6 @@ import {faultTitle, groups, groupOf, priorityNames, priorityOf, prioritySign}
   from './faults.js';
 import {clockText, dateText, durationText, timeText, zoneName}
   from './format.js';
-import {logOut} from './login.js';
 import {nextTheme, settings} from './settings.js';
 import {showHelp} from './shortcuts.js';
 import {store} from './store.js';
@@ -85,7 +84,6 @@ export function createShell(top, banner) {
   const health = h('span', {class: 'health'});
   const clock = h('span', {class: 'clock'});
   const user = h('span', {class: 'user'});
-  const leave = button('Log out', logOut, {hidden: true});
   const theme = button('', nextTheme, {title: 'Light or dark (key T)'});
   const utc = button('', () => settings.set('utc', !settings.get('utc')),
       {title: 'Local time or UTC (key U)'});
@@ -93,8 +91,8 @@ export function createShell(top, banner) {
     title: 'Keys (key ?)'});
   replace(top, h('span', {class: 'brand'}, 'Valves'),
       h('nav', {'aria-label': 'Views'}, links), summary,
-      h('div', {class: 'tools'}, health, clock, user, leave, utc,
-          theme, help));
+      h('div', {class: 'tools'}, health, clock, user, utc, theme,
+          help));
 
   let title = '';
   const showSummary = () => {
@@ -110,7 +108,6 @@ export function createShell(top, banner) {
     setText(health, status ? healthText(status) : '');
     health.classList.toggle('bad', Boolean(bad));
     setText(user, status?.user ? `${status.user}, ${status.role}` : '');
-    leave.hidden = !status?.session;
     health.title = !status ? '' :
       `${status.software}, running for ` +
       durationText(store.nowMs() - status.started_ms);

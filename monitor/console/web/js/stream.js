@@ -114,7 +114,7 @@ export class Stream extends EventTarget {
         url('/stream', {valve: this.#valve}),
         {signal: abort.signal, cache: 'no-store',
           headers: {Accept: 'text/event-stream'}});
-    if (response.status === 401) location.reload();  // The session has ended.
+    if (response.status === 401) location.reload();  // The proxy asks again.
     if (!response.ok) throw await errorOf(response);
     const reader = response.body.pipeThrough(new TextDecoderStream())
         .getReader();

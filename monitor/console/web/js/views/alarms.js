@@ -111,7 +111,7 @@ class Alarms extends View {
     setText(this.#readOnly, store.status?.plant ? 'Read-only: acknowledge, ' +
       'shelve and label on the page of the monitor, or with fdi-store.' :
       store.status?.user ? 'Read-only: your role is view.' :
-      'Read-only: the monitor was started without --console-users.');
+      'Read-only: whoever acts opens the page through nginx.');
     replace(this.#head, headRow([
       ...(canAct() ? [{text: h('span', {class: 'sr-only'}, 'Selected')}] : []),
       ...kColumns, ...(canAct() ? [{text: 'Actions'}] : [])]));
