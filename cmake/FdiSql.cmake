@@ -3,7 +3,9 @@
 # fdi_sql(TARGET NAMESPACE) writes the header "FOLDER/sql.h" from the files of
 # the current folder:
 #
-#   migrations/0001.sql ...  become NAMESPACE::kMigrations, in order;
+#   migrations/NNNN.sql ...  become NAMESPACE::kMigrations, in order. NNNN is the
+#                            version that the script leads to; the first one
+#                            makes the tables and is NAMESPACE::kBaseline;
 #   queries.sql              becomes one constant for each statement in it.
 #
 # A statement begins at a line `-- name: open_episodes` and is the constant
@@ -19,7 +21,10 @@ function(fdi_sql target namespace)
          "#include <string_view>\n\n" "namespace fdi::storage::${namespace} {\n\n")
 
   list(LENGTH migrations count)
-  string(APPEND text "inline constexpr std::array<std::string_view, ${count}> "
+  list(GET migrations 0 baseline)
+  string(REGEX REPLACE ".*/0*([0-9]+)\\.sql$" "\\1" baseline "${baseline}")
+  string(APPEND text "inline constexpr int kBaseline = ${baseline};\n"
+         "inline constexpr std::array<std::string_view, ${count}> "
          "kMigrations{\n")
   foreach(file ${migrations})
     file(READ ${file} sql)

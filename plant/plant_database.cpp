@@ -18,7 +18,8 @@ namespace fdi::storage {
 namespace sql = plant_sql;
 namespace {
 
-constexpr int kVersion = static_cast<int>(sql::kMigrations.size());
+constexpr int kVersion =
+    sql::kBaseline + static_cast<int>(sql::kMigrations.size()) - 1;
 
 // libpq's messages have several lines: "ERROR:  no such ...\nDETAIL:  ...\n".
 std::string OneLine(std::string_view text) {
@@ -308,7 +309,9 @@ void PlantDatabase::CheckVersion() {
     const std::string reason =
         "schema fdi has version " + std::to_string(version) +
         ", this program needs " + std::to_string(kVersion) +
-        (version < kVersion
+        (version < sql::kBaseline
+             ? ": it was never released, make another database and ship to it"
+         : version < kVersion
              ? ": run `fdi-store ship --init --to URL` as its owner"
              : ": update this program");
     Fail(reason.c_str());
@@ -325,14 +328,18 @@ PlantDatabase PlantDatabase::Init(const std::string& url, PlantLimits limits) {
   {
     // PostgreSQL rolls back statements that define tables, too.
     PlantTransaction transaction(plant);
-    std::int64_t version = 0;
+    std::int64_t next = sql::kBaseline;
     if (plant.Run(sql::is_there).Text(0, 0) == "t") {
-      version = plant.Run(sql::plant).Int64(0, 1);
+      next = plant.Run(sql::plant).Int64(0, 1) + 1;
+      if (next <= sql::kBaseline) {
+        plant.CheckVersion();  // Refuses it.
+      }
     }
-    for (std::int64_t v = version; v < kVersion; ++v) {
-      plant.RunScript(sql::kMigrations[static_cast<std::size_t>(v)]);
+    for (std::int64_t v = next; v <= kVersion; ++v) {
+      plant.RunScript(
+          sql::kMigrations[static_cast<std::size_t>(v - sql::kBaseline)]);
     }
-    if (version < kVersion) {
+    if (next <= kVersion) {
       plant.Run(sql::set_version, {std::to_string(kVersion)});
     }
     transaction.Commit();

@@ -82,8 +82,8 @@ class PlantDatabase {
   ~PlantDatabase();
   PlantDatabase(PlantDatabase&&) noexcept;
 
-  /// Makes the schema, or brings one of an earlier version to this one, and the
-  /// roles fdi_writer and fdi_reader; all or nothing. Twice is once.
+  /// Makes the schema and the roles fdi_writer and fdi_reader, or brings a
+  /// released version of them to this one; all or nothing. Twice is once.
   /// @throws PlantError
   static PlantDatabase Init(const std::string& url, PlantLimits limits = {});
 

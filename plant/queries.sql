@@ -291,7 +291,7 @@ SELECT * FROM (
      WHERE (t.episode_id, t.monitor_id) = (e.episode_id, e.monitor_id)
        AND is_stamp(last_ns)),
     e.session_id, e.fault_bits, e.strength, e.unknown_kind, e.layer,
-    e.flow_unit, e.channels, e.faults, coalesce(e.known, e.faults), e.lowest,
+    e.flow_unit, e.channels, e.faults, e.known, e.lowest,
     e.highest, e.worst_strength,
     e.priority, e.unconfirmed_ns, plain_name(e.monitor_id, e.fault),
     ack_comment(e.monitor_id, e.episode_id, e.acked_by, e.acked_ns),

@@ -9,7 +9,6 @@
 #include <string>
 
 #include "base/error.h"
-#include "base/usual_period.h"
 #include "diagnosis/model/fault_catalogue.h"
 #include "diagnosis/model/trained_signals.h"
 
@@ -262,8 +261,8 @@ void RequireAlike(const std::vector<TrainingRun>& runs) {
   const TrainingRun& first = runs.front();
   const SignalMask signals = first.samples.front().sample.present;
   for (const TrainingRun& run : runs) {
-    // Recordings of earlier versions have the first step, with its jitter.
-    if (UsualPeriod(run.period_s) != UsualPeriod(first.period_s)) {
+    // The period of a recording is measured, if its stream keeps it to 1e-6.
+    if (std::abs(run.period_s - first.period_s) > 1e-6 * first.period_s) {
       throw DataError("run " + run.id + " has a sample period of " +
                       std::to_string(run.period_s) + " s, run " + first.id +
                       " of " + std::to_string(first.period_s) + " s");

@@ -226,7 +226,6 @@ ModelSet DescribeModelSet(const std::vector<TrainingRun>& runs,
   models.sample_period_s = runs.front().period_s;
   models.flow_unit = runs.front().flow_unit;
   models.validity = TrainedRegion(conditions);
-  models.command_may_pass = true;
   models.stuck = FitStuckLimits(conditions.front());
   models.floor =
       FitFloor(conditions.front(), models.sample_period_s, options.flow_shape);

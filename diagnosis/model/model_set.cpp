@@ -164,7 +164,7 @@ unsigned SignalsRead(const ModelSet& models) {
 
 }  // namespace
 
-// The test of too little flow came later than the others and is the last.
+// The test of too little flow is the last: without a flow there is none.
 int FindingCount(const ModelSet& models) {
   const int all = kLastFloorFinding - kFirstFinding + 1;
   return !models.floor ? 0 : models.floor->flow_share > 0.0 ? all : all - 1;

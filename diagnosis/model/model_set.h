@@ -1,6 +1,5 @@
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -59,9 +58,6 @@ struct ChannelSpec {
   double upper_threshold{0.0};  ///< or above this is abnormal [unit].
   std::vector<WindowLimits>
       windows{};  ///< Slow and small faults; may be empty.
-  /// How far limits were allowed to follow a drift, in sets of before 1.0,
-  /// which keep their bytes and hash with it. Nothing uses it: limits stay.
-  std::array<double, 3> former_drift{};
 };
 
 /// What the residual of a fault observer, in its deviations, shows over the
@@ -99,7 +95,7 @@ struct Observer {
   double strength{0.0};                   ///< Of the trained condition; signed.
   std::vector<ChannelObserver> channels;  ///< One per ModelSet::channels.
   /// Those of P1, P2 and T1 that are outside normal operation in all of the
-  /// condition's own data; stored with the limits of the fit. X and F: the
+  /// condition's own data. X and F: the
   /// observer accounts for its own data there, and has to for what it explains.
   SignalMask moved{0};
 };
@@ -174,7 +170,7 @@ struct FloorLimits {
   double flow_factor{1.5};  ///< Flow limit: this factor times F(X),
   double flow_margin{0.1};  ///< plus this share of the largest flow.
   int flow_samples{10};     ///< Consecutive samples for a finding.
-  /// Flow below this share of F(X) is too little; 0: not tested (older sets).
+  /// Flow below this share of F(X) is too little; 0: no flow was measured.
   double flow_share{0.0};
 
   friend bool operator==(const FloorLimits&, const FloorLimits&) = default;
@@ -196,8 +192,7 @@ struct ModelSet {
   FlowUnit flow_unit{FlowUnit::kM3PerHour};
   ValidityRegion validity;
   StuckLimits stuck;
-  /// Limits that always apply; older sets have none and are judged only within
-  /// their region.
+  /// Limits that always apply; none without CV, or without both X and F.
   std::optional<FloorLimits> floor;
   DecisionParameters decision;
   std::vector<ChannelSpec> channels;
@@ -215,9 +210,6 @@ struct ModelSet {
   /// What its models read as CV is the position X, and they have no X: see
   /// PositionAsCommand().
   bool position_as_command{false};
-  /// A command beyond `validity` for moments leaves the valve armed: see
-  /// Coverage. False in sets whose region ends at the extremes.
-  bool command_may_pass{false};
 };
 
 /// A set of faults as bits: bit i stands for ModelSet::faults[i].

@@ -101,8 +101,7 @@ CoverageReasons Coverage::Operation(const Sample& sample) {
   last_cv_ = cv;
   const bool settled = averaged_ == kCvMeanSettling;
   const bool beyond = !region.cv.Contains(cv);
-  const bool passes = models_->command_may_pass && beyond && settled &&
-                      region.cv.Contains(mean_cv_);
+  const bool passes = beyond && settled && region.cv.Contains(mean_cv_);
   passing_ = passes ? read_for_ : std::max(passing_ - 1, 0);
   const bool mean_within = !settled || region.cv_mean.Contains(mean_cv_);
   reasons |= If((beyond && !passes) || !mean_within, CoverageReason::kCv);

@@ -20,7 +20,7 @@ inline constexpr std::int64_t kMaxInterruptionNs = 600'000'000'000;
 /// The process disarms it: by a mode other than AUTO, by a command that stays
 /// outside the trained range or steps as never in training, or by parking it,
 /// i.e. an end of travel without flow. A command that is outside for moments,
-/// its running mean inside, does not (ModelSet::command_may_pass): the valve is
+/// its running mean inside, does not: the valve is
 /// only not judged until no observer reads that command any more. It is armed
 /// again after `rearm_samples` in a row without any of these and with dP, T1,
 /// P1 and P2 as in normal operation: cold feedwater and rising pressure at a

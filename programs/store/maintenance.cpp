@@ -1,4 +1,4 @@
-// fdi-store doctor, backup, migrate, prune: the files of the data directory.
+// fdi-store doctor, backup, prune: the files of the data directory.
 #include <chrono>
 #include <string_view>
 #include <thread>
@@ -58,6 +58,16 @@ bool Exists(const std::filesystem::path& path) {
   return there;
 }
 
+// A writer that opens a database brings it up to date, and keeps a copy of what
+// was there.
+void BringUpToDate(const File& file) {
+  try {
+    const Database current(file.path, *file.schema, Access::kReader);
+  } catch (const OutdatedError&) {
+    const Database writer(file.path, *file.schema, Access::kOccasionalWriter);
+  }
+}
+
 // Whatever is wrong with a file becomes its trouble, so that the others are
 // examined all the same.
 Json Examine(const File& file) {
@@ -74,6 +84,7 @@ Json Examine(const File& file) {
       return finding;
     }
     finding["present"] = true;
+    BringUpToDate(file);
     Database database(file.path, *file.schema, Access::kReader);
     finding["version"] = database.version();
     finding["bytes"] = database.FileBytes();
@@ -236,29 +247,6 @@ Report Backup(const std::string& target, const Context& context) {
   return report;
 }
 
-// To open a database as a writer is to migrate it, which keeps a copy of the
-// old one.
-Report Migrate(const NoOptions&, const Context& context) {
-  Report report;
-  report.document["databases"] = Json::array();
-  for (const File& file : FilesOf(DataOf(context))) {
-    if (!Exists(file.path)) {
-      continue;
-    }
-    const Database database(file.path, *file.schema, Access::kOccasionalWriter);
-    const auto& backup = database.migration_backup();
-    report.document["databases"].push_back(
-        {{"name", file.name},
-         {"version", database.version()},
-         {"backup", backup ? Json(backup->string()) : Json()}});
-    report.Line(std::string(file.name) + ": version " +
-                std::to_string(database.version()) +
-                (backup ? ", migrated; the old file is " + backup->string()
-                        : ", nothing to do"));
-  }
-  return report;
-}
-
 // Limits of one kind of record.
 struct AgeAndSize {
   std::string age;
@@ -407,8 +395,10 @@ void AddPrune(report::Program& program) {
 }  // namespace
 
 void AddMaintenanceVerbs(report::Program& program) {
-  AddVerb(program, program.root(), "doctor", "Check the three databases",
-          Doctor);
+  AddVerb(
+      program, program.root(), "doctor",
+      "Check the three databases, and bring them up to date after an update",
+      Doctor);
   auto [backup, target] =
       AddVerb(program, program.root(), "backup",
               "Copy the databases while they are in use", Backup);
@@ -416,8 +406,7 @@ void AddMaintenanceVerbs(report::Program& program) {
       .add_option("folder", target,
                   "Folder to copy to; made if it does not exist")
       ->required();
-  AddVerb(program, program.root(), "migrate",
-          "Bring the databases to the current version", Migrate);
+  program.AddRemoved("", "migrate", "doctor brings the databases up to date");
   AddPrune(program);
 }
 

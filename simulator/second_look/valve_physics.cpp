@@ -299,8 +299,8 @@ ValvePhysics DescribeValve(const ValveParameters& parameters,
 //   path    = field { "." field } [ "." index ]
 //             for example "parameters.actuator.stroke_m"
 //
-// PhysicsFrom() requires these paths in this order. A field that is renamed or
-// moved makes the stored sets unreadable; those of kAddedLater may be missing.
+// PhysicsFrom() requires these paths in this order: a field that is new,
+// renamed or moved makes the stored sets unreadable.
 namespace {
 
 FDI_VISITABLE(RecordDrive, period_s, interpolated_command, command_delay)
@@ -309,18 +309,6 @@ FDI_VISITABLE(InputBand, mean, slope, sd)
 FDI_VISITABLE(LoopHabit, command_sd, reads_flow)
 FDI_VISITABLE(ValvePhysics, parameters, drive, x, flow, flow_mean, p1, p2, t1,
               loop, least_loss)
-
-// Sets that were stored before there were these have the default: a water valve
-// whose spring opens it. A name with a dot at its end is that of all in it.
-constexpr std::string_view kAddedLater[] = {
-    "loop.",
-    "least_loss",
-    "parameters.medium.",
-    "parameters.actuator.spring",
-    "parameters.trim.shut_off",
-    "parameters.trim.leakage",
-    "parameters.trim.liquid_recovery",
-    "parameters.trim.choked_pressure_ratio"};
 
 // Calls use(path, field) for every field that is a number or a list of them.
 template <typename Use>
@@ -402,10 +390,7 @@ ValvePhysics PhysicsFrom(const std::vector<PhysicalValue>& values) {
     } else if (is_next(name)) {
       field =
           FromNumber<std::remove_reference_t<decltype(field)>>(values[next++]);
-    } else if (std::ranges::none_of(kAddedLater, [&](std::string_view added) {
-                 return added.ends_with('.') ? name.starts_with(added)
-                                             : name == added;
-               })) {
+    } else {
       throw DataError("the physics of the model set lacks " + name +
                       ": onboard the valve anew");
     }

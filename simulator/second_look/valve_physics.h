@@ -47,7 +47,7 @@ struct ValvePhysics {
   LoopHabit loop{};
   /// Less flow than the opening passes, whatever the cause in the line
   /// (kLowFlow), is a hypothesis from this share on: a smaller loss cannot be
-  /// told from a fault of the valve. 0: none (older sets).
+  /// told from a fault of the valve. 0: none.
   double least_loss{0.0};
 };
 
@@ -57,8 +57,7 @@ ValvePhysics DescribeValve(const ValveParameters& parameters,
                            const RecordDrive& drive,
                            const std::vector<std::vector<RecordRow>>& records);
 
-/// The physics as it is stored in a model set, and back. That of a valve that
-/// was onboarded before there was `loop` or `least_loss` knows nothing of it.
+/// The physics as it is stored in a model set, and back.
 /// @throws DataError naming a value that is missing or unknown; ConfigError if
 ///   a parameter is out of its range.
 std::vector<PhysicalValue> ToValues(const ValvePhysics& physics);

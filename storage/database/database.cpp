@@ -12,7 +12,6 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "base/error.h"
 #include "base/headroom.h"
 #include "base/text.h"
 #include "diagnosis/records/valve_glob.h"
@@ -38,12 +37,13 @@ auto SqliteCall(std::string_view operation, Call&& call) {
   }
 }
 
+template <typename Error = DataError>
 [[noreturn]] void Refuse(const std::filesystem::path& path,
                          const std::string& reason) {
   // SQLite names other reasons where no descriptor is left.
   const std::string lack = LackOfDescriptors(4);
-  throw DataError("database " + path.string() + ": " +
-                  (lack.empty() ? reason : lack));
+  throw Error("database " + path.string() + ": " +
+              (lack.empty() ? reason : lack));
 }
 
 /// Reports the reason that SQLite would hide behind "unable to open".
@@ -142,15 +142,13 @@ std::filesystem::path UnfinishedBackup(const std::filesystem::path& path,
   return path.string() + ".v" + std::to_string(version) + ".backup.unfinished";
 }
 
-// Names the copies of migrations that were committed: those of versions before
-// that of the file. Who made one may have been killed since.
-void FinishBackups(const std::filesystem::path& path, int version,
-                   std::optional<std::filesystem::path>& backup) {
+// Gives the copies of before the version of the file their names, which a
+// program that was killed after its migration had committed did not.
+void FinishBackups(const std::filesystem::path& path, int version) {
   for (int before = 1; before < version; ++before) {
     const std::filesystem::path copy = UnfinishedBackup(path, before);
     if (std::filesystem::exists(copy)) {
-      backup = FreeBackupName(path, before);
-      std::filesystem::rename(copy, *backup);
+      std::filesystem::rename(copy, FreeBackupName(path, before));
     }
   }
 }
@@ -232,11 +230,11 @@ Database::Database(const std::filesystem::path& path, const Schema& schema,
   connection_ = Connect(path, access, immutable);
   if (access == Access::kReader) {
     version_ = CheckIdentity(schema);
-    const int current = static_cast<int>(schema.migrations.size());
-    if (version_ < current) {
-      Refuse(path_, "version " + std::to_string(version_) + " is older than " +
-                        std::to_string(current) +
-                        ", the version read here: run `fdi-store migrate`");
+    if (version_ < schema.version()) {
+      Refuse<OutdatedError>(
+          path_, "version " + std::to_string(version_) + " is older than " +
+                     std::to_string(schema.version()) +
+                     ", the version read here: run `fdi-store doctor`");
     }
     Configure(schema);
   } else {
@@ -245,10 +243,10 @@ Database::Database(const std::filesystem::path& path, const Schema& schema,
     const GateHolder holder(*gate_, path);
     version_ = CheckIdentity(schema);
     Configure(schema);
-    if (version_ < static_cast<int>(schema.migrations.size())) {
+    if (version_ < schema.version()) {
       Migrate(schema, version_);
     } else {
-      FinishBackups(path_, version_, migration_backup_);
+      FinishBackups(path_, version_);
     }
   }
   // A connection that has read in WAL mode keeps its WAL until it is closed.
@@ -284,7 +282,6 @@ bool Database::Refresh() {
   Database fresh(path_, schema_, access_);
   cached_.clear();  // Before the connection that they belong to.
   std::swap(version_, fresh.version_);
-  std::swap(migration_backup_, fresh.migration_backup_);
   std::swap(gate_, fresh.gate_);
   std::swap(connection_, fresh.connection_);
   std::swap(files_, fresh.files_);
@@ -321,20 +318,26 @@ int Database::CheckIdentity(const Schema& schema) {
   // committed together, so there is nothing between empty and complete.
   const bool blank = id == 0 && version == 0 && objects == 0;
   if (blank && access_ == Access::kReader) {
-    Refuse(path_,
-           "is empty: who made it was stopped before it was done; the next "
-           "program that writes, or fdi-store migrate, goes on with it");
+    Refuse<OutdatedError>(
+        path_,
+        "is empty: who made it was stopped before it was done; the next "
+        "program that writes, or `fdi-store doctor`, goes on with it");
   }
   if (id != schema.application_id && !blank) {
     Refuse(path_, "is not a " + std::string(schema.kind) +
                       " database: application_id " + std::to_string(id) +
                       " instead of " + std::to_string(schema.application_id));
   }
-  const auto accepted = static_cast<std::int64_t>(schema.migrations.size());
-  if (version < 0 || version > accepted) {
+  if (version > schema.version()) {
     Refuse(path_, "version " + std::to_string(version) +
                       " is newer than this program, which accepts up to " +
-                      std::to_string(accepted));
+                      std::to_string(schema.version()));
+  }
+  if (version < schema.baseline && !blank) {
+    Refuse(path_, "version " + std::to_string(version) +
+                      " was never released, and nothing reads it any more: "
+                      "move it away and " +
+                      std::string(schema.instead));
   }
   return static_cast<int>(version);
 }
@@ -384,18 +387,18 @@ void Database::Migrate(const Schema& schema, int from) {
   // the header of the file and are rolled back with the rest.
   Execute("BEGIN IMMEDIATE");
   try {
-    for (std::size_t v = static_cast<std::size_t>(from);
+    for (auto v = static_cast<std::size_t>(
+             from == 0 ? 0 : from - schema.baseline + 1);
          v < schema.migrations.size(); ++v) {
       Execute(std::string(schema.migrations[v]));
     }
-    const auto version = static_cast<int>(schema.migrations.size());
     Execute("PRAGMA application_id = " + std::to_string(schema.application_id));
-    Execute("PRAGMA user_version = " + std::to_string(version));
+    Execute("PRAGMA user_version = " + std::to_string(schema.version()));
     if (Prepare("PRAGMA foreign_key_check").Step()) {
       Refuse(path_, "rows without their parent after the migration");
     }
     Execute("COMMIT");
-    version_ = version;
+    version_ = schema.version();
   } catch (...) {
     connection_->tryExec("ROLLBACK");
     // The file is as before, and a service tries again and again: each attempt
@@ -404,7 +407,7 @@ void Database::Migrate(const Schema& schema, int from) {
     std::filesystem::remove(copy, ignored);
     throw;
   }
-  FinishBackups(path_, version_, migration_backup_);
+  FinishBackups(path_, version_);
 }
 
 Statement& Database::Cached(std::string_view sql) {

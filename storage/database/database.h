@@ -15,6 +15,8 @@
 #include <utility>
 #include <vector>
 
+#include "base/error.h"
+
 namespace SQLite {
 class Database;
 class Statement;
@@ -82,11 +84,25 @@ struct Schema {
   std::string_view kind;           ///< In messages: "run", "model", "history".
   std::int32_t application_id{0};  ///< Marks the file as this kind.
   Synchronous synchronous{Synchronous::kFull};
-  /// migrations[v] is the SQL script from version v to v + 1; their number is
-  /// the current version. Never edit a released one: append.
+  /// The SQL scripts from nothing to version `baseline`, and from each version
+  /// to the next. Never edit a released one: append.
   std::vector<std::string_view> migrations;
+  int baseline{1};
+  /// What to do about a file of before the baseline: "import its runs again".
+  std::string_view instead{};
   /// Additional queries of Check(): one finding per row, as text.
   std::vector<std::string_view> checks{};
+
+  int version() const {
+    return baseline + static_cast<int>(migrations.size()) - 1;
+  }
+};
+
+/// The file is sound, but not yet what a reader can read: it has an older
+/// version, or nothing in it. A writer that opens it brings it up to date.
+class OutdatedError : public DataError {
+ public:
+  using DataError::DataError;
 };
 
 class Database;
@@ -250,8 +266,8 @@ class Database {
   /// that may not write to the folder, as SQLite's shared memory needs, reads a
   /// file that nobody has open, which is one without a WAL, as immutable.
   /// @throws DataError naming file and reason: folder missing, no permission,
-  ///   not a database, another application_id, a newer version (naming both),
-  ///   or, for a reader, an older version.
+  ///   not a database, another application_id, a version that is newer, or
+  ///   older than the baseline. @throws OutdatedError for a reader.
   /// @throws SqliteError if SQLite fails otherwise.
   Database(const std::filesystem::path& path, const Schema& schema,
            Access access);
@@ -310,10 +326,6 @@ class Database {
   Access access() const { return access_; }
   bool InTransaction() const;
   int version() const { return version_; }
-  /// The copy made before a migration, if any.
-  const std::optional<std::filesystem::path>& migration_backup() const {
-    return migration_backup_;
-  }
 
  private:
   friend class Statement;
@@ -329,7 +341,6 @@ class Database {
   Schema schema_;
   Access access_;
   int version_{0};
-  std::optional<std::filesystem::path> migration_backup_;
   std::unique_ptr<WriteGate> gate_;  // Null for a reader.
   std::unique_ptr<SQLite::Database> connection_;
   OpenFiles files_;

@@ -85,8 +85,7 @@ std::vector<Alarm> AsAlarms(std::vector<Episode> episodes,
                             const std::vector<Shelf>& shelves,
                             std::int64_t now_ns);
 
-/// Alarms that are not shelved, by Severity. Those of earlier versions, which
-/// have none, count as medium.
+/// Alarms that are not shelved, by Severity; medium if it is not known.
 struct AlarmCounts {
   std::array<std::uint64_t, kSeverityCount> active{};
   std::array<std::uint64_t, kSeverityCount> unacked{};  ///< Active or not.

@@ -71,13 +71,13 @@ struct Episode {
   FlowUnit flow_unit{FlowUnit::kM3PerHour};
   std::vector<std::string> channels;  ///< Of the trace.
   std::vector<std::string> faults;    ///< Of the trace, by index.
-  /// KnownFaults() of its set; `faults` if an earlier version stored it.
+  /// KnownFaults() of its set.
   std::vector<std::string> known;
   std::optional<double> lowest;  ///< Ends of the 95 % interval of strength.
   std::optional<double> highest;
   /// The largest strength since it has its name, whatever its sign.
   std::optional<double> worst_strength;
-  /// 1 (critical) to 4 (low), as of now; null from earlier versions.
+  /// 1 (critical) to 4 (low), as of now; null: not known.
   std::optional<std::int64_t> priority;
   /// The data ended then, and the fault has not been seen to be gone since.
   std::optional<std::int64_t> unconfirmed_ns;

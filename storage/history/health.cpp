@@ -19,8 +19,7 @@
 namespace fdi::storage {
 namespace sql = history_sql;
 
-// The bytes of an hour, format 2, and 3 with stroke tests; format 1 had no
-// counts:
+// The bytes of an hour, format 2, and 3 with stroke tests:
 //
 //   hour     = head seen alarm open shut live_samples normal_factor travel
 //              reversals  counts  channels channel*  filled bin*  strength* 0
@@ -43,7 +42,6 @@ namespace sql = history_sql;
 // are omitted if it has no samples.
 namespace {
 
-constexpr std::uint8_t kWithoutCounts = 1;
 constexpr std::uint8_t kFormat = 2;
 constexpr std::uint8_t kWithStrokes = 3;  // As sql::stroke_hours knows.
 constexpr std::uint8_t kTonnes = 0x80;    // beside the format: flow in t/h
@@ -371,17 +369,14 @@ void UnpackHealth(std::span<const std::byte> bytes, HealthHour& hour) {
   ByteReader in(bytes, "health of " + hour.valve_id);
   const auto head = in.Get<std::uint8_t>();
   const int format = head & ~kTonnes;
-  if (format < kWithoutCounts || format > kWithStrokes) {
+  if (format < kFormat || format > kWithStrokes) {
     in.Refuse("format " + std::to_string(format) +
               " is not known to this program");
   }
   hour.flow_unit =
       (head & kTonnes) != 0 ? FlowUnit::kTPerHour : FlowUnit::kM3PerHour;
   ForEachNumber(hour, [&in](std::int64_t& value) { value = GetNumber(in); });
-  hour.counts = {};
-  if (format != kWithoutCounts) {
-    GetCounts(in, hour);
-  }
+  GetCounts(in, hour);
   hour.channels.resize(GetCount(in, kMaxChannels, "channels"));
   for (HealthChannel& channel : hour.channels) {
     const auto signal = in.Get<std::uint8_t>();

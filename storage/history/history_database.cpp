@@ -16,6 +16,8 @@ const Schema& HistorySchema() {
       0x46444948,  // "FDIH"
       Synchronous::kFull,
       {sql::kMigrations.begin(), sql::kMigrations.end()},
+      sql::kBaseline,
+      "start without its episodes; the program that wrote it still lists them",
       {sql::damaged_episode_ids, sql::damaged_event_ids}};
   return schema;
 }

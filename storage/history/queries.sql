@@ -11,7 +11,7 @@ SELECT v.episode_id, v.valve_id, v.detected_utc, v.isolated_utc,
   (SELECT max(last_ns) FROM episode_trace t
    WHERE t.episode_id = e.episode_id), e.session_id, e.fault_bits, e.strength,
   e.unknown_kind, e.layer, e.flow_unit, e.channels, e.faults,
-  coalesce(e.known, e.faults), e.lowest, e.highest, e.worst_strength,
+  e.known, e.lowest, e.highest, e.worst_strength,
   e.priority, e.unconfirmed_ns, v.fault_name, v.ack_comment,
   (SELECT nullif(s.value, 'none') FROM episode_event s
    WHERE s.episode_id = e.episode_id AND s.kind = 'SECOND'

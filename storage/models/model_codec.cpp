@@ -1,6 +1,5 @@
 #include "storage/models/model_codec.h"
 
-#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cstdio>
@@ -12,8 +11,6 @@
 #include <openssl/evp.h>
 #include <zlib.h>
 
-#include "diagnosis/model/fault_catalogue.h"
-#include "diagnosis/observers/fit_window.h"
 #include "storage/database/bytes.h"
 
 namespace fdi::storage {
@@ -21,42 +18,18 @@ namespace fdi::storage {
 // The bytes of a model set, little endian:
 //
 //   file    = "FDIM" format:uint32 length:uint64 payload crc:uint32
-//   format  = 3, + 1 with physics, + 2 with a floor, + 4 with a former drift,
-//             + 8 with an interpolation allowance, + 16 with names before t_k,
-//             + 32 with the trim of a floor, + 64 with a share of the flow that
-//             is too little, + 128 with limits of a fit, + 256 if the command
-//             is the position, + 512 if it may pass the end of its range; both
-//             have no bytes
-//   payload = the fields of ModelSet in the order of Fields() below, the floor
-//             last; then [physics: list] [drift: of each channel] [allowance]
-//             [early_error] [flow shape of the floor: list]
-//             [flow_share] [fit: of each channel of each observer, and what its
-//             fault moves: int32]
+//   payload = the fields of ModelSet in the order of Fields() below
 //
 // The CRC-32 covers all bytes before it. Encoding: a double as its 64 bits; int
-// as int32; int64 unchanged; bool and enumerations as uint8; a text as uint32
-// length and bytes; a list as uint32 count and its elements; a struct as its
-// fields. A new or moved field needs another kFormat. A part that is absent has
-// no bytes, so that older sets keep their bytes and hash.
+// as int32; int64 unchanged; bool, enumerations and masks of signals as uint8
+// or uint16; a text as uint32 length and bytes; a list as uint32 count and its
+// elements; an optional as a bool and, if it is true, its value; a struct as
+// its fields. A new or moved field needs another kFormat.
 namespace {
 
 constexpr std::uint32_t kMagic = 0x4D494446;  // "FDIM"
-// Format 3, plus one of these for each of the parts appended behind the fields.
-constexpr std::uint32_t kFormat = 3;
-constexpr std::uint32_t kWithPhysics = 1;
-constexpr std::uint32_t kWithFloor = 2;
-constexpr std::uint32_t kWithDrift = 4;
-constexpr std::uint32_t kWithAllowance = 8;
-constexpr std::uint32_t kWithEarlyNames = 16;
-constexpr std::uint32_t kWithFlowShape = 32;
-constexpr std::uint32_t kWithFlowShare = 64;
-constexpr std::uint32_t kWithFit = 128;
-constexpr std::uint32_t kWithPosition = 256;
-constexpr std::uint32_t kWithPassing = 512;
-constexpr std::uint32_t kLastFormat =
-    kFormat + kWithPhysics + kWithFloor + kWithDrift + kWithAllowance +
-    kWithEarlyNames + kWithFlowShape + kWithFlowShare + kWithFit +
-    kWithPosition + kWithPassing;
+// The formats 3 to 1026 were those of sets that were never released.
+constexpr std::uint32_t kFormat = 1027;
 constexpr std::uint32_t kMaxPhysics = 256;
 constexpr std::size_t kFrame =
     2 * sizeof(std::uint32_t) + sizeof(std::uint64_t) + sizeof(std::uint32_t);
@@ -103,14 +76,14 @@ void Fields(A& a, T& rod) {
   a(share, rate);
 }
 
-// Without the share of the flow, which is appended behind the other fields.
 template <typename A, Of<FloorLimits> T>
 void Fields(A& a, T& floor) {
   auto& [delay, quick, slow, deviation, deviation_samples, stuck_travel,
          flow_gain, flow_exponent, flow_shape, dp_level, flow_high, flow_factor,
          flow_margin, flow_samples, flow_share] = floor;
   a(delay, quick, slow, deviation, deviation_samples, stuck_travel, flow_gain,
-    flow_exponent, dp_level, flow_high, flow_factor, flow_margin, flow_samples);
+    flow_exponent, flow_shape, dp_level, flow_high, flow_factor, flow_margin,
+    flow_samples, flow_share);
 }
 
 template <typename A, Of<Trapezoid> T>
@@ -163,11 +136,9 @@ void Fields(A& a, T& window) {
     command);
 }
 
-// Without the former drift, which is appended behind the other fields.
 template <typename A, Of<ChannelSpec> T>
 void Fields(A& a, T& channel) {
-  auto& [name, output, lower_threshold, upper_threshold, windows,
-         former_drift] = channel;
+  auto& [name, output, lower_threshold, upper_threshold, windows] = channel;
   a(name, output, lower_threshold, upper_threshold,
     Limited{windows, kMaxWindows});
 }
@@ -178,19 +149,18 @@ void Fields(A& a, T& fit) {
   a(lower_mean, upper_mean, upper_square);
 }
 
-// Without the limits of the fit, which are appended behind the other fields.
 template <typename A, Of<ChannelObserver> T>
 void Fields(A& a, T& channel) {
   auto& [model, difference, membership, residual_sd, correlation_time,
          interpolation_error, validation, fit] = channel;
   a(model, difference, membership, residual_sd, correlation_time,
-    interpolation_error, validation);
+    interpolation_error, validation, fit);
 }
 
 template <typename A, Of<Observer> T>
 void Fields(A& a, T& observer) {
   auto& [name, fault, strength, channels, moved] = observer;
-  a(name, fault, strength, Limited{channels, kMaxChannels});
+  a(name, fault, strength, Limited{channels, kMaxChannels}, moved);
 }
 
 template <typename A, Of<DecisionParameters> T>
@@ -199,10 +169,10 @@ void Fields(A& a, T& decision) {
          isolation_fraction, join_fraction, reisolation_samples,
          clearing_samples, settling_samples, evidence_window, evidence_core,
          evidence_support, interpolation_allowance, early_error] = decision;
-  // The last two are appended behind the fields.
   a(isolation_threshold, detection_samples, isolation_samples,
     isolation_fraction, join_fraction, reisolation_samples, clearing_samples,
-    settling_samples, evidence_window, evidence_core, evidence_support);
+    settling_samples, evidence_window, evidence_core, evidence_support,
+    interpolation_allowance, early_error);
 }
 
 template <typename A, Of<PhysicalValue> T>
@@ -217,14 +187,14 @@ void Fields(A& a, T& models) {
   auto& [name, version, content_hash, created_ns, software, preset,
          sample_period_s, flow_unit, validity, stuck, floor, decision, channels,
          observers, faults, groups, undetectable, training_runs,
-         threshold_hours, false_alarms_per_hour, physics, position_as_command,
-         command_may_pass] = models;
+         threshold_hours, false_alarms_per_hour, physics, position_as_command] =
+      models;
   a(name, created_ns, software, preset, sample_period_s, flow_unit, validity,
-    stuck, decision, Limited{channels, kMaxChannels},
+    stuck, floor, decision, Limited{channels, kMaxChannels},
     Limited{observers, kMaxObservers}, Limited{faults, kMaxFaults},
     Limited{groups, kMaxFaults}, Limited{undetectable, kMaxFaults},
     Limited{training_runs, kMaxTrainingRuns}, threshold_hours,
-    false_alarms_per_hour, floor);
+    false_alarms_per_hour, Limited{physics, kMaxPhysics}, position_as_command);
 }
 
 class Encoder {
@@ -242,8 +212,9 @@ class Encoder {
   void Field(bool value) { writer.Put(static_cast<std::uint8_t>(value)); }
   void Field(Signal value) { writer.Put(static_cast<std::uint8_t>(value)); }
   void Field(FlowUnit value) { writer.Put(static_cast<std::uint8_t>(value)); }
-  // No byte says whether there is a floor: the format does.
+  void Field(SignalMask value) { writer.Put(value); }
   void Field(const std::optional<FloorLimits>& floor) {
+    Field(floor.has_value());
     if (floor) {
       Field(*floor);
     }
@@ -276,8 +247,7 @@ class Encoder {
 
 class Decoder {
  public:
-  Decoder(ByteReader& reader, std::uint32_t format)
-      : reader_(reader), format_(format) {}
+  explicit Decoder(ByteReader& reader) : reader_(reader) {}
 
   template <typename... T>
   void operator()(T&&... fields) {
@@ -296,8 +266,11 @@ class Decoder {
     value = static_cast<FlowUnit>(
         Small(static_cast<std::uint8_t>(FlowUnit::kTPerHour), "flow unit"));
   }
+  void Field(SignalMask& value) { value = reader_.Get<SignalMask>(); }
   void Field(std::optional<FloorLimits>& floor) {
-    if (((format_ - kFormat) & kWithFloor) != 0) {
+    bool there = false;
+    Field(there);
+    if (there) {
       Field(floor.emplace());
     }
   }
@@ -326,14 +299,7 @@ class Decoder {
   }
 
   ByteReader& reader_;
-  std::uint32_t format_;
 };
-
-bool HasFormerDrift(const ModelSet& models) {
-  return std::ranges::any_of(models.channels, [](const ChannelSpec& channel) {
-    return channel.former_drift != std::array<double, 3>{};
-  });
-}
 
 std::uint32_t Checksum(std::span<const std::byte> bytes) {
   // crc32_z() takes a size_t; the length of crc32() has 32 bits only.
@@ -342,64 +308,14 @@ std::uint32_t Checksum(std::span<const std::byte> bytes) {
               reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));
 }
 
-// Sets made before findings had a number range of their own number them behind
-// the 22 faults of that time.
-void RenumberFindings(ModelSet& models) {
-  constexpr int kBehindFaults = 23;
-  if (!models.floor || std::ranges::any_of(models.faults, IsFinding)) {
-    return;
-  }
-  for (int& fault : models.faults) {
-    fault += fault >= kBehindFaults ? kFirstFinding - kBehindFaults : 0;
-  }
-}
-
 }  // namespace
 
 std::vector<std::byte> EncodeModelSet(const ModelSet& models) {
   Encoder payload;
   Fields(payload, models);
-  if (!models.physics.empty()) {
-    payload(Limited{models.physics, kMaxPhysics});
-  }
-  const bool drifts = HasFormerDrift(models);
-  for (std::size_t c = 0; drifts && c < models.channels.size(); ++c) {
-    const auto& [lower, upper, log_scale] = models.channels[c].former_drift;
-    payload(lower, upper, log_scale);
-  }
-  const double allowance = models.decision.interpolation_allowance;
-  if (allowance > 0.0) {
-    payload(allowance);
-  }
-  const double early_error = models.decision.early_error;
-  if (early_error > 0.0) {
-    payload(early_error);
-  }
-  const bool shaped = models.floor && !models.floor->flow_shape.empty();
-  if (shaped) {
-    payload(models.floor->flow_shape);
-  }
-  const bool low_flow = models.floor && models.floor->flow_share > 0.0;
-  if (low_flow) {
-    payload(models.floor->flow_share);
-  }
-  const bool fits = JudgesFit(models);
-  for (std::size_t o = 0; fits && o < models.observers.size(); ++o) {
-    for (const ChannelObserver& channel : models.observers[o].channels) {
-      payload(channel.fit);
-    }
-    payload(static_cast<std::int32_t>(models.observers[o].moved));
-  }
   ByteWriter writer;
   writer.Put(kMagic);
-  writer.Put(kFormat + (models.physics.empty() ? 0U : kWithPhysics) +
-             (models.floor ? kWithFloor : 0U) + (drifts ? kWithDrift : 0U) +
-             (allowance > 0.0 ? kWithAllowance : 0U) +
-             (early_error > 0.0 ? kWithEarlyNames : 0U) +
-             (shaped ? kWithFlowShape : 0U) + (low_flow ? kWithFlowShare : 0U) +
-             (fits ? kWithFit : 0U) +
-             (models.position_as_command ? kWithPosition : 0U) +
-             (models.command_may_pass ? kWithPassing : 0U));
+  writer.Put(kFormat);
   writer.Put(static_cast<std::uint64_t>(payload.writer.size()));
   writer.Append(payload.writer.view().data(), payload.writer.size());
   writer.Put(Checksum(writer.view()));
@@ -420,58 +336,22 @@ ModelSet DecodeModelSet(std::span<const std::byte> bytes,
     reader.Refuse("its CRC-32 differs");
   }
   const auto format = reader.Get<std::uint32_t>();
-  if (format < kFormat || format > kLastFormat) {
-    throw DataError(std::string(where) + ": format version " +
-                    std::to_string(format) + ", this program reads " +
-                    std::to_string(kFormat) + " to " +
-                    std::to_string(kLastFormat) + "; train the model set anew");
+  if (format != kFormat) {
+    throw DataError(std::string(where) + ": format " + std::to_string(format) +
+                    " is of another version of this program, which reads " +
+                    std::to_string(kFormat) +
+                    "; make the model set anew from stored runs, with "
+                    "`fdi-trainer train` or `fdi-trainer onboard`");
   }
   if (reader.Get<std::uint64_t>() != bytes.size() - kFrame) {
     reader.Refuse("its length differs");
   }
   ByteReader payload(reader.TakeBytes(bytes.size() - kFrame), where);
   ModelSet models;
-  Decoder decoder(payload, format);
+  Decoder decoder(payload);
   Fields(decoder, models);
-  if (((format - kFormat) & kWithPhysics) != 0) {
-    decoder(Limited{models.physics, kMaxPhysics});
-  }
-  if (((format - kFormat) & kWithDrift) != 0) {
-    for (ChannelSpec& channel : models.channels) {
-      auto& [lower, upper, log_scale] = channel.former_drift;
-      decoder(lower, upper, log_scale);
-    }
-  }
-  if (((format - kFormat) & kWithAllowance) != 0) {
-    decoder(models.decision.interpolation_allowance);
-  }
-  if (((format - kFormat) & kWithEarlyNames) != 0) {
-    decoder(models.decision.early_error);
-  }
-  if (((format - kFormat) & kWithFlowShape) != 0 && models.floor) {
-    decoder(models.floor->flow_shape);
-  }
-  if (((format - kFormat) & kWithFlowShare) != 0) {
-    if (!models.floor) {
-      payload.Refuse("a share of the flow without a floor");
-    }
-    decoder(models.floor->flow_share);
-  }
-  if (((format - kFormat) & kWithFit) != 0) {
-    for (Observer& observer : models.observers) {
-      for (ChannelObserver& channel : observer.channels) {
-        decoder(channel.fit);
-      }
-      std::int32_t moved = 0;
-      decoder(moved);
-      observer.moved = static_cast<SignalMask>(moved);
-    }
-  }
-  models.position_as_command = ((format - kFormat) & kWithPosition) != 0;
-  models.command_may_pass = ((format - kFormat) & kWithPassing) != 0;
   payload.ExpectEnd();
-  models.content_hash = ContentHash(models);  // Of what is stored.
-  RenumberFindings(models);
+  models.content_hash = ContentHash(models);
   return models;
 }
 

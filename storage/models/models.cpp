@@ -180,7 +180,10 @@ const Schema& ModelsSchema() {
       "model",
       0x4644496D,  // "FDIm"
       Synchronous::kFull,
-      {sql::kMigrations.begin(), sql::kMigrations.end()}};
+      {sql::kMigrations.begin(), sql::kMigrations.end()},
+      sql::kBaseline,
+      "make its model sets anew from stored runs, with `fdi-trainer train` or "
+      "`fdi-trainer onboard`"};
   return schema;
 }
 

@@ -135,7 +135,10 @@ const Schema& RunsSchema() {
       "run",
       0x46444972,  // "FDIr"
       Synchronous::kNormal,
-      {sql::kMigrations.begin(), sql::kMigrations.end()}};
+      {sql::kMigrations.begin(), sql::kMigrations.end()},
+      sql::kBaseline,
+      "import its runs again with `fdi-store runs import`, from what the "
+      "program that wrote it exports"};
   return schema;
 }
 

@@ -1,6 +1,5 @@
 #include "storage/runs/sample_codec.h"
 
-#include <algorithm>
 #include <array>
 #include <bit>
 #include <limits>
@@ -18,13 +17,12 @@ namespace fdi::storage {
 //   plain   = record*
 //   record  = mask:uint32 word:uint64*     bit i of the mask: number i is not 0
 //   columns = size:uint32 deflated         size of what is deflated
-//   deflated = zlib of: integers * 11, doubles * 11
+//   deflated = zlib of: integers * 11, doubles * 12
 //
-// The 22 numbers of a sample, in this order: stamp, source, seq, present,
+// The 23 numbers of a sample, in this order: stamp, source, seq, present,
 // qualities (2 bits each), mode, flow unit, epoch, intake, flags, fault of the
-// truth; the ten values by signal, strength of the truth. A column of integers
-// or doubles is as in column_codec.cpp. With PV there are 23 numbers, 12 of
-// them doubles: PV stands between the other values and the strength.
+// truth; the eleven values by signal, strength of the truth. A column of
+// integers or doubles is as in column_codec.cpp.
 namespace {
 
 constexpr unsigned kQualityBits = 2;
@@ -35,39 +33,25 @@ constexpr std::int64_t kHasTruth = 4;
 /// A StoredSample as plain numbers.
 struct Row {
   static constexpr std::size_t kIntegers = 11;
+  static constexpr std::size_t kDoubles = kSignalCount + 1;
   // stamp, source, seq, present, quality, mode, flow unit, epoch, intake,
   // flags, fault
   std::array<std::int64_t, kIntegers> integers{};
   std::array<double, kSignalCount> values{};
   double strength{0.0};  // Of the truth.
 
-  // The doubles of a form with so many signals.
-  double& Double(std::size_t i, std::size_t signals) {
-    return i < signals ? values[i] : strength;
+  double& Double(std::size_t i) {
+    return i < kSignalCount ? values[i] : strength;
   }
 };
 
-std::size_t SignalsOf(ChunkCodec codec) {
-  return codec == ChunkCodec::kPlainPv || codec == ChunkCodec::kColumnsPv
-             ? kSignalCount
-             : kModelSignalCount;
-}
-
-// Anything of the PV, also what a sample does not need.
-bool HasPv(const StoredSample& stored) {
-  const Sample& s = stored.sample;
-  return s.Has(Signal::kPv) ||
-         std::bit_cast<std::uint64_t>(s[Signal::kPv]) != 0 ||
-         s.quality[Index(Signal::kPv)] != SignalQuality::kGood;
-}
-
 /// Upper bound of the inflated size of a chunk of `count` samples.
-std::size_t MaxInflated(std::size_t count, std::size_t signals) {
+std::size_t MaxInflated(std::size_t count) {
   // A column of doubles is at most two of integers behind its kind, origin and
   // step (17 bytes). A column of integers is at most its form, two seeds and
   // the width (18 bytes), and 8 bytes for every sample. So 64 bytes beside the
   // samples suffice for each.
-  return (Row::kIntegers + 2 * (signals + 1)) * (8 * count + 64);
+  return (Row::kIntegers + 2 * Row::kDoubles) * (8 * count + 64);
 }
 
 Row ToRow(const StoredSample& stored) {
@@ -105,8 +89,7 @@ std::int64_t Within(std::int64_t value, std::int64_t max, const char* what,
   return value;
 }
 
-StoredSample FromRow(const Row& row, std::size_t signals,
-                     const ByteReader& reader) {
+StoredSample FromRow(const Row& row, const ByteReader& reader) {
   const auto& n = row.integers;
   StoredSample stored;
   Sample& s = stored.sample;
@@ -114,8 +97,8 @@ StoredSample FromRow(const Row& row, std::size_t signals,
   s.source_id = static_cast<std::uint64_t>(n[1]);
   s.seq = static_cast<std::uint64_t>(n[2]);
   s.present = static_cast<SignalMask>(
-      Within(n[3], (1 << signals) - 1, "signals", reader));
-  for (std::size_t i = 0; i < signals; ++i) {
+      Within(n[3], (1 << kSignalCount) - 1, "signals", reader));
+  for (std::size_t i = 0; i < kSignalCount; ++i) {
     s.quality[i] = static_cast<SignalQuality>(
         Within((n[4] >> (kQualityBits * i)) & 3,
                static_cast<int>(SignalQuality::kBad), "quality", reader));
@@ -152,7 +135,7 @@ std::uint32_t ChecksumOf(const Chunk& chunk) {
 }
 
 std::vector<std::byte> EncodeColumns(std::span<const StoredSample> samples,
-                                     std::size_t signals, ChunkHints* hints) {
+                                     ChunkHints* hints) {
   std::vector<Row> rows;
   rows.reserve(samples.size());
   for (const StoredSample& sample : samples) {
@@ -167,13 +150,12 @@ std::vector<std::byte> EncodeColumns(std::span<const StoredSample> samples,
     WriteIntegers(writer, integers);
   }
   std::vector<double> doubles(rows.size());
-  for (std::size_t c = 0; c <= signals; ++c) {
+  for (std::size_t c = 0; c < Row::kDoubles; ++c) {
     for (std::size_t i = 0; i < rows.size(); ++i) {
-      doubles[i] = rows[i].Double(c, signals);
+      doubles[i] = rows[i].Double(c);
     }
-    const std::size_t hint = c < signals ? c : kSignalCount;
     WriteDoubles(writer, doubles,
-                 hints != nullptr ? &hints->columns[hint] : nullptr);
+                 hints != nullptr ? &hints->columns[c] : nullptr);
   }
   ByteWriter chunk;
   chunk.Put(static_cast<std::uint32_t>(writer.size()));
@@ -184,11 +166,10 @@ std::vector<std::byte> EncodeColumns(std::span<const StoredSample> samples,
 
 std::vector<StoredSample> DecodeColumns(const Chunk& chunk,
                                         std::string_view where) {
-  const std::size_t signals = SignalsOf(chunk.codec);
   ByteReader packed(chunk.bytes, where);
-  const std::uint32_t size = packed.GetCount(
-      static_cast<std::uint32_t>(MaxInflated(chunk.count, signals)),
-      "size of inflated chunk");
+  const std::uint32_t size =
+      packed.GetCount(static_cast<std::uint32_t>(MaxInflated(chunk.count)),
+                      "size of inflated chunk");
   const std::vector<std::byte> raw =
       Inflate(packed.TakeBytes(chunk.bytes.size() - sizeof size), size, where);
   ByteReader reader(raw, where);
@@ -199,34 +180,33 @@ std::vector<StoredSample> DecodeColumns(const Chunk& chunk,
       rows[i].integers[c] = column[i];
     }
   }
-  for (std::size_t c = 0; c <= signals; ++c) {
+  for (std::size_t c = 0; c < Row::kDoubles; ++c) {
     const auto column = ReadDoubles(reader, rows.size());
     for (std::size_t i = 0; i < rows.size(); ++i) {
-      rows[i].Double(c, signals) = column[i];
+      rows[i].Double(c) = column[i];
     }
   }
   reader.ExpectEnd();
   std::vector<StoredSample> samples;
   samples.reserve(rows.size());
   for (const Row& row : rows) {
-    samples.push_back(FromRow(row, signals, reader));
+    samples.push_back(FromRow(row, reader));
   }
   return samples;
 }
 
 /// Zero words (all bits 0) are omitted and marked in the record's mask.
-std::vector<std::byte> EncodePlain(std::span<const StoredSample> samples,
-                                   std::size_t signals) {
+std::vector<std::byte> EncodePlain(std::span<const StoredSample> samples) {
   ByteWriter writer;
   for (const StoredSample& sample : samples) {
     Row row = ToRow(sample);
-    std::array<std::uint64_t, Row::kIntegers + kSignalCount + 1> words{};
+    std::array<std::uint64_t, Row::kIntegers + Row::kDoubles> words{};
     std::uint32_t mask = 0;
-    for (std::size_t i = 0; i < Row::kIntegers + signals + 1; ++i) {
-      words[i] = i < Row::kIntegers
-                     ? static_cast<std::uint64_t>(row.integers[i])
-                     : std::bit_cast<std::uint64_t>(
-                           row.Double(i - Row::kIntegers, signals));
+    for (std::size_t i = 0; i < words.size(); ++i) {
+      words[i] =
+          i < Row::kIntegers
+              ? static_cast<std::uint64_t>(row.integers[i])
+              : std::bit_cast<std::uint64_t>(row.Double(i - Row::kIntegers));
       mask |= words[i] != 0 ? 1U << i : 0U;
     }
     writer.Put(mask);
@@ -241,23 +221,22 @@ std::vector<std::byte> EncodePlain(std::span<const StoredSample> samples,
 
 std::vector<StoredSample> DecodePlain(const Chunk& chunk,
                                       std::string_view where) {
-  const std::size_t signals = SignalsOf(chunk.codec);
   ByteReader reader(chunk.bytes, where);
   std::vector<StoredSample> samples;
   samples.reserve(chunk.count);
   for (std::uint32_t k = 0; k < chunk.count; ++k) {
     Row row;
     const auto mask = reader.Get<std::uint32_t>();
-    for (std::size_t i = 0; i < Row::kIntegers + signals + 1; ++i) {
+    for (std::size_t i = 0; i < Row::kIntegers + Row::kDoubles; ++i) {
       const std::uint64_t word =
           (mask >> i & 1U) != 0 ? reader.Get<std::uint64_t>() : 0;
       if (i < Row::kIntegers) {
         row.integers[i] = static_cast<std::int64_t>(word);
       } else {
-        row.Double(i - Row::kIntegers, signals) = std::bit_cast<double>(word);
+        row.Double(i - Row::kIntegers) = std::bit_cast<double>(word);
       }
     }
-    samples.push_back(FromRow(row, signals, reader));
+    samples.push_back(FromRow(row, reader));
   }
   reader.ExpectEnd();
   return samples;
@@ -269,17 +248,11 @@ Chunk EncodeChunk(std::span<const StoredSample> samples, ChunkCodec codec,
                   ChunkHints* hints) {
   Require(!samples.empty() && samples.size() <= kMaxChunkSamples,
           "a chunk holds 1 to 65536 samples");
-  const bool plain =
-      codec == ChunkCodec::kPlain || codec == ChunkCodec::kPlainPv;
   Chunk chunk;
-  chunk.codec = plain ? ChunkCodec::kPlain : ChunkCodec::kColumns;
-  if (std::ranges::any_of(samples, HasPv)) {
-    chunk.codec = plain ? ChunkCodec::kPlainPv : ChunkCodec::kColumnsPv;
-  }
-  const std::size_t signals = SignalsOf(chunk.codec);
+  chunk.codec = codec;
   chunk.count = static_cast<std::uint32_t>(samples.size());
-  chunk.bytes = plain ? EncodePlain(samples, signals)
-                      : EncodeColumns(samples, signals, hints);
+  chunk.bytes = codec == ChunkCodec::kPlain ? EncodePlain(samples)
+                                            : EncodeColumns(samples, hints);
   chunk.crc = ChecksumOf(chunk);
   return chunk;
 }
@@ -297,10 +270,8 @@ std::vector<StoredSample> DecodeChunk(const Chunk& chunk,
   }
   switch (chunk.codec) {
     case ChunkCodec::kPlain:
-    case ChunkCodec::kPlainPv:
       return DecodePlain(chunk, where);
     case ChunkCodec::kColumns:
-    case ChunkCodec::kColumnsPv:
       return DecodeColumns(chunk, where);
   }
   refuser.Refuse("unknown codec " +

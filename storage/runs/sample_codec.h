@@ -28,10 +28,6 @@ struct StoredSample {
 enum class ChunkCodec : std::uint8_t {
   kPlain = 0,    ///< Fixed records, for the few samples of a tail row.
   kColumns = 1,  ///< Columns of differences, byte planes, zlib.
-  // The same with PV: chunks in which no sample has one are as they were before
-  // there was any.
-  kPlainPv = 2,
-  kColumnsPv = 3,
 };
 
 /// Consecutive samples of a run, as stored.
@@ -58,7 +54,6 @@ struct ChunkHints {
 /// a + q·n (the grid of a converter), plus corrections in units in the last
 /// place; or the bits themselves. Each integer column is stored as first or
 /// second differences, split into byte planes, and everything is deflated.
-/// @param codec with or without PV, as the samples need it.
 /// @throws std::invalid_argument if there are none or too many.
 Chunk EncodeChunk(std::span<const StoredSample> samples, ChunkCodec codec,
                   ChunkHints* hints = nullptr);

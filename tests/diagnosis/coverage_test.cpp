@@ -337,7 +337,6 @@ TEST(CoverageTest, WindowsBeginAnewOnceArmedAndOutlastLostSamples) {
 TEST(CoverageTest, CommandThatPassesTheEndOfTheRangeDoesNotDisarm) {
   ModelSet models = OperatedPlant();
   models.validity.cv_step = 50.0;
-  models.command_may_pass = true;
   constexpr int kLag = 5;
   models.observers[1].channels[0].model.regressors[0].lag = kLag;
   const auto passing = [](int samples) {
@@ -358,11 +357,6 @@ TEST(CoverageTest, CommandThatPassesTheEndOfTheRangeDoesNotDisarm) {
   Follow(staying, 0, 300, passing(30));
   Follow(staying, 300, 330, passing(30));
   EXPECT_EQ(Follow(staying, 330, 330 + kRearm, passing(30)).live, 0);
-  // Sets from before are disarmed by it.
-  models.command_may_pass = false;
-  ValveEngine older = Engine(models);
-  Follow(older, 0, 300, passing(2));
-  EXPECT_EQ(Follow(older, 300, 302 + kRearm, passing(2)).live, 0);
 }
 
 TEST(CoverageTest, ArmedStateIsPartOfTheSnapshot) {

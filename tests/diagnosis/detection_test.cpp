@@ -112,23 +112,19 @@ TEST(DetectionTest, LimitOnEnergyFollowsTheExcitation) {
 constexpr double kLimit = 0.6 * tests::kNoise;  // on the mean of F
 constexpr int kHour = 3600;
 
-// Of before 1.0, when limits followed the valve as far as `former`.
-std::shared_ptr<const ModelSet> DriftingPlant(
-    const std::array<double, 3>& former) {
+std::shared_ptr<const ModelSet> DriftingPlant() {
   ModelSet models = *SharedPlant();
   models.channels[1].lower_threshold = -100.0;
   models.channels[1].upper_threshold = 100.0;
   models.channels[1].windows = {
       {100, -kLimit, kLimit, std::log(1.5 * tests::kNoise)}};
-  models.channels[1].former_drift = former;
   return std::make_shared<const ModelSet>(models);
 }
 
 // Hour of the first alarm while F is raised by `shift` limits and its noise
 // grows by `growth` each hour; nothing if there is none in 24 h.
-std::optional<double> AlarmAfter(const std::array<double, 3>& former,
-                                 double shift, double growth) {
-  ValveEngine engine(DriftingPlant(former));
+std::optional<double> AlarmAfter(double shift, double growth) {
+  ValveEngine engine(DriftingPlant());
   Noise noise(9);
   for (int k = 0; k < 24 * kHour; ++k) {
     const double hours = static_cast<double>(k) / kHour;
@@ -146,14 +142,12 @@ std::optional<double> AlarmAfter(const std::array<double, 3>& former,
 }
 
 // A limit is reached in 12 h, and so is one on the noise in 10 h.
-TEST(DetectionTest, SlowChangesAreFoundAsAnyOtherAlsoByFormerSets) {
-  const std::array<double, 3> former{-2.0 * kLimit, 2.0 * kLimit,
-                                     std::log(2.0)};
-  EXPECT_EQ(AlarmAfter(former, 0.0, 0.0), std::nullopt);
-  const auto shifted = AlarmAfter(former, 1.0 / 12.0, 0.0);
+TEST(DetectionTest, SlowChangesAreFoundAsAnyOther) {
+  EXPECT_EQ(AlarmAfter(0.0, 0.0), std::nullopt);
+  const auto shifted = AlarmAfter(1.0 / 12.0, 0.0);
   ASSERT_TRUE(shifted.has_value());
   EXPECT_LT(*shifted, 12.0);
-  const auto noisy = AlarmAfter(former, 0.0, 1.0 / 20.0);
+  const auto noisy = AlarmAfter(0.0, 1.0 / 20.0);
   ASSERT_TRUE(noisy.has_value());
   EXPECT_LT(*noisy, 11.0);
 }

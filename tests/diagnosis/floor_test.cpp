@@ -228,8 +228,8 @@ TEST(FloorTest, FlowThatWentWithThePressureIsLostUnlessTheValveIsParked) {
   EXPECT_EQ(first(0.0), "unknown");
 }
 
-// Sets of before the test have one finding less.
-TEST(FloorTest, OlderSetsDoNotTestForTooLittleFlow) {
+// Sets without a flow have one finding less.
+TEST(FloorTest, WithoutAShareNothingTestsForTooLittleFlow) {
   ModelSet models = FlooredPlant();
   models.floor->flow_share = 0.0;
   EXPECT_THROW(Validate(models), DataError);
@@ -457,7 +457,8 @@ TEST(FloorTest, AFaultThatHasGrownExplainsTheLoss) {
 }
 
 // The fault moves the command, by more than any step in training and out of
-// the trained range: f6 is named all the same. Sets of before wait outside.
+// the trained range: f6 is named all the same. Sets without a floor wait
+// outside.
 TEST(FloorTest, AbnormalValveStaysJudgedWhateverItsCommandDoes) {
   for (const bool floored : {false, true}) {
     ModelSet models = floored ? FlooredPlant() : tests::LinearPlant();

@@ -46,7 +46,7 @@ void PackAgain(const std::vector<StoredSample>& samples, ChunkCodec codec) {
 
 }  // namespace
 
-// Byte 0: bits 0 and 2 are the codec, bit 1 says whether the rest is to be
+// Byte 0: bit 0 is the codec, bit 1 says whether the rest is to be
 // deflated; 1, 2: count.
 extern "C" int LLVMFuzzerTestOneInput(const unsigned char* data,
                                       std::size_t size) {
@@ -54,7 +54,7 @@ extern "C" int LLVMFuzzerTestOneInput(const unsigned char* data,
     return 0;
   }
   Chunk chunk;
-  chunk.codec = static_cast<ChunkCodec>((data[0] & 1) | (data[0] & 4) >> 1);
+  chunk.codec = static_cast<ChunkCodec>(data[0] & 1);
   chunk.count = data[1] + 256U * (data[2] & 3U);
   const auto* rest = reinterpret_cast<const std::byte*>(data) + 3;
   chunk.bytes = (data[0] & 2) != 0

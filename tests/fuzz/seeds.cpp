@@ -91,20 +91,14 @@ void WriteChunks() {
   for (std::uint64_t k = 0; k < samples.size(); ++k) {
     samples[k].sample = PlantSample(k, 0.1 * static_cast<double>(k % 7));
   }
-  for (const bool with_pv : {false, true}) {
-    if (with_pv) {
-      samples[7].sample.Set(fdi::Signal::kPv, 3.2);
-    }
-    for (const auto codec : {fdi::storage::ChunkCodec::kPlain,
-                             fdi::storage::ChunkCodec::kColumns}) {
-      const auto chunk = fdi::storage::EncodeChunk(samples, codec);
-      const int number = static_cast<int>(chunk.codec);
-      // Bit 1 says whether the rest is to be deflated.
-      const char kind = static_cast<char>((number & 1) | (number & 2) << 1);
-      Write("chunk", "codec" + std::to_string(number),
-            std::string{kind, static_cast<char>(samples.size()), '\0'} +
-                Text(chunk.bytes));
-    }
+  samples[7].sample.Set(fdi::Signal::kPv, 3.2);
+  for (const auto codec :
+       {fdi::storage::ChunkCodec::kPlain, fdi::storage::ChunkCodec::kColumns}) {
+    const auto chunk = fdi::storage::EncodeChunk(samples, codec);
+    const char kind = static_cast<char>(codec);
+    Write("chunk", "codec" + std::to_string(kind),
+          std::string{kind, static_cast<char>(samples.size()), '\0'} +
+              Text(chunk.bytes));
   }
 }
 

@@ -415,34 +415,6 @@ TEST(ValvePhysicsTest, RefusesAValueThatIsMissingOrUnknown) {
   EXPECT_THROW(PhysicsFrom(values), DataError);
 }
 
-TEST(ValvePhysicsTest, KnowsNothingOfTheLoopWhereItIsOfBefore) {
-  ValvePhysics physics = Physics();
-  physics.loop = {2.0, false};
-  std::vector<PhysicalValue> values = ToValues(physics);
-  EXPECT_FALSE(PhysicsFrom(values).loop.reads_flow);
-  values.resize(values.size() - 3);
-  EXPECT_TRUE(PhysicsFrom(values).loop.reads_flow);
-  EXPECT_EQ(PhysicsFrom(values).least_loss, 0.0);
-}
-
-TEST(ValvePhysicsTest, SetsOfBeforeThereWereMediaAreOfWater) {
-  std::vector<PhysicalValue> values = ToValues(Physics());
-  const std::size_t all = values.size();
-  std::erase_if(values, [](const PhysicalValue& value) {
-    return value.name.starts_with("parameters.medium.") ||
-           value.name == "parameters.actuator.spring" ||
-           value.name == "parameters.trim.shut_off" ||
-           value.name == "parameters.trim.leakage" ||
-           value.name == "parameters.trim.liquid_recovery" ||
-           value.name == "parameters.trim.choked_pressure_ratio";
-  });
-  ASSERT_EQ(values.size() + 12, all);
-  const ValveParameters valve = PhysicsFrom(values).parameters;
-  EXPECT_EQ(valve.medium, Medium{});
-  EXPECT_EQ(valve.trim.shut_off, 0.975);
-  EXPECT_EQ(valve.actuator.spring, SpringAction::kToOpen);
-}
-
 TEST(ValvePhysicsTest, AMissingValueThatWasAlwaysThereIsRefused) {
   for (const char* name :
        {"parameters.actuator.spring_rate_n_m", "parameters.trim.exponent"}) {

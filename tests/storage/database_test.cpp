@@ -120,14 +120,14 @@ TEST_F(DatabaseTest, MigrationKeepsRowsAndLeavesTheOldFileBeside) {
     Database old(file_, SchemaOf(1), Access::kWriter);
     Insert(old, 4);
   }
+  EXPECT_THROW(Database(file_, SchemaOf(2), Access::kReader), OutdatedError);
   EXPECT_THAT(MessageOf(SchemaOf(2), Access::kReader),
-              HasSubstr("fdi-store migrate"));
+              HasSubstr("fdi-store doctor"));
 
   Database migrated(file_, SchemaOf(2), Access::kOccasionalWriter);
   EXPECT_EQ(migrated.version(), 2);
   EXPECT_EQ(migrated.QueryInt64("SELECT extra FROM t"), 40);
-  ASSERT_TRUE(migrated.migration_backup());
-  Database backup(*migrated.migration_backup(), SchemaOf(1), Access::kReader);
+  Database backup(file_.string() + ".v1.backup", SchemaOf(1), Access::kReader);
   EXPECT_EQ(backup.QueryInt64("SELECT id FROM t"), 4);
 }
 
@@ -143,6 +143,26 @@ TEST_F(DatabaseTest, FailedMigrationLeavesTheOldVersion) {
   EXPECT_FALSE(std::filesystem::exists(file_.string() + ".v1.backup"));
   Database after(file_, SchemaOf(1), Access::kWriter);
   EXPECT_EQ(after.QueryInt64("SELECT id FROM t"), 4);
+}
+
+// The first script of a schema makes its baseline, whatever its number.
+TEST_F(DatabaseTest, VersionsBeforeTheBaselineAreRefusedAndLeftAlone) {
+  { const Database old(file_, SchemaOf(1), Access::kWriter); }
+  Schema schema{
+      "test", 0x1234,         Synchronous::kNormal, {kFirst, kSecondVersion},
+      16,     "make it again"};
+  for (const Access access :
+       {Access::kWriter, Access::kOccasionalWriter, Access::kReader}) {
+    const std::string message = MessageOf(schema, access);
+    EXPECT_THAT(message, HasSubstr(file_.string() + ": version 1 was never"));
+    EXPECT_THAT(message, HasSubstr("move it away and make it again"));
+  }
+  { const Database same(file_, SchemaOf(1), Access::kReader); }
+  std::filesystem::remove(file_);
+  EXPECT_EQ(Database(file_, schema, Access::kWriter).version(), 17);
+  schema.migrations.push_back("ALTER TABLE t ADD COLUMN more INTEGER;");
+  EXPECT_EQ(Database(file_, schema, Access::kWriter).version(), 18);
+  EXPECT_TRUE(std::filesystem::exists(file_.string() + ".v17.backup"));
 }
 
 TEST_F(DatabaseTest, NewerVersionIsRefusedNamingFileAndBothVersions) {

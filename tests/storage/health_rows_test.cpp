@@ -109,35 +109,6 @@ TEST(HealthCodecTest, BytesGiveBackEveryNumber) {
   EXPECT_EQ(back, hour);
 }
 
-// Hours of before there were counts.
-TEST(HealthCodecTest, HoursOfTheFormatBeforeHaveNoCounts) {
-  std::mt19937 random(4);
-  HealthHour hour = Typical("V1", 1, 2, random);
-  hour.counts = {};
-  hour.counts.auto_ms = hour.seen_ms;
-  auto bytes = PackHealth(hour);
-  HealthHour shorter = hour;
-  shorter.reversals = 0;
-  // No counts: a zero behind the two bytes of the reversals, which differ.
-  const auto other = PackHealth(shorter);
-  const auto place = std::ranges::mismatch(bytes, other).in1 + 2;
-  ASSERT_EQ(*place, std::byte{0});
-  bytes.erase(place);
-  hour.counts = {};
-  bytes[0] = (bytes[0] & std::byte{0x80}) | std::byte{1};
-  HealthHour back;
-  back.valve_id = hour.valve_id;
-  back.hour = hour.hour;
-  back.model_hash = hour.model_hash;
-  back.epoch = hour.epoch;
-  back.live_ms = hour.live_ms;
-  back.counts.steps = 9;
-
-  UnpackHealth(bytes, back);
-
-  EXPECT_EQ(back, hour);
-}
-
 TEST(HealthCodecTest, DamagedBytesAreRefused) {
   std::mt19937 random(3);
   HealthHour hour = Typical("V1", 1, 2, random);

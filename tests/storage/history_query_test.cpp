@@ -111,41 +111,5 @@ TEST_F(HistoryQueryTest, AlarmsAndTheirFiguresWalkIndexes) {
   EXPECT_THAT(plan, Not(HasSubstr("SCAN e\n")));
 }
 
-TEST_F(HistoryQueryTest, AnOlderFileGetsItsAnswersAndIndexes) {
-  const DataDirectory old{directory_.path() / "old"};
-  EnsureExists(old);
-  Schema second = HistorySchema();
-  second.migrations.resize(2);
-  {
-    Database file(old.history(), second, Access::kWriter);
-    Transaction transaction(file);
-    const std::string columns =
-        "INSERT INTO episode (episode_id, valve_id, source_id, detected_ns, "
-        "isolated_ns, ended_ns, peak_factor, strength, model_set, model_hash, "
-        "flow_unit, channels, faults) VALUES ";
-    const std::string rest = ", 0.5, 0.5, 'm@1', 1, 'm3/h', 'X', 'f1|f7')";
-    file.Run(columns + "('000000000000000a', 'A', 1, 10, 20, 30" + rest);
-    file.Run(columns + "('000000000000000b', 'B', 1, 11, NULL, 30" + rest);
-    file.Run(columns + "('000000000000000c', 'C', 1, 12, NULL, NULL" + rest);
-    for (const char* fault : {"('000000000000000a', 'f7', 1, 20, 1)",
-                              "('000000000000000a', 'f1', 0, 20, 1)",
-                              "('000000000000000a', 'f2', 2, 15, 0)"}) {
-      file.Run(std::string("INSERT INTO episode_fault VALUES ") + fault);
-    }
-    transaction.Commit();
-  }
-  const HistoryWriter migrate(old.history());
-
-  HistoryReader reader(old.history());
-  const std::vector<Episode> episodes = reader.List();
-  ASSERT_EQ(episodes.size(), 3U);
-  EXPECT_EQ(episodes[0].fault, "f1|f7");
-  EXPECT_EQ(episodes[1].fault, "unknown");
-  EXPECT_EQ(episodes[2].fault, std::nullopt);
-  EpisodeFilter f7;
-  f7.fault = "f7";
-  EXPECT_EQ(reader.List(f7).size(), 1U);
-}
-
 }  // namespace
 }  // namespace fdi::storage

@@ -52,26 +52,6 @@ TEST_F(HistoryStrengthTest, TheyGoWithTheirEpisodeAndDoNotComeWithoutOne) {
   EXPECT_EQ(Sql("SELECT count(*) FROM episode_strength"), "0");
 }
 
-TEST_F(HistoryStrengthTest, AHistoryOfVersion9GetsThem) {
-  Schema older = HistorySchema();
-  older.migrations.resize(9);
-  {
-    Database database(path_, older, Access::kWriter);
-    Transaction transaction(database);
-    database.Run(
-        "INSERT INTO episode (episode_id, valve_id, source_id, detected_ns, "
-        "fault_bits, peak_factor, strength, model_set, model_hash, flow_unit, "
-        "channels, faults) VALUES (?, 'LV-1', 1, 2, 0, 0.5, 0.5, 'demo@3', 4, "
-        "'m3/h', 'X', 'f7')",
-        EpisodeIdText(Id()));
-    transaction.Commit();
-  }
-  HistoryWriter writer(path_);
-  EXPECT_TRUE(HistoryReader(path_).Strengths(Id()).empty());
-  writer.StoreStrength(Strength(0, 7, 0.5));
-  EXPECT_EQ(HistoryReader(path_).Strengths(Id()).size(), 1U);
-}
-
 TEST_F(HistoryStrengthTest, TheFaultsOfTheNameDevelopInItsOrder) {
   Episode episode;
   episode.fault = "f7|f19";

@@ -67,7 +67,7 @@ TEST_F(HistoryWriterTest, ViewHasTheNamesOfTheMonitorThatStartedLast) {
 }
 
 // A file that was replaced and took no session, as on a full disk, has none to
-// end: the one in it, of before the copy, died.
+// end: the session that the copy holds died.
 TEST_F(HistoryWriterTest, WithoutASessionNobodysIsEnded) {
   HistoryWriter writer(path_);
   writer.BeginSession(kDetected, "test", "");
@@ -98,16 +98,6 @@ TEST_F(HistoryWriterTest, WhatTheSetKnowsIsKeptWithItsSigns) {
   EXPECT_THAT(shown().known, ElementsAre("f2", "f5", "f19-"));
   EXPECT_THAT(LookAlikesOf(shown()), ElementsAre("f19"));
   EXPECT_EQ(CertaintyOf(shown()), Certainty::kOneOf);
-
-  // As an earlier version has stored it.
-  {
-    Database database(path_, HistorySchema(), Access::kWriter);
-    Transaction transaction(database);
-    database.Run("UPDATE episode SET known = NULL");
-    transaction.Commit();
-  }
-  EXPECT_THAT(shown().known, ElementsAre("f2", "f5", "f19"));
-  EXPECT_EQ(CertaintyOf(shown()), Certainty::kSure);
 }
 
 TEST_F(HistoryWriterTest, WhatEndedBeforeItHadANameIsNotUnlikeAnyFault) {
@@ -557,41 +547,26 @@ TEST_F(GrowingAlarmTest, WhatIsLeftOpenWasKnownUpToTheLastSample) {
   EXPECT_EQ(writer_.OpenEpisodes().at(0).last_stamp_ns, last);
 }
 
-TEST_F(HistoryWriterTest, AHistoryOfVersion10KeepsItsAlarms) {
-  Schema older = HistorySchema();
-  older.migrations.resize(10);
+// The first version after the baseline.
+TEST_F(HistoryWriterTest, EpisodesOfTheBaselineKnowTheFaultsOfTheirTrace) {
+  Schema baseline = HistorySchema();
+  baseline.migrations.resize(1);
   {
-    Database database(path_, older, Access::kWriter);
+    Database database(path_, baseline, Access::kWriter);
     Transaction transaction(database);
-    const std::string episode =
+    database.Run(
         "INSERT INTO episode (episode_id, valve_id, source_id, detected_ns, "
-        "isolated_ns, ended_ns, end_reason, fault, fault_bits, peak_factor, "
-        "strength, model_set, model_hash, flow_unit, channels, faults) VALUES ";
-    const std::string rest = "'f7', 1, 0.5, 0.25, 'm@1', 1, 'm3/h', 'X', 'f7')";
-    database.Run(episode +
-                 "('000000000000000a', 'A', 1, 10, 20, 30, "
-                 "'stream_ended', " +
-                 rest);
-    database.Run(episode +
-                 "('000000000000000b', 'A', 1, 40, 50, 60, "
-                 "'stale_timeout', " +
-                 rest);
-    database.Run(episode +
-                 "('000000000000000c', 'C', 1, 11, 21, 31, "
-                 "'cleared', " +
-                 rest);
+        "peak_factor, strength, model_set, model_hash, flow_unit, channels, "
+        "faults) VALUES ('00000000000000aa', 'V', 1, 2, 1.0, 1.0, 'm@1', 1, "
+        "'m3/h', 'X', 'f2|f19')");
     transaction.Commit();
   }
-  const HistoryWriter migrate(path_);
-  HistoryReader reader(path_);
-  std::vector<std::string> states;
-  for (const Alarm& alarm : reader.Alarms(reader.List(), 100)) {
-    states.emplace_back(AlarmStateName(alarm.state));
-  }
-  // The second episode of A has taken the place of the first.
-  EXPECT_EQ(states, (std::vector<std::string>{"NORMAL", "RTN_UNACK", "UNACK"}));
-  EXPECT_EQ(reader.List().at(0).worst_strength, 0.25);
-  EXPECT_EQ(reader.List().at(0).priority, std::nullopt);
+  EXPECT_THROW(HistoryReader reader(path_), OutdatedError);
+  const HistoryWriter migrates(path_);
+  EXPECT_THAT(HistoryReader(path_).Show("last").known,
+              ElementsAre("f2", "f19"));
+  EXPECT_TRUE(std::filesystem::exists(
+      path_.string() + ".v" + std::to_string(baseline.version()) + ".backup"));
 }
 
 TEST_F(HistoryWriterTest, SameGapTwiceIsOneGap) {
@@ -726,24 +701,6 @@ TEST_F(HistoryWriterTest, TheLayerThatNamedTheFaultIsKept) {
     layers.push_back(entry.layer);
   }
   EXPECT_EQ(layers, (std::vector<std::string>{"", "observers", "physics", ""}));
-}
-
-// What an earlier version stored.
-TEST_F(HistoryWriterTest, AnOlderHistoryWasNamedByTheObservers) {
-  Schema older = HistorySchema();
-  older.migrations.resize(6);
-  {
-    Database database(path_, older, Access::kOccasionalWriter);
-    Transaction transaction(database);
-    database.Run(
-        "INSERT INTO episode (episode_id, valve_id, source_id, detected_ns, "
-        "isolated_ns, peak_factor, strength, model_set, model_hash, flow_unit, "
-        "channels, faults) VALUES ('00000000000000aa', 'V', 1, 2, 3, 1.0, 1.0, "
-        "'m@1', 1, 'm3/h', 'X', 'f1')");
-    transaction.Commit();
-  }
-  HistoryWriter writer(path_);
-  EXPECT_EQ(HistoryReader(path_).Show("last").layer, "observers");
 }
 
 // Written behind the back of SQLite's keys, as a disk or a person would.

@@ -22,14 +22,14 @@ WITH RECURSIVE n(k) AS (VALUES (0) UNION ALL SELECT k + 1 FROM n
                ?2 + k * (?3 / ?1) * 1000000000 AS detected FROM n)
 INSERT INTO episode (episode_id, valve_id, source_id, detected_ns, isolated_ns,
   cleared_ns, ended_ns, end_reason, fault_bits, peak_factor, strength,
-  model_set, model_hash, flow_unit, channels, faults, label, acked_by, acked_ns,
-  fault)
+  model_set, model_hash, flow_unit, channels, faults, known, label, acked_by,
+  acked_ns, fault)
 SELECT printf('%s%012x', ?4, k), printf('V%04d', valve), 1, detected,
   iif(fault = 0, NULL, detected + 20000000000),
   iif(k < ?1 - 100, detected + 600000000000, NULL),
   iif(k < ?1 - 100, detected + 601000000000, NULL),
   iif(k < ?1 - 100, 'cleared', NULL), 1, 0.8, 0.5, 'paper@1', 1, 'm3/h', 'X|F',
-  'f1|f7', iif(k % 10 = 3, 'true', NULL), iif(k % 10 = 0, NULL, 'anna'), 1,
+  'f1|f7', 'f1|f7', iif(k % 10 = 3, 'true', NULL), iif(k % 10 = 0, NULL, 'anna'), 1,
   iif(fault = 0, iif(k < ?1 - 100, 'unknown', NULL), 'f' || fault)
 FROM t)sql";
 
@@ -57,9 +57,8 @@ SELECT episode_id, 0, detected_ns, detected_ns, 1, 1, 0, randomblob(?1), 0,
 inline void GenerateEpisodes(const std::filesystem::path& path,
                              std::int64_t episodes,
                              const std::string& first_digits = "0000",
-                             int blob_bytes = 600,
-                             const Schema& schema = HistorySchema()) {
-  Database database(path, schema, Access::kWriter);
+                             int blob_bytes = 600) {
+  Database database(path, HistorySchema(), Access::kWriter);
   Transaction transaction(database);
   database.Run(kEpisodes, episodes, kLastDetectedNs - kYear * 1'000'000'000,
                kYear, first_digits);

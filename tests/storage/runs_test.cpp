@@ -137,28 +137,6 @@ TEST_F(RunsTest, LabelsOverrideTheTruthOfTheirStretch) {
   EXPECT_FALSE(store.Load(id).samples[0].truth);
 }
 
-TEST_F(RunsTest, LabelsOfAnOlderFileStayAndSayTheNamesOfTheirFaults) {
-  Schema second = RunsSchema();
-  second.migrations.resize(2);
-  {
-    Database old(file_, second, Access::kOccasionalWriter);
-    Transaction transaction(old);
-    old.Run(
-        "INSERT INTO run (id, valve_id, source_id, start_ns, period_s, "
-        "flow_unit, origin, scenario, software, state, created_ns) VALUES "
-        "('000000000001', 'V', 1, 0, 1.0, 'm3/h', 'imported', '', '', "
-        "'complete', 0)");
-    old.Run(
-        "INSERT INTO run_label (run_id, fault, strength, created_ns) "
-        "VALUES (1, 6, 0.5, 0), (1, 21, -0.5, 0), (1, 0, 0, 0)");
-    transaction.Commit();
-  }
-  Database database(file_, RunsSchema(), Access::kOccasionalWriter);
-  Statement labels = database.Prepare("SELECT labels FROM run_summary");
-  ASSERT_TRUE(labels.Step());
-  EXPECT_EQ(labels.Text(0), "f6 0.5, p1 -0.5, normal");
-}
-
 TEST_F(RunsTest, ListSelectsByValveOriginAndTime) {
   {
     RunStore store(file_, Access::kOccasionalWriter);

@@ -73,18 +73,11 @@ std::string Doctor(const std::filesystem::path& data) {
   if (!std::filesystem::exists(data)) {
     return "";
   }
-  const auto store = [&data](const char* verb) {
-    return RunProgram({FDI_STORE_PROGRAM, "--data", data.string(), verb});
-  };
-  if (store("doctor").code == 0) {
-    return "";
-  }
-  // Killed while it made a file, which the next writer goes on with.
-  const Finished migrate = store("migrate");
-  const Finished doctor = store("doctor");
+  const Finished doctor =
+      RunProgram({FDI_STORE_PROGRAM, "--data", data.string(), "doctor"});
   return doctor.code == 0 ? ""
                           : "doctor ended with " + std::to_string(doctor.code) +
-                                ": " + migrate.errors + doctor.errors;
+                                ": " + doctor.errors;
 }
 
 }  // namespace fdi

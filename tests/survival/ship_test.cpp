@@ -293,38 +293,6 @@ TEST_F(ShipTest, ChangesAreLoggedForPlantsAlone) {
   ExpectEqual("a");
 }
 
-// What an earlier version recorded; a chunk of evidence, a look, hours, gaps
-// and shelves of all ages are among it.
-TEST_F(ShipTest, AHistoryOfVersion8IsShipped) {
-  Init();
-  const auto path = Folder("a") / "history.db";
-  Schema old = HistorySchema();
-  old.migrations.resize(8);
-  GenerateEpisodes(path, 2500, "aaaa", 600, old);
-  {
-    Database database(path, old, Access::kWriter);
-    Transaction transaction(database);
-    for (const char* sql :
-         {"INSERT INTO episode_trace SELECT episode_id, 1, first_ns, last_ns, "
-          "instants, 1, 0, samples, 0, vectors FROM episode_trace LIMIT 50",
-          "INSERT INTO episode_look SELECT episode_id, 1, 2, 3.0 FROM episode",
-          "INSERT INTO episode_look_row SELECT episode_id, 0, 1.0, 2.0 "
-          "FROM episode",
-          "INSERT INTO coverage_day SELECT DISTINCT valve_id, 1, 'LIVE', 2, "
-          "3.0 FROM episode WHERE valve_id < 'V0020'",
-          "INSERT INTO health_hour SELECT DISTINCT valve_id, 25, 1, 0, 2, "
-          "x'03' FROM episode WHERE valve_id BETWEEN 'V0010' AND 'V0030'",
-          "INSERT INTO data_gap VALUES (7, NULL, 1, 2, 'test', NULL)",
-          "INSERT INTO monitor_session VALUES (5, 1, 2, 3, 1, 'old', '')"}) {
-      database.Run(sql);
-    }
-    transaction.Commit();
-  }
-  ASSERT_EQ(Ship("a").code, 0);
-  ExpectEqual("a");
-  EXPECT_TRUE(std::filesystem::exists(path.string() + ".v8.backup"));
-}
-
 // Of two histories into one plant, of which one is written meanwhile, with
 // kill -9 of the server and of the programs at random moments; again, and
 // nothing is new.
@@ -947,9 +915,9 @@ constexpr const char* kBadRows =
     "9223372036854775807, 1, 1, 0, 'x', 0, 'x' FROM fdi.episode;"
     "INSERT INTO fdi.episode (monitor_id, episode_id, valve_id, source_id, "
     "detected_ns, isolated_ns, fault_bits, peak_factor, strength, model_set, "
-    "model_hash, flow_unit, channels, faults, host, monitor) "
+    "model_hash, flow_unit, channels, faults, known, host, monitor) "
     "SELECT 1, 'ffff00000000000' || n, 'V1', 1, d, i, 0, p, 0.5, 'm', 1, u, "
-    "'X', 'f1', 'h', 'a' FROM (VALUES "
+    "'X', 'f1', 'f1', 'h', 'a' FROM (VALUES "
     "(1, 9223372036854775807, -9223372036854775807, 0.5, 'm3/h'),"
     "(2, 1795186571000000000, NULL, 0.5, 'gpm'),"
     "(3, 1795186571000000001, NULL, 'NaN', 'm3/h')) AS v(n, d, i, p, u);"
@@ -1049,40 +1017,16 @@ TEST_F(ShipTest, ABadRowHidesNoGoodOne) {
   EXPECT_THAT(said.err, HasSubstr("plant_rows_left_out"));
 }
 
-// What earlier versions let in.
-TEST_F(ShipTest, AnUpgradeMovesBadRowsAside) {
+// A schema that was never released is left as it is.
+TEST_F(ShipTest, ASchemaOfBeforeTheBaselineIsRefused) {
   Init();
-  HistoryWriter writer(Folder("a") / "history.db");
-  RecordEpisode(writer, 0b01);
-  {  // As an earlier version has stored it.
-    Database history(Folder("a") / "history.db", HistorySchema(),
-                     Access::kWriter);
-    Transaction transaction(history);
-    history.Run("UPDATE episode SET known = NULL");
-    transaction.Commit();
+  PlantDatabase(Url()).RunScript("UPDATE fdi.plant SET version = 8");
+  for (const char* command : {"ship --init --to '", "history list --from '"}) {
+    const Outcome refused = Store(command + Url() + "'");
+    EXPECT_EQ(refused.code, 3);
+    EXPECT_THAT(refused.err, HasSubstr("version 8, this program needs"));
+    EXPECT_THAT(refused.err, HasSubstr("make another database"));
   }
-  ASSERT_EQ(Ship("a").code, 0);
-  PlantDatabase owner(Url());
-  owner.RunScript(kLiftChecks);
-  owner.RunScript(kBadRows);
-  owner.RunScript(
-      "DELETE FROM fdi.episode_strength;"
-      "ALTER TABLE fdi.shelf DROP COLUMN planned_ns;"
-      "ALTER TABLE fdi.episode DROP COLUMN known;"
-      "DROP FUNCTION fdi.is_stamp, fdi.is_finite; DROP TABLE fdi.unsound;"
-      "DROP INDEX fdi.data_gap_once, fdi.shelf_once;"
-      "ALTER TABLE fdi.data_gap ADD PRIMARY KEY (gap_id, monitor_id);"
-      "ALTER TABLE fdi.shelf ADD PRIMARY KEY (shelf_id, monitor_id);"
-      "UPDATE fdi.plant SET version = 4");
-  const Outcome upgraded = Store("ship --init --to '" + Url() + "'");
-  ASSERT_EQ(upgraded.code, 0) << upgraded.err;
-  EXPECT_THAT(upgraded.out, HasSubstr("rows that cannot be right are in"));
-  EXPECT_EQ(PlantRowsOf("SELECT count(*) FROM fdi.unsound "
-                        "WHERE table_name = 'episode'"),
-            std::vector<std::string>{"|3"});
-  EXPECT_EQ(PlantReader(Url()).List({}).size(), 1U);
-  ASSERT_EQ(Ship("a").code, 0);
-  ExpectEqual("a");
 }
 
 // Of a history.db that somebody has written into: its other rows go on.

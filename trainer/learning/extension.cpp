@@ -19,8 +19,8 @@ namespace {
 ValveType TypeOf(const ModelSet& models, std::string name) {
   if (models.physics.empty()) {
     throw DataError("model set " + NameOf(models) +
-                    " holds no physical parameters: it was made before they "
-                    "were stored, onboard the valve anew");
+                    " holds no physical parameters: it is of `fdi-trainer "
+                    "train`, onboard the valve");
   }
   const simulator::ValvePhysics physics =
       simulator::PhysicsFrom(models.physics);

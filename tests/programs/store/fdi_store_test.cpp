@@ -6,6 +6,7 @@
 #include <gmock/gmock.h>
 
 #include "diagnosis/model/fault_catalogue.h"
+#include "storage/history/history_database.h"
 #include "storage/models/models.h"
 #include "storage/runs/runs.h"
 #include "tests/programs/store/store_program_fixture.h"
@@ -338,7 +339,7 @@ TEST_F(FdiStoreTest, DataDirectoryThatIsAFileExitsWithThree) {
 
 TEST_F(FdiStoreTest, DatabaseOfANewerVersionIsRefusedWithBothVersions) {
   Schema newer = RunsSchema();
-  const auto version = newer.migrations.size();
+  const int version = newer.version();
   newer.migrations.push_back("CREATE TABLE later (x INTEGER) STRICT;");
   { Database(directory_.path() / "runs.db", newer, Access::kWriter); }
 
@@ -348,6 +349,46 @@ TEST_F(FdiStoreTest, DatabaseOfANewerVersionIsRefusedWithBothVersions) {
   EXPECT_THAT(outcome.err,
               AllOf(HasSubstr("version " + std::to_string(version + 1)),
                     HasSubstr("up to " + std::to_string(version))));
+}
+
+TEST_F(FdiStoreTest, DatabasesThatWereNeverReleasedAreRefusedInOneSentence) {
+  const std::pair<Schema, const char*> files[] = {
+      {RunsSchema(), "runs.db"},
+      {ModelsSchema(), "models.db"},
+      {HistorySchema(), "history.db"}};
+  for (auto [schema, name] : files) {
+    schema.migrations = {"CREATE TABLE t (x INTEGER) STRICT;"};
+    --schema.baseline;
+    { Database(directory_.path() / name, schema, Access::kWriter); }
+  }
+  const auto refusal = [this](const std::string& command) {
+    const Outcome outcome = Store(command);
+    EXPECT_EQ(outcome.code, 3) << command;
+    EXPECT_EQ(std::ranges::count(outcome.err, '\n'), 1) << outcome.err;
+    return outcome.err;
+  };
+  EXPECT_THAT(refusal("runs list"), HasSubstr("`fdi-store runs import`"));
+  EXPECT_THAT(refusal("models list"), HasSubstr("`fdi-trainer onboard`"));
+  EXPECT_THAT(refusal("history list"), HasSubstr("start without its episodes"));
+}
+
+TEST_F(FdiStoreTest, DoctorBringsDatabasesUpToDate) {
+  Schema baseline = HistorySchema();
+  baseline.migrations.resize(1);
+  { Database(directory_.path() / "history.db", baseline, Access::kWriter); }
+  Write("runs.db", "");  // Its first writer was killed.
+  for (const char* command : {"history list", "runs list"}) {
+    const Outcome outcome = Store(command);
+    EXPECT_EQ(outcome.code, 3);
+    EXPECT_THAT(outcome.err, HasSubstr("`fdi-store doctor`"));
+  }
+  EXPECT_EQ(Store("doctor").code, 0);
+  EXPECT_EQ(Store("history list").code, 0);
+  EXPECT_EQ(Store("runs list").code, 0);
+
+  const Outcome gone = Store("migrate");
+  EXPECT_EQ(gone.code, 2);
+  EXPECT_THAT(gone.err, HasSubstr("migrate is gone: doctor"));
 }
 
 TEST_F(FdiStoreTest, LabelsAreShownAndRemoved) {

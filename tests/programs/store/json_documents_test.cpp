@@ -390,7 +390,6 @@ TEST_F(JsonDocumentsTest, ProgramsAndPageHaveTheSameKeys) {
   Printed(page, "keys list", "keys");
   Printed(page, "doctor");
   Printed(page, "backup", "copy");
-  Printed(page, "migrate");
   Printed(page, "prune", "--history-age 1d --dry-run");
   if (FDI_PLANNER && FDI_PLANT && PrivatePostgres::IsInstalled()) {
     PrivatePostgres server;

@@ -1,4 +1,6 @@
--- Version 1. Times are ns UTC; codec, crc and bytes as in sample_codec.h.
+-- The baseline of runs.db. Times are ns UTC; codec, crc and bytes are as in
+-- sample_codec.h.
+
 CREATE TABLE recorder (        -- that is alive while it locks byte `recorder_id`
   recorder_id INTEGER PRIMARY KEY AUTOINCREMENT,  -- of the file runs.db.live
   pid INTEGER NOT NULL,
@@ -46,7 +48,8 @@ CREATE TABLE run_label (
   run_id INTEGER NOT NULL REFERENCES run (run_id) ON DELETE CASCADE,
   from_s REAL,                           -- since start_ns; NULL: no bound
   to_s REAL,
-  fault INTEGER NOT NULL CHECK (fault BETWEEN 0 AND 19),
+  fault INTEGER NOT NULL CHECK (fault >= 0),  -- As the programs number them.
+  fault_name TEXT NOT NULL,              -- normal, f1, ...
   strength REAL NOT NULL CHECK (strength BETWEEN -1 AND 1),
   created_ns INTEGER NOT NULL
 ) STRICT;
@@ -93,8 +96,8 @@ SELECT
   origin,
   state,
   samples > 0 AND truth_samples = samples AS has_truth,
-  (SELECT group_concat(CASE fault WHEN 0 THEN 'normal'
-                       ELSE 'f' || fault || ' ' || strength END ||
+  (SELECT group_concat(fault_name ||
+                       CASE fault WHEN 0 THEN '' ELSE ' ' || strength END ||
                        CASE WHEN from_s IS NULL AND to_s IS NULL THEN ''
                        ELSE ' @' || ifnull(from_s, '') || ':' ||
                             ifnull(to_s, '') END, ', ')

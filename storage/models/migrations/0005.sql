@@ -1,5 +1,5 @@
--- Version 1. The blob is what counts; observer, channel and training_run say in
--- SQL what is in it.
+-- The baseline of models.db. The blob of a model set is what counts; observer,
+-- channel and training_run say in SQL what is in it.
 CREATE TABLE model_set (
   model_set_id INTEGER PRIMARY KEY,
   name TEXT NOT NULL,
@@ -50,6 +50,30 @@ CREATE TABLE training_run (
   PRIMARY KEY (model_set_id, position)
 ) STRICT, WITHOUT ROWID;
 
+CREATE TABLE lineage (                   -- of trained sets
+  model_set_id INTEGER PRIMARY KEY
+    REFERENCES model_set (model_set_id) ON DELETE CASCADE,
+  settings TEXT NOT NULL,                -- JSON of the training; '': unknown
+  parent_set TEXT,                       -- NULL: built on none
+  parent_version INTEGER,
+  parent_hash TEXT
+) STRICT;
+
+CREATE TABLE training_episode (          -- labelled, of history.db
+  model_set_id INTEGER NOT NULL
+    REFERENCES model_set (model_set_id) ON DELETE CASCADE,
+  episode_id TEXT NOT NULL,
+  valve_id TEXT NOT NULL,
+  label TEXT NOT NULL,                   -- true, false, or a fault
+  labelled_by TEXT NOT NULL,
+  labelled_ns INTEGER NOT NULL,
+  fault TEXT NOT NULL,                   -- that it was taken for, or normal
+  strength REAL NOT NULL,
+  run TEXT NOT NULL,                     -- of runs.db, with its samples
+  samples INTEGER NOT NULL,
+  PRIMARY KEY (model_set_id, episode_id)
+) STRICT, WITHOUT ROWID;
+
 CREATE TABLE valve (                     -- the first that matches wins
   valve_entry_id INTEGER PRIMARY KEY,
   pattern TEXT NOT NULL UNIQUE,          -- id or glob
@@ -60,8 +84,55 @@ CREATE TABLE valve (                     -- the first that matches wins
   period_s REAL NOT NULL CHECK (period_s > 0),
   epoch INTEGER NOT NULL,
   model_set TEXT,
-  model_set_version INTEGER              -- NULL: the active one
+  model_set_version INTEGER,             -- NULL: the active one
+  baseline_epoch INTEGER                 -- NULL: not onboarded
 ) STRICT;
+
+CREATE TABLE valve_event (               -- opens an epoch
+  valve_event_id INTEGER PRIMARY KEY,
+  valve TEXT NOT NULL,                   -- pattern of its entry
+  epoch INTEGER NOT NULL,
+  kind TEXT NOT NULL
+    CHECK (kind IN ('replaced', 'repacked', 'recalibrated')),
+  note TEXT NOT NULL,
+  at_ns INTEGER NOT NULL,
+  who TEXT NOT NULL
+) STRICT;
+CREATE INDEX valve_event_by_valve ON valve_event (valve, epoch);
+
+CREATE TABLE baseline (                  -- one for each onboarding
+  baseline_id INTEGER PRIMARY KEY,
+  valve TEXT NOT NULL,                   -- pattern of its entry
+  epoch INTEGER NOT NULL,
+  model_set TEXT NOT NULL,
+  version INTEGER NOT NULL,
+  created_ns INTEGER NOT NULL,
+  hours REAL NOT NULL,                   -- of healthy data
+  parameters TEXT NOT NULL,              -- JSON {name: value}
+  channels TEXT NOT NULL                 -- JSON [{name, rmse, bias, vaf}]
+) STRICT;
+CREATE INDEX baseline_by_valve ON baseline (valve, epoch);
+
+CREATE TABLE valve_type (                -- effects of the faults on a type
+  name TEXT PRIMARY KEY,
+  created_ns INTEGER NOT NULL,
+  bytes BLOB NOT NULL,                   -- the trainer's
+  summary TEXT NOT NULL
+) STRICT;
+
+-- The loops of a plant, as its table lists them.
+CREATE TABLE plant_loop (
+  name TEXT PRIMARY KEY,                 -- the id of the valve
+  service TEXT NOT NULL,                 -- F, P, L, T, A; '': not said
+  type TEXT NOT NULL,                    -- '': data only
+  grade INTEGER,                         -- 1..3; NULL: not said
+  loop_group TEXT NOT NULL,              -- '': none
+  watch TEXT NOT NULL,                   -- faults, audit, nothing
+  state TEXT NOT NULL,                   -- expected, onboarded, data_only, refused
+  finding TEXT NOT NULL,                 -- one sentence
+  input_hash TEXT NOT NULL,              -- of row and record; '': not read yet
+  checked_ns INTEGER NOT NULL
+) STRICT, WITHOUT ROWID;
 
 CREATE TABLE generation (
   id INTEGER PRIMARY KEY CHECK (id = 1),
