@@ -42,10 +42,6 @@ class HistoryStore : public HistorySink {
   std::vector<EndedEpisode> LastEnds();
   /// The accumulators as of the last checkpoint.
   std::vector<Accumulator> Accumulators() { return writer_.Accumulators(); }
-  /// The same for the --shadow candidate.
-  std::vector<Accumulator> ShadowAccumulators() {
-    return writer_.ShadowAccumulators();
-  }
   /// Events that an earlier session committed but may not have sent. Unreadable
   /// ones are reported and skipped.
   std::vector<FaultEvent> UnsentEvents();

@@ -22,9 +22,7 @@ std::vector<fdi::report::VerbExamples> Examples() {
          "fdi-monitor run --model-set paper@2 --valves 'FV-1*' --interface "
          "all"},
         {"A page behind nginx, through which people acknowledge and label",
-         "fdi-monitor run --console --console-proxy proxy-secret"},
-        {"See what a new set would say, beside the old one",
-         "fdi-monitor run --shadow paper@3"}}},
+         "fdi-monitor run --console --console-proxy proxy-secret"}}},
       {"watch",
        {{"All fault events as JSON lines", "fdi-monitor watch --events --json"},
         {"How many vectors come in ten seconds",

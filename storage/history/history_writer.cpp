@@ -12,7 +12,6 @@
 #include "storage/history/episode.h"
 #include "storage/history/health.h"
 #include "storage/history/history_database.h"
-#include "storage/history/shadow.h"
 #include "storage/history/sql.h"
 #include "storage/history/strength.h"
 
@@ -494,19 +493,12 @@ std::size_t HistoryWriter::CommitCheckpoint(const Checkpoint& checkpoint) {
     StoreCoverage(database_, checkpoint.coverage);
     StoreAccumulators(database_, "accumulator", checkpoint.accumulators);
     worse = StoreHealth(database_, checkpoint.health);
-    StoreShadow(database_, checkpoint.shadow);
-    StoreAccumulators(database_, "shadow_accumulator",
-                      checkpoint.shadow_accumulators);
   });
   return worse;
 }
 
 std::vector<Accumulator> HistoryWriter::Accumulators() {
   return ReadAccumulators(database_, "accumulator");
-}
-
-std::vector<Accumulator> HistoryWriter::ShadowAccumulators() {
-  return ReadAccumulators(database_, "shadow_accumulator");
 }
 
 void HistoryWriter::MarkSent(const FaultEvent& event) {

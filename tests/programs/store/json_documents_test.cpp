@@ -274,10 +274,6 @@ class JsonDocumentsTest : public FdiStoreTest {
         "INSERT INTO common_cause_member SELECT '00000000000000aa', "
         "episode_id, "
         "valve_id, 'f7', detected_ns FROM episode");
-    database.Run(
-        "INSERT INTO shadow_difference VALUES (1, 'LV-1', 1, ?1, ?1 + 1000, 5, "
-        "'pump@1', 1, 'ISOLATED', 'f7', 'pump@2', 2, 'NORMAL', NULL)",
-        kDetected);
     transaction.Commit();
   }
 
@@ -370,7 +366,6 @@ TEST_F(JsonDocumentsTest, ProgramsAndPageHaveTheSameKeys) {
   Printed(page, "history report", "last -o page.html");
   Printed(page, "history stats");
   Printed(page, "history causes");
-  Printed(page, "history shadow");
   Printed(page, "history unshelve", "--valve LV-1");
   Printed(page, "faults");
   if (FDI_PLANNER) {
