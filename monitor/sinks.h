@@ -121,9 +121,7 @@ class HistorySink {
   /// Buffers.
   virtual void AddGap(const DataGap& gap) = 0;
   /// Durable on return; all or nothing. Not idempotent: twice counts twice.
-  /// @returns how many stroke tests in it are worse than the last of their
-  ///   valve.
-  virtual std::size_t CommitCheckpoint(const Checkpoint& checkpoint) = 0;
+  virtual void CommitCheckpoint(const Checkpoint& checkpoint) = 0;
   /// Marks the event as published. Buffers.
   virtual void MarkSent(const FaultEvent& event) = 0;
   /// Commits what is buffered, and a sign of life; called every second. After a

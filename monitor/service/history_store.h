@@ -57,7 +57,7 @@ class HistoryStore : public HistorySink {
   }
   void AddTrace(const EpisodeTrace& trace) override;
   void AddGap(const DataGap& gap) override { writer_.AddGap(gap); }
-  std::size_t CommitCheckpoint(const Checkpoint& checkpoint) override;
+  void CommitCheckpoint(const Checkpoint& checkpoint) override;
   void MarkSent(const FaultEvent& event) override { writer_.MarkSent(event); }
   void Commit() override;
   void DropBuffered() override { writer_.DropPending(); }

@@ -484,17 +484,15 @@ void HistoryWriter::Resume(std::uint64_t episode_id, std::int64_t stamp_ns,
   });
 }
 
-std::size_t HistoryWriter::CommitCheckpoint(const Checkpoint& checkpoint) {
-  std::size_t worse = 0;
+void HistoryWriter::CommitCheckpoint(const Checkpoint& checkpoint) {
   CommitBatch([&] {
     // Coverage and health are added to what is stored. All of it is in one
     // transaction, so that after an error the caller can merge this checkpoint
     // into the next one.
     StoreCoverage(database_, checkpoint.coverage);
     StoreAccumulators(database_, "accumulator", checkpoint.accumulators);
-    worse = StoreHealth(database_, checkpoint.health);
+    StoreHealth(database_, checkpoint.health);
   });
-  return worse;
 }
 
 std::vector<Accumulator> HistoryWriter::Accumulators() {

@@ -110,9 +110,8 @@ class HistoryWriter {
 
   /// Adds coverage and health to what is stored, and replaces accumulators,
   /// together with what is pending; durable on return. Not idempotent: twice
-  /// counts twice. @returns how many stroke tests in it are
-  /// worse than the last of their valve.
-  std::size_t CommitCheckpoint(const Checkpoint& checkpoint);
+  /// counts twice.
+  void CommitCheckpoint(const Checkpoint& checkpoint);
 
   /// The accumulators of the last checkpoint, by valve.
   std::vector<Accumulator> Accumulators();
