@@ -1,6 +1,5 @@
 #include "monitor/health_book.h"
 
-#include <algorithm>
 #include <cmath>
 #include <random>
 #include <utility>

@@ -89,6 +89,7 @@ TEST_F(FdiStoreTest, RemovedVerbsAndOptionsNameWhatReplacesThem) {
       {"audit --ps PS a.csv", "--ps is gone: stroke tests"},
       {"history shadow --since 1d", "shadow is gone: fdi-trainer compare"},
       {"history shadow --help", "shadow is gone: fdi-trainer compare"},
+      {"keys init keys --days 30", "keys is gone: the script fdi-keys"},
       {"prune --shadow-age 90d", "--shadow-age is gone: differences"}};
   for (const auto& [call, instead] : removed) {
     const Outcome outcome = Store(call);

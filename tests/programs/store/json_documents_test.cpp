@@ -365,10 +365,6 @@ TEST_F(JsonDocumentsTest, ProgramsAndPageHaveTheSameKeys) {
     called_.insert({"fdi-store health show", "fdi-store health trend",
                     "fdi-store worklist", "fdi-store report"});
   }
-  Printed(page, "keys init", "keys");
-  Printed(page, "keys add", "keys monitor-1 --role monitor");
-  Printed(page, "keys renew", "keys monitor-1");
-  Printed(page, "keys list", "keys");
   Printed(page, "doctor");
   Printed(page, "backup", "copy");
   Printed(page, "migrate");
