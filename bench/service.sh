@@ -23,9 +23,9 @@ trap '[ -z "$monitor" ] || kill -9 "$monitor" 2>/dev/null; rm -rf "$out"' EXIT
 
 declare -A key=([publish]='' [read]='' [run]='')
 if [ -n "${FDI_BENCH_SECURITY:-}" ]; then
-  "$bin/fdi-store" keys init "$out/keys" >/dev/null
+  "$bin/fdi-keys" init "$out/keys" >/dev/null
   for role in gateway reader monitor; do
-    "$bin/fdi-store" keys add "$out/keys" "$role" --role "$role" >/dev/null
+    "$bin/fdi-keys" add "$out/keys" "$role" --role "$role" >/dev/null
   done
   key=([publish]="--security=$out/keys/gateway"
     [read]="--security=$out/keys/reader" [run]="--security=$out/keys/monitor")

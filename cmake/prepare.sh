@@ -15,7 +15,7 @@ packages=(
   g++ cmake ninja-build pkg-config git ca-certificates
   libfastrtps-dev libfastcdr-dev fastddsgen
   libeigen3-dev libsundials-dev
-  libsqlite3-dev libsqlitecpp-dev sqlite3 zlib1g-dev libssl-dev libpq-dev
+  libsqlite3-dev libsqlitecpp-dev sqlite3 zlib1g-dev libssl-dev openssl libpq-dev
   libcpp-httplib-dev libsystemd-dev
   libcli11-dev libtomlplusplus-dev libspdlog-dev nlohmann-json3-dev libhowardhinnant-date-dev
   gnuplot-nox

@@ -20,7 +20,7 @@
 #include "idl/interface_watch.h"
 #include "idl/library_log.h"
 #include "idl/participant_impl.h"
-#include "idl/security/keys.h"
+#include "idl/security/key_folder.h"
 #if FDI_FAST_DDS == 2
 #include <fastdds/rtps/transport/ChainingTransport.h>
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
@@ -470,7 +470,7 @@ bool Participant::Impl::PermitsPv(const char* topic) {
     CountRefusedPermission();
     Log(LogLevel::kWarning,
         "security_key_without_pv name=" + key_->name + " topic=" + topic +
-            " effect=\"no PV is sent or read\" try=\"fdi-store keys renew\"");
+            " effect=\"no PV is sent or read\" try=\"fdi-keys renew\"");
   }
   return permitted;
 }

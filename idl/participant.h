@@ -26,7 +26,7 @@ struct DdsOptions {
   std::string interfaces{"127.0.0.1"};
   std::string transport{"udp"};  ///< udp | shm | default (both).
   std::string qos_file;          ///< XML with profiles, see qos.h; or empty.
-  /// Folder of a key made by fdi-store keys; empty: the bus is not secured.
+  /// Folder of a key made by fdi-keys; empty: the bus is not secured.
   std::string security;
   int max_valves{2000};  ///< 1..100000; further valves are refused.
 };

@@ -22,7 +22,7 @@
 #include "idl/participant.h"
 #include "idl/profile_file.h"
 #include "idl/qos.h"
-#include "idl/security/keys.h"
+#include "idl/security/key_folder.h"
 
 /// Inside idl/ only: shared by the endpoints of a participant.
 namespace fdi::idl {

@@ -35,15 +35,6 @@ void Merge(std::vector<T>& older, std::vector<T> newer, KeyOf key_of,
   }
 }
 
-// Of two records with the same key the newer one is kept.
-template <typename T, typename KeyOf>
-void Replace(std::vector<T>& older, std::vector<T> newer, KeyOf key_of) {
-  Merge(older, std::move(newer), key_of, [](T& old, T& fresh) {
-    old = std::move(fresh);
-    return true;
-  });
-}
-
 }  // namespace
 
 Checkpoint Merged(Checkpoint older, Checkpoint newer) {
@@ -69,13 +60,14 @@ Checkpoint Merged(Checkpoint older, Checkpoint newer) {
         old.Add(fresh);
         return true;
       });
-  const auto valve_of = [](const Accumulator& a) { return a.valve_id; };
-  Replace(older.accumulators, std::move(newer.accumulators), valve_of);
-  Replace(older.shadow_accumulators, std::move(newer.shadow_accumulators),
-          valve_of);
-  Replace(older.shadow, std::move(newer.shadow), [](const ShadowDifference& d) {
-    return std::tuple(d.valve_id, d.source_id, d.from_ns, d.candidate_hash);
-  });
+  // Of two accumulators of a valve the newer one is kept.
+  Merge(
+      older.accumulators, std::move(newer.accumulators),
+      [](const Accumulator& a) { return a.valve_id; },
+      [](Accumulator& old, Accumulator& fresh) {
+        old = std::move(fresh);
+        return true;
+      });
   return older;
 }
 

@@ -80,11 +80,6 @@ constexpr std::array<CounterInfo, kCounterCount> kInfos{{
      "Changes of direction of all valves, as of the last checkpoint"},
     {"", "fdi_slip_jumps_total",
      "Jumps of rods that stuck and let go, as of the last checkpoint"},
-    {"", "fdi_stroke_tests_total",
-     "Stroke and partial-stroke tests that were over, as of the last "
-     "checkpoint"},
-    {"", "fdi_stroke_tests_worse_total",
-     "Of these, tests that were worse than the last one of their valve"},
 }};
 static_assert(!kInfos.back().help.empty(), "a counter has no description");
 

@@ -49,8 +49,6 @@ enum class Counter : std::uint8_t {
   kStrokes,
   kReversals,
   kSlipJumps,
-  kStrokeTests,
-  kStrokeTestsWorse,
   kCount_
 };
 inline constexpr std::size_t kCounterCount =

@@ -107,13 +107,6 @@ void HealthBook::Add(const Sample& sample, const Verdict& verdict,
   hour.seen_ms += period_ms;
   AddCounts(sample, period_s, hour);
   AddStroke(sample, period_ms, hour);
-  if (verdict.intake == Intake::kAccepted) {
-    std::vector<StrokeTest> tests;
-    strokes_.Push(sample, period_s, tests);
-    for (StrokeTest& test : tests) {
-      hour.AddStroke(std::move(test));
-    }
-  }
   // Where no further row may be begun, At() returns another one. Time counts
   // there, too, but residuals and decisions belong to their own model set.
   if (models != nullptr && verdict.quality == Quality::kLive &&
@@ -212,8 +205,6 @@ void HealthBooks::Drain(const std::string& valve_id, HealthBook& book,
                   static_cast<std::uint64_t>(hours[i].reversals));
     counters_.Add(Counter::kSlipJumps,
                   static_cast<std::uint64_t>(hours[i].counts.slips));
-    counters_.Add(Counter::kStrokeTests,
-                  static_cast<std::uint64_t>(hours[i].strokes.size()));
   }
   counters_.Add(Counter::kStrokes,
                 static_cast<std::uint64_t>(travel_ / kStroke));

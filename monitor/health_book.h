@@ -6,7 +6,6 @@
 #include <unordered_map>
 #include <vector>
 
-#include "diagnosis/loop/stroke_watch.h"
 #include "diagnosis/loop/valve_counters.h"
 #include "diagnosis/model/model_set.h"
 #include "diagnosis/model/verdict.h"
@@ -63,7 +62,6 @@ class HealthBook {
   std::vector<HealthHour> hours_;
   StrokeCount stroke_;
   loop::ValveCounters counters_;
-  StrokeWatch strokes_;
   std::int64_t stamp_ns_{0};
   std::uint64_t source_id_{0};
   bool by_command_{false};  // The position is CV for want of X.

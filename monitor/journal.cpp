@@ -468,15 +468,13 @@ void Journal::SetAside(const Record& record, const std::string& reason) {
 // would count its time twice: the sink guarantees all or nothing.
 bool Journal::WriteCheckpoint() {
   Checkpoint checkpoint;
-  std::size_t worse = 0;
   {
     const MutexLock lock(mutex_);
     checkpoint = std::exchange(checkpoint_, {});
   }
   if (checkpoint.empty() ||
-      AttemptOrDrop([&] { worse = history_.CommitCheckpoint(checkpoint); },
+      AttemptOrDrop([&] { history_.CommitCheckpoint(checkpoint); },
                     checkpoint_failures_, [&] { checkpoint = {}; })) {
-    counters_.Add(Counter::kStrokeTestsWorse, worse);
     return true;
   }
   const MutexLock lock(mutex_);

@@ -121,9 +121,7 @@ class HistorySink {
   /// Buffers.
   virtual void AddGap(const DataGap& gap) = 0;
   /// Durable on return; all or nothing. Not idempotent: twice counts twice.
-  /// @returns how many stroke tests in it are worse than the last of their
-  ///   valve.
-  virtual std::size_t CommitCheckpoint(const Checkpoint& checkpoint) = 0;
+  virtual void CommitCheckpoint(const Checkpoint& checkpoint) = 0;
   /// Marks the event as published. Buffers.
   virtual void MarkSent(const FaultEvent& event) = 0;
   /// Commits what is buffered, and a sign of life; called every second. After a
@@ -154,15 +152,10 @@ struct ValveOutcome {
   const Verdict& verdict;  ///< Valid until the next call.
   const ModelSet* models;  ///< Null while the valve is UNASSIGNED.
   bool model_swapped;      ///< This is the first sample with another model set.
-  bool isolation_held;     ///< See ModelResolver::IsolationHeld().
   /// Signals that the model set needs and the sample lacks. Their channels
   /// abstain; if no channel is left, the quality is BAD_INPUT.
   SignalMask missing{0};
-  double period_s{0.0};            ///< The time that the sample stands for.
-  const Verdict* engine{nullptr};  ///< Null: no second look changed `verdict`.
-
-  /// What the engine said, before any second look.
-  const Verdict& observed() const { return engine ? *engine : verdict; }
+  double period_s{0.0};  ///< The time that the sample stands for.
 };
 
 /// Why a valve sends nothing.
@@ -173,11 +166,10 @@ enum class Silence : std::uint8_t {
   kMonitor,  ///< Its monitor is silent; only on the plant page.
 };
 
-/// Follows the valves beside diagnosis and journal: the page, the recorder, the
-/// candidate of --shadow, health. Each hook is optional, is called by the
-/// diagnosis thread after the decision vector has been published, and must not
-/// block. One that throws is counted and logged (`part_failed`), and called
-/// again the next time.
+/// Follows the valves beside diagnosis and journal: the page, the recorder,
+/// health. Each hook is optional, is called by the diagnosis thread after the
+/// decision vector has been published, and must not block. One that throws is
+/// counted and logged (`part_failed`), and called again the next time.
 class ValveListener {
  public:
   virtual ~ValveListener() = default;

@@ -30,7 +30,6 @@ enum class LogId : std::uint8_t {
   kModelFailure = 112,   ///< model_set_unusable
   kGap = 113,            ///< data_gap
   kStale = 114,          ///< valve_stale
-  kShadow = 115,         ///< shadow_not_compared
   kMissingSignal = 116,  ///< sample_rejected reason=missing_signal
   kOverShare = 117,      ///< sample_rejected reason=over_share
   kPartlyJudged = 119,   ///< valve_partly_judged

@@ -159,8 +159,7 @@ ValveOutcome ValveMonitor::Step(const Sample& sample, std::uint64_t writer,
   tracker_.Take(names_->TakeStrengths(), outlet);
   ConfirmNormal(verdict, outlet);
   const auto missing = static_cast<SignalMask>(required_ & ~sample.present);
-  return {verdict, models_.get(), swapped, isolation_held_,
-          missing, period_s(),    &engine};
+  return {verdict, models_.get(), swapped, missing, period_s()};
 }
 
 ValveOutcome ValveMonitor::StepLoop(const Sample& sample, std::uint64_t writer,
@@ -173,7 +172,7 @@ ValveOutcome ValveMonitor::StepLoop(const Sample& sample, std::uint64_t writer,
   swapped = swapped || models_ != watch.models();
   models_ = watch.models();
   if (!CountsAsTime(verdict)) {
-    return {verdict, models_.get(), swapped, isolation_held_, 0, period_s()};
+    return {verdict, models_.get(), swapped, 0, period_s()};
   }
   RecordPosition(sample);
   coverage_.Add(sample.stamp_ns, verdict.quality);
@@ -181,7 +180,7 @@ ValveOutcome ValveMonitor::StepLoop(const Sample& sample, std::uint64_t writer,
     tracker_.Advance(sample, verdict, *models_, outlet);
   }
   TellOfLoop(sample, outlet);
-  return {verdict, models_.get(), swapped, isolation_held_, 0, period_s()};
+  return {verdict, models_.get(), swapped, 0, period_s()};
 }
 
 // The loop of a valve with a model set is followed while the observers find

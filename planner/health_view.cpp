@@ -6,7 +6,6 @@
 #include "base/time_text.h"
 #include "base/time_units.h"
 #include "diagnosis/model/fault_catalogue.h"
-#include "report/stroke_rows.h"
 #include "storage/history/episode.h"
 #include "storage/history/history_database.h"
 
@@ -78,7 +77,7 @@ void AddFigures(const HealthHour& hour, const report::FaultTexts& texts,
   for (std::size_t i = 0; i < loop::kFigureCount; ++i) {
     const auto figure = static_cast<loop::Figure>(i);
     const std::string name(loop::FigureName(figure));
-    const auto value = FigureOf(figure, hour);
+    const auto value = loop::FigureOf(figure, hour.counts, hour.seen_ms);
     json[name] = value ? SixDigits(*value) : Json();
     if (const auto& text = texts.Of(figure); value && text.Exceeded(*value)) {
       exceeded.push_back(name);
@@ -212,20 +211,6 @@ Json HealthHoursJson(std::span<const HealthHour> hours,
   Json list = Json::array();
   for (const HealthHour& hour : hours) {
     list.push_back(HourJson(hour, texts));
-  }
-  return list;
-}
-
-Json StrokesJson(std::span<const HealthHour> hours) {
-  Json list = Json::array();
-  for (const HealthHour& hour : hours) {
-    for (const StrokeTest& test : hour.strokes) {
-      Json json{{"start_utc", FormatTime(test.start_ns, true)},
-                {"last_start_utc",
-                 test.last ? Json(FormatTime(test.last_ns, true)) : Json()}};
-      json.update(report::StrokeJson(test.stroke, test.Worse()));
-      list.push_back(std::move(json));
-    }
   }
   return list;
 }

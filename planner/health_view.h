@@ -45,10 +45,6 @@ report::Json TrendsJson(std::span<const LimitTrend> trends);
 report::Json HealthHoursJson(std::span<const HealthHour> hours,
                              const report::FaultTexts& texts);
 
-/// The stroke tests in `hours`: [{"start_utc", "last_start_utc", ...
-/// (report::StrokeJson)}].
-report::Json StrokesJson(std::span<const HealthHour> hours);
-
 /// Merges the hours of each day, separately for each model set and epoch.
 std::vector<HealthHour> DaysOf(std::span<const HealthHour> hours);
 

@@ -26,7 +26,6 @@ using storage::Episode;
 constexpr double kOtherReasons = 0.25;
 constexpr double kRepetition = 0.1;
 constexpr double kMaxRepetition = 2.0;
-constexpr std::size_t kDateLength = 10;  // Of "2026-11-20 14:00:00Z".
 
 template <typename Reason>
 void SortByWeight(std::vector<Reason>& reasons, const WorkOptions& options) {
@@ -100,11 +99,6 @@ std::string TrendText(const LimitTrend& trend) {
 // 1.00"
 std::string FigureText(const FigureReason& reason) {
   const report::FigureText& text = reason.text;
-  if (!reason.worse.empty()) {
-    return text.name + " (" +
-           FormatTime(reason.last_ns, true).substr(0, kDateLength) +
-           "): " + JoinText(reason.worse, ", ");
-  }
   const bool low = text.lowest && reason.value < *text.lowest;
   return text.name + ": " + report::FormatNumber(reason.value, 2) +
          (text.unit.empty() ? "" : " " + text.unit) +
@@ -251,7 +245,6 @@ std::int64_t EventsOf(loop::Figure figure, const loop::ValveCounts& counts) {
     case loop::Figure::kT86:
     case loop::Figure::kOvershoot:
     case loop::Figure::kTravelGain:
-    case loop::Figure::kStrokeTest:
       break;
   }
   return counts.steps;
@@ -279,37 +272,10 @@ std::vector<FigureReason> FiguresOf(const std::vector<HealthHour>& hours,
     if (value && EventsOf(figure, counts) >= kFewest &&
         texts.Of(figure).Exceeded(*value)) {
       reasons.push_back(
-          {texts.Of(figure), *value, hours.back().hour * kNsPerHour, {}});
+          {texts.Of(figure), *value, hours.back().hour * kNsPerHour});
     }
   }
   return reasons;
-}
-
-// Of the newest test of each kind with this equipment, what is worse than in
-// the one before.
-void AddStrokes(const std::vector<HealthHour>& hours,
-                const report::FaultTexts& texts,
-                std::vector<FigureReason>& reasons) {
-  const report::FigureText& text = texts.Of(loop::Figure::kStrokeTest);
-  std::vector<const StrokeTest*> newest;
-  for (auto hour = hours.rbegin();
-       hour != hours.rend() && hour->epoch == hours.back().epoch; ++hour) {
-    for (auto test = hour->strokes.rbegin(); test != hour->strokes.rend();
-         ++test) {
-      const auto alike = [&test](const StrokeTest* other) {
-        return loop::AreAlike(other->stroke, test->stroke);
-      };
-      if (std::ranges::any_of(newest, alike)) {
-        continue;
-      }
-      newest.push_back(&*test);
-      std::vector<std::string> worse = test->Worse();
-      const auto value = static_cast<double>(worse.size());
-      if (value > 0.0 && text.Exceeded(value)) {
-        reasons.push_back({text, value, test->start_ns, std::move(worse)});
-      }
-    }
-  }
 }
 
 void AddHealth(const std::vector<HealthHour>& hours,
@@ -336,7 +302,6 @@ void AddHealth(const std::vector<HealthHour>& hours,
   work.trends = TrendsOf(hours, query.limits);
   work.drifts = DriftsOf(hours);
   work.figures = FiguresOf(hours, texts);
-  AddStrokes(hours, texts, work.figures);
 }
 
 void RequireDiscipline(const std::string& discipline) {

@@ -37,13 +37,11 @@ struct FaultReason {
   std::int64_t last_ns{0};
 };
 
-/// A figure that was beyond its limit over the last day of the valve, or in its
-/// last stroke test.
+/// A figure that was beyond its limit over the last day of the valve.
 struct FigureReason {
   report::FigureText text;
   double value{0.0};        ///< In its own unit, over that day.
-  std::int64_t last_ns{0};  ///< The newest hour, or the start of the test.
-  std::vector<std::string> worse{};  ///< Of a stroke test: than in the last.
+  std::int64_t last_ns{0};  ///< The newest hour.
 };
 
 /// Everything known of one valve.

@@ -285,8 +285,8 @@ void AddBusOptions(CLI::App& app, GlobalOptions& options) {
                  "from; a monitor may take several, 'hall-1,pumps-*'")
       ->type_name("NAME[,NAME]");
   app.add_option("--security", options.security,
-                 "Folder of the key that fdi-store keys has made for this "
-                 "program or host; without one the bus is open to all")
+                 "Folder of the key that fdi-keys has made for this program or "
+                 "host; without one the bus is open to all")
       ->check(CLI::ExistingDirectory)
       ->type_name("DIR");
   app.add_option("--qos", options.qos_file,

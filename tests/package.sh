@@ -25,8 +25,10 @@ dpkg-deb --control "$package" "$folder/control"
 for field in Package Version Maintainer Depends Recommends Description; do
   [ -n "$(dpkg-deb --field "$package" $field)" ] || fail "no $field"
 done
-dpkg-deb --field "$package" Depends | grep >/dev/null -E 'libfast(rtps|dds)' ||
-  fail "no dependencies on libraries"
+for needed in libfast openssl; do
+  dpkg-deb --field "$package" Depends | grep >/dev/null "$needed" ||
+    fail "no dependency on $needed"
+done
 for script in postinst prerm postrm; do
   sh -n "$folder/control/$script"
 done
@@ -41,6 +43,7 @@ for file in etc/default/fdi-monitor usr/lib/systemd/system/fdi-monitor.service \
   usr/lib/sysusers.d/fdi.conf usr/share/fdi/campaigns/paper.toml \
   usr/share/fdi/faults.toml usr/share/fdi/idl/fdi_v{1,2}.idl \
   usr/share/doc/fdi/{copyright,changelog.gz,changelog.Debian.gz,README.md} \
+  usr/bin/fdi-keys usr/share/man/man1/fdi-keys.1.gz \
   usr/share/doc/fdi/docs/tutorial.md usr/share/fdi/console/index.html \
   usr/share/fdi/nginx/fdi.conf; do
   [ -s "$root/$file" ] || fail "$file is missing"

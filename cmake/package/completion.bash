@@ -63,7 +63,7 @@ _fdi_candidates() {
       _fdi_listed valve_id history list
       _fdi_listed valve_id runs list
       ;;
-    *NAME\[@VERSION\]* | model-set\ * | parent\ * | candidate\ * | shadow\ *)
+    *NAME\[@VERSION\]* | model-set\ * | parent\ *)
       _fdi_listed model_set models list
       ;;
     *ID\[@* | run\ * | runs\ *) _fdi_listed run_id runs list ;;

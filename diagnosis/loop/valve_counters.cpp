@@ -53,8 +53,8 @@ void ValveCounts::Add(const ValveCounts& other) {
 
 std::string_view FigureName(Figure figure) {
   constexpr std::array<std::string_view, kFigureCount> kNames{
-      "at_limit", "slip_jump", "dead_band", "error_band",  "delay",
-      "t63",      "t86",       "overshoot", "travel_gain", "stroke_test"};
+      "at_limit", "slip_jump", "dead_band", "error_band", "delay",
+      "t63",      "t86",       "overshoot", "travel_gain"};
   return kNames[static_cast<std::size_t>(figure)];
 }
 
@@ -85,8 +85,6 @@ std::optional<double> FigureOf(Figure figure, const ValveCounts& counts,
       return MeanSize(counts.overshoot, counts.steps, kQuantum);
     case Figure::kTravelGain:
       return MeanSize(counts.gain, counts.steps, kQuantum);
-    case Figure::kStrokeTest:
-      break;
   }
   return std::nullopt;
 }

@@ -68,17 +68,16 @@ enum class Figure : std::uint8_t {
   kT86,         ///< [s]
   kOvershoot,   ///< [% of the realised step]
   kTravelGain,  ///< ΔX/ΔCV [-].
-  kStrokeTest,  ///< Figures of a stroke test that are worse than in the last.
 };
-inline constexpr std::size_t kFigureCount = 10;
+inline constexpr std::size_t kFigureCount = 9;
 
 /// "at_limit", "slip_jump", "dead_band", "error_band", "delay", "t63", "t86",
-/// "overshoot", "travel_gain" or "stroke_test".
+/// "overshoot" or "travel_gain".
 std::string_view FigureName(Figure figure);
 
 /// The figure as `counts` of `seen_ms` have it; nothing if too little was
 /// counted: no time, jump, turn or step, or less than 60 samples of ramps
-/// either way. Of stroke tests nothing is counted here.
+/// either way.
 std::optional<double> FigureOf(Figure figure, const ValveCounts& counts,
                                std::int64_t seen_ms);
 

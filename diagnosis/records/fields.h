@@ -6,17 +6,8 @@
 
 namespace fdi {
 
-/// Accesses the member `Inner` of the member `Outer` of a record.
-template <auto Outer, auto Inner>
-struct Nested {
-  template <typename Record>
-  auto& operator()(Record& record) const {
-    return record.*Outer.*Inner;
-  }
-};
-
 /// A field of a record with its name in SQL, JSON and on the wire. `member` is
-/// a pointer to member, or Nested.
+/// a pointer to member.
 template <typename Member>
 struct Field {
   std::string_view name;

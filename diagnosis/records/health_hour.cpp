@@ -56,9 +56,6 @@ void HealthHour::Add(const HealthHour& part) {
   for (const StrengthSums& sums : part.strengths) {
     AddStrength(sums.fault, sums.samples, sums.strength);
   }
-  for (const StrokeTest& test : part.strokes) {
-    AddStroke(test);
-  }
 }
 
 void HealthHour::AddStrength(int fault, std::int64_t samples,
@@ -70,26 +67,6 @@ void HealthHour::AddStrength(int fault, std::int64_t samples,
   }
   place->samples += samples;
   place->strength += strength;
-}
-
-void HealthHour::AddStroke(StrokeTest test) {
-  if (strokes.size() < kMaxStrokes) {
-    const auto place = std::ranges::upper_bound(strokes, test.start_ns, {},
-                                                &StrokeTest::start_ns);
-    strokes.insert(place, std::move(test));
-  }
-}
-
-std::optional<double> FigureOf(loop::Figure figure, const HealthHour& hour) {
-  if (figure != loop::Figure::kStrokeTest) {
-    return loop::FigureOf(figure, hour.counts, hour.seen_ms);
-  }
-  std::optional<double> most;
-  for (const StrokeTest& test : hour.strokes) {
-    most =
-        std::max(most.value_or(0.0), static_cast<double>(test.Worse().size()));
-  }
-  return most;
 }
 
 }  // namespace fdi

@@ -3,11 +3,9 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <optional>
 #include <string>
 #include <vector>
 
-#include "diagnosis/loop/stroke_watch.h"
 #include "diagnosis/loop/valve_counters.h"
 #include "diagnosis/model/sample.h"
 
@@ -55,8 +53,7 @@ struct StrengthSums {
 struct HealthHour {
   static constexpr double kShare = 1e-3;   ///< Quantum of d_0 and strength [-].
   static constexpr double kTravel = 1e-3;  ///< Of the travel [% of stroke].
-  static constexpr double kFullStroke = 100.0;    ///< Of the travel [%].
-  static constexpr std::size_t kMaxStrokes = 48;  ///< More are not kept.
+  static constexpr double kFullStroke = 100.0;  ///< Of the travel [%].
 
   std::string valve_id;
   std::int64_t hour{0};         ///< UTC, since 1970-01-01.
@@ -80,8 +77,6 @@ struct HealthHour {
   /// By bin of CV, then by channel; an empty bin has no samples.
   std::array<std::vector<ResidualSums>, kCommandBins> bins;
   std::vector<StrengthSums> strengths;  ///< By fault, ascending.
-  /// Stroke tests that were over in this hour, by start.
-  std::vector<StrokeTest> strokes;
 
   /// Within this of an end of its travel a valve is at the stop [%].
   static constexpr double kStopPercent = 1.0;
@@ -92,13 +87,8 @@ struct HealthHour {
   /// @throws std::invalid_argument if the channels differ.
   void Add(const HealthHour& part);
   void AddStrength(int fault, std::int64_t samples, std::int64_t strength);
-  void AddStroke(StrokeTest test);
 
   bool operator==(const HealthHour&) const = default;
 };
-
-/// The figure in that hour; of stroke tests, how many of the figures of one
-/// were worse than in the last, at most. Nothing if too little was counted.
-std::optional<double> FigureOf(loop::Figure figure, const HealthHour& hour);
 
 }  // namespace fdi

@@ -84,10 +84,8 @@ void HistoryStore::CommitBatch(const std::function<void()>& batch) {
   OnCurrentFile([&] { writer_.CommitBatch(batch); });
 }
 
-std::size_t HistoryStore::CommitCheckpoint(const Checkpoint& checkpoint) {
-  std::size_t worse = 0;
-  OnCurrentFile([&] { worse = writer_.CommitCheckpoint(checkpoint); });
-  return worse;
+void HistoryStore::CommitCheckpoint(const Checkpoint& checkpoint) {
+  OnCurrentFile([&] { writer_.CommitCheckpoint(checkpoint); });
 }
 
 void HistoryStore::Commit() {

@@ -42,10 +42,6 @@ class HistoryStore : public HistorySink {
   std::vector<EndedEpisode> LastEnds();
   /// The accumulators as of the last checkpoint.
   std::vector<Accumulator> Accumulators() { return writer_.Accumulators(); }
-  /// The same for the --shadow candidate.
-  std::vector<Accumulator> ShadowAccumulators() {
-    return writer_.ShadowAccumulators();
-  }
   /// Events that an earlier session committed but may not have sent. Unreadable
   /// ones are reported and skipped.
   std::vector<FaultEvent> UnsentEvents();
@@ -61,7 +57,7 @@ class HistoryStore : public HistorySink {
   }
   void AddTrace(const EpisodeTrace& trace) override;
   void AddGap(const DataGap& gap) override { writer_.AddGap(gap); }
-  std::size_t CommitCheckpoint(const Checkpoint& checkpoint) override;
+  void CommitCheckpoint(const Checkpoint& checkpoint) override;
   void MarkSent(const FaultEvent& event) override { writer_.MarkSent(event); }
   void Commit() override;
   void DropBuffered() override { writer_.DropPending(); }

@@ -32,7 +32,6 @@
 #include "monitor/clock_watch.h"
 #include "monitor/guard.h"
 #include "monitor/health_book.h"
-#include "monitor/service/shadow.h"
 #include "report/fault_texts.h"
 #include "report/logging.h"
 #include "storage/history/history_reader.h"
@@ -188,13 +187,6 @@ Service::Service(const ServiceOptions& options, const report::Context& context)
               {MonitorName(), options.pair ? options.pair->name : "",
                options.pipeline.valve_glob, context.options.partition},
               log_),
-      shadow_(options.shadow ? std::make_unique<ShadowBank>(
-                                   ShadowOptions{LoadCandidate(data_.models(),
-                                                               *options.shadow),
-                                                 options.shadow_valves,
-                                                 {}},
-                                   log_)
-                             : nullptr),
       recorder_(runs_ ? std::make_unique<Recorder>(
                             *runs_, MonitorContext{counters_, log_, NowNs},
                             RecorderOptions{.lossless = options.recording ==
@@ -223,9 +215,6 @@ Service::~Service() = default;
 void Service::AttachListeners() {
   pipeline_.Attach(std::make_unique<HealthBooks>(counters_));
   pipeline_.Attach(std::make_unique<ClockWatch>(NowNs, context_.log));
-  if (shadow_) {
-    pipeline_.Attach(*shadow_);
-  }
   if (console_) {
     pipeline_.Attach(console_->live());
   }
@@ -342,9 +331,6 @@ void Service::Start() {
   ResendEvents();
   if (console_) {
     ServeConsole();
-  }
-  if (shadow_) {
-    shadow_->Restore(history_.ShadowAccumulators());
   }
   if (recorder_) {
     recorder_->Start();
@@ -650,11 +636,7 @@ std::string Service::Metrics() const {
   } catch (const std::exception&) {
     // Without the history nobody can tell; fdi_persistence_degraded says so.
   }
-  std::string page = MetricsPage(Facts(), facts);
-  if (shadow_) {
-    page += ShadowMetrics(shadow_->counts());
-  }
-  return page;
+  return MetricsPage(Facts(), facts);
 }
 
 void Service::ReportLoss() {

@@ -27,7 +27,6 @@
 #include "monitor/service/model_assignment.h"
 #include "monitor/service/run_store.h"
 #include "monitor/service/status.h"
-#include "monitor/shadow.h"
 #include "report/program.h"
 #include "report/stop_signals.h"
 #include "storage/database/data_directory.h"
@@ -48,8 +47,6 @@ struct ServiceOptions {
   double status_period_s{60.0};     ///< Of the status line in the log.
   std::optional<PairOptions> pair;  ///< This monitor has a standby.
   /// Runs beside the active sets; without a version the newest one.
-  std::optional<storage::ModelReference> shadow;
-  std::string shadow_valves{"*"};
   /// Serve metrics and probes over HTTP.
   std::optional<HttpAddress> http;
   MakeFollower follower;  ///< Of the history; see there.
@@ -144,7 +141,6 @@ class Service {
   std::unique_ptr<Pair> pair_;               // Null: not in a pair.
   std::unique_ptr<OperatorSync> operators_;  // Set together with pair_.
   ShareWatch shares_;
-  std::unique_ptr<ShadowBank> shadow_;         // Null: no candidate.
   std::unique_ptr<Recorder> recorder_;         // Set together with runs_.
   std::unique_ptr<HistoryFollower> follower_;  // Null: nothing follows.
   Pipeline pipeline_;

@@ -138,7 +138,6 @@ Json Health(const Api& api, const httplib::Request& request) {
       history->Health({valve_id, since_ns, now_ns + kNsPerHour});
   Json json{{"valve", valve_id}, {"step", hourly ? "hour" : "day"}};
   json.update(ColumnsJson(hourly ? hours : DaysOf(hours), api.texts));
-  json["strokes"] = StrokesJson(hours);
   json["trends"] = TrendsJson(TrendsOf(hours, limits));
   json["note"] = console::TextOrNull(storage::TakeNote(*history));
   return json;

@@ -14,7 +14,7 @@ std::vector<fdi::report::VerbExamples> Examples() {
       {"",
        {{"Diagnose what is on the bus, with a page to look at",
          "fdi-monitor run --model-set paper --console"},
-        {"Watch it in another terminal", "fdi-monitor top"}}},
+        {"Watch it in another terminal", "fdi-monitor watch --table"}}},
       {"run",
        {{"Every valve with the set that is assigned to it; store the samples",
          "fdi-monitor run --record"},
@@ -22,17 +22,13 @@ std::vector<fdi::report::VerbExamples> Examples() {
          "fdi-monitor run --model-set paper@2 --valves 'FV-1*' --interface "
          "all"},
         {"A page behind nginx, through which people acknowledge and label",
-         "fdi-monitor run --console --console-proxy proxy-secret"},
-        {"See what a new set would say, beside the old one",
-         "fdi-monitor run --shadow paper@3"}}},
+         "fdi-monitor run --console --console-proxy proxy-secret"}}},
       {"watch",
        {{"All fault events as JSON lines", "fdi-monitor watch --events --json"},
         {"How many vectors come in ten seconds",
-         "fdi-monitor watch --count --for 10"}}},
-      {"top",
-       {{"The worst valves first; q quits, s sorts, / filters",
-         "fdi-monitor top"},
-        {"Once, for a script", "fdi-monitor top --once --valves 'FV-1*'"}}},
+         "fdi-monitor watch --count --for 10"},
+        {"A table of the valves, the worst first; for a script",
+         "fdi-monitor watch --table --for 3 --valves 'FV-1*'"}}},
       {"console",
        {{"One page of all monitors, with the plant's history",
          "fdi-monitor console --from postgresql://screen@db.example/plant"},
@@ -53,7 +49,7 @@ int main(int argc, char** argv) {
   program.MapError<fdi::idl::TransportError>(fdi::report::kExitTransport);
   fdi::monitor::AddRunVerb(program);
   fdi::monitor::AddWatchVerb(program);
-  fdi::monitor::AddTopVerb(program);
+  program.AddRemoved("", "top", "fdi-monitor watch --table shows the valves");
   fdi::monitor::AddConsoleVerb(program);
   program.AddRemoved("", "console-user",
                      "users are in a file of nginx, which htpasswd makes, and "

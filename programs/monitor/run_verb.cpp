@@ -22,7 +22,6 @@ constexpr int kDescriptors = 96;
 
 struct RunArguments {
   std::string model_set;
-  std::string shadow;
   std::string record{"off"};
   std::string http{"off"};
   std::string console{"off"};
@@ -129,11 +128,6 @@ int Run(const RunArguments& arguments, const report::Context& context) {
   if (!arguments.model_set.empty()) {
     options.model_set = storage::ParseModelReference(arguments.model_set);
   }
-  if (!arguments.shadow.empty()) {
-    options.shadow = storage::ParseModelReference(arguments.shadow);
-  } else if (options.shadow_valves != "*") {
-    throw ConfigError("--shadow-valves needs --shadow NAME[@VERSION]");
-  }
   if (arguments.record != "off") {
     options.recording =
         arguments.record == "lossless" ? Recording::kLossless : Recording::kOn;
@@ -184,13 +178,6 @@ void AddRunVerb(report::Program& program) {
   run.add_option("--model-set", arguments.model_set,
                  "NAME[@VERSION] for valves without a set of their own "
                  "(default: the only active set, if no valve has its own)");
-  run.add_option("--shadow", arguments.shadow,
-                 "Run a candidate beside the active sets and record where they "
-                 "differ; without VERSION the newest one")
-      ->type_name("NAME[@VERSION]");
-  run.add_option("--shadow-valves", arguments.service.shadow_valves,
-                 "Compare only on ids that match GLOB")
-      ->capture_default_str();
   run.add_option("--record", arguments.record,
                  "Store the samples as runs; =lossless waits for the disk "
                  "instead of counting what it could not take")
@@ -233,6 +220,11 @@ void AddRunVerb(report::Program& program) {
       ->type_name("[=[ADDRESS:]PORT]");
   AddConsoleOptions(run, arguments);
   AddRemovedConsoleOptions(program, "run");
+  for (const char* option : {"--shadow", "--shadow-valves"}) {
+    program.AddRemoved("run", option,
+                       "record with --record, then compare the two sets with "
+                       "fdi-trainer compare SET@1 SET@2 --runs ID,...");
+  }
   run.add_option("--status-period", service.status_period_s,
                  "Time between status lines in the log [s]")
       ->check(CLI::Range(1.0, 86400.0))

@@ -16,7 +16,4 @@ void AddWatchVerb(report::Program& program);
 /// left_out.cpp.
 void AddConsoleVerb(report::Program& program);
 
-/// `top`: a live table of what they publish.
-void AddTopVerb(report::Program& program);
-
 }  // namespace fdi::monitor

@@ -1,14 +1,20 @@
 #include <chrono>
 #include <cstdint>
 #include <iostream>
+#include <limits>
+#include <optional>
 #include <set>
 #include <string>
 
 #include <CLI/CLI.hpp>
+#include <unistd.h>
 
+#include "base/time_text.h"
 #include "programs/monitor/verbs.h"
 #include "programs/monitor/watch_records.h"
+#include "programs/monitor/watch_table.h"
 #include "report/json_output.h"
+#include "report/live_screen.h"
 #include "report/logging.h"
 #include "report/program.h"
 #include "report/stop_signals.h"
@@ -21,6 +27,7 @@ using Clock = WatchRecords::Clock;
 struct WatchOptions {
   BusOptions bus{.program = "fdi-monitor watch"};
   bool count{false};
+  bool table{false};
   bool lossless{false};
   bool events_only{false};
   double for_s{0.0};   // 0: no limit
@@ -45,6 +52,7 @@ struct WatchCounts {
 };
 
 constexpr std::chrono::seconds kStopPatience{3};
+constexpr std::chrono::seconds kRefresh{1};  // Of the table.
 
 bool Passed(Clock::time_point since, double seconds) {
   return seconds > 0.0 &&
@@ -65,6 +73,45 @@ void PrintCounts(const WatchCounts& counts, std::uint64_t lost, bool json) {
   }
 }
 
+// Shows the table anew each second: on a terminal in place of the last one,
+// else below it.
+class TableOutput {
+ public:
+  TableOutput(const report::Context& context, bool in_place)
+      : json_(context.options.json),
+        table_(report::LoadFaultTexts(context.options), context.options.utc) {
+    if (in_place) {
+      screen_.emplace();
+    }
+  }
+  WatchTable& table() { return table_; }
+
+  void ShowWhenDue(Clock::time_point now) {
+    if (now - shown_ >= kRefresh) {
+      Show(now);
+    }
+  }
+  void Show(Clock::time_point now) {
+    shown_ = now;
+    if (screen_) {
+      screen_->Draw(table_.Text(screen_->height(), NowNs(), now));
+    } else if (json_) {
+      std::cout << report::JsonText(table_.Valves(NowNs(), now).document)
+                << '\n';
+    } else {
+      std::cout << table_.Text(kAllLines, NowNs(), now) << '\n';
+    }
+  }
+
+ private:
+  static constexpr auto kAllLines = std::numeric_limits<std::size_t>::max();
+
+  bool json_;
+  WatchTable table_;
+  std::optional<report::LiveScreen> screen_;
+  Clock::time_point shown_{Clock::now()};
+};
+
 int RunWatch(const WatchOptions& given, const report::Context& context) {
   WatchOptions options = given;
   if (options.events_only) {
@@ -75,11 +122,26 @@ int RunWatch(const WatchOptions& given, const report::Context& context) {
   report::StopSignals signals;
   // Whoever reads the output may have stopped reading.
   signals.EndWithin(kStopPatience);
-  BusView bus(options.bus, context, context.log);
-  report::WriteToStderr(
-      "watch_ready domain=" + std::to_string(context.options.domain) + "\n");
   const bool json = context.options.json;
-  WatchRecords records(context.options.utc, [json](const WatchRecord& record) {
+  // What is limited is for a file, even if it is shown on a terminal.
+  const bool in_place = options.table && !json && options.for_s == 0.0 &&
+                        options.idle_s == 0.0 && options.expect == 0 &&
+                        isatty(STDOUT_FILENO) != 0;
+  // Log lines would garble the screen.
+  BusView bus(options.bus, context, in_place ? LogSink() : context.log);
+  if (!in_place) {
+    report::WriteToStderr(
+        "watch_ready domain=" + std::to_string(context.options.domain) + "\n");
+  }
+  std::optional<TableOutput> output;
+  if (options.table) {
+    output.emplace(context, in_place);
+  }
+  WatchRecords records(context.options.utc, [&](const WatchRecord& record) {
+    if (output) {
+      output->table().Add(record.object, Clock::now());
+      return;
+    }
     std::cout << (json ? report::JsonText(record.object) : record.line) << '\n';
   });
   WatchCounts counts;
@@ -101,12 +163,22 @@ int RunWatch(const WatchOptions& given, const report::Context& context) {
             records.Add(message, Clock::now());
           }
         },
-        [](const std::string& /*valve_id*/) {});
+        [&](const std::string& valve_id) {
+          if (output) {
+            output->table().Remove(valve_id);
+          }
+        });
     records.Flush(Clock::now());
+    if (output) {
+      output->ShowWhenDue(Clock::now());
+    }
     std::cout.flush();
   }
   // What still waits for its model set is printed without its names.
   records.Flush(Clock::time_point::max());
+  if (output && !in_place) {
+    output->Show(Clock::now());
+  }
   if (options.count) {
     PrintCounts(counts, bus.lost(), json);
   }
@@ -120,13 +192,21 @@ void AddWatchVerb(report::Program& program) {
   auto [watch, options] = AddVerb(
       program, "watch",
       "Print what monitors publish: decision vectors, fault events", RunWatch);
-  watch.add_flag("--count", options.count,
-                 "Print only how many messages came, at the end");
+  CLI::Option* const count =
+      watch.add_flag("--count", options.count,
+                     "Print only how many messages came, at the end");
+  CLI::Option* const table =
+      watch
+          .add_flag("--table", options.table,
+                    "Show a table of valves each second instead, the worst "
+                    "first")
+          ->excludes(count);
   watch.add_option("--valves", options.bus.valves, "Only ids that match GLOB");
   watch.add_flag("--lossless", options.lossless,
                  "Every decision vector of monitors that run with "
                  "--lossless-decisions");
-  watch.add_flag("--events", options.events_only, "Leave out decision vectors");
+  watch.add_flag("--events", options.events_only, "Leave out decision vectors")
+      ->excludes(table);
   watch
       .add_option("--max-valves", options.bus.max_valves,
                   "Maximum number of valves")

@@ -17,7 +17,6 @@
 #include "import/layout.h"
 #include "import/tag_map.h"
 #include "programs/store/loop_audits.h"
-#include "programs/store/strokes.h"
 #include "programs/store/verbs.h"
 #include "report/plot/loop_figure.h"
 #include "storage/runs/runs.h"
@@ -38,7 +37,6 @@ struct AuditOptions {
   std::string pv;
   std::string sp;
   std::string x;
-  std::string ps;
   std::string mode;
   std::string service;
   bool ignore_x{false};
@@ -56,8 +54,8 @@ struct Role {
   std::string AuditOptions::*column;
   std::vector<const char*> names;
 };
-const std::array<Role, 5>& Roles() {
-  static const std::array<Role, 5> roles{{
+const std::array<Role, 4>& Roles() {
+  static const std::array<Role, 4> roles{{
       {Signal::kCv,
        "--op",
        &AuditOptions::op,
@@ -68,7 +66,6 @@ const std::array<Role, 5>& Roles() {
        {"PV", "F_t_h", "F_m3_h", "F", "MEAS"}},
       {Signal::kSp, "--sp", &AuditOptions::sp, {"SP", "SV", "SETPOINT"}},
       {Signal::kX, "--x", &AuditOptions::x, {"X_pct", "X", "ZT", "POS"}},
-      {Signal::kPs, "--ps", &AuditOptions::ps, {"Ps_kPa", "PS"}},
   }};
   return roles;
 }
@@ -591,17 +588,13 @@ void DrawAll(const std::vector<Judged>& judged, const std::string& path,
 // Files and runs, one after the other. One that cannot be read does not keep
 // the others from being judged.
 void JudgeAll(const AuditOptions& options, const Context& context,
-              std::vector<Judged>& judged, std::vector<FoundStroke>& strokes,
-              Json& skipped) {
+              std::vector<Judged>& judged, Json& skipped) {
   const auto judge = [&](const std::string& source, const auto& read) {
     const auto skip = [&](const std::exception& error) {
       skipped.push_back({{"source", source}, {"reason", error.what()}});
     };
     try {
-      const LoopRecord record = read();
-      JudgeRecord(record, options, judged, skipped);
-      AddStrokes(record.loop, record.source, record.dated, record.stretches,
-                 strokes);
+      JudgeRecord(read(), options, judged, skipped);
     } catch (const DataError& error) {
       skip(error);
     } catch (const NotFoundError& error) {
@@ -707,9 +700,8 @@ Report AuditLoops(const AuditOptions& options, const Context& context) {
     plot::FormatOf(options.plot);
   }
   std::vector<Judged> judged;
-  std::vector<FoundStroke> strokes;
   Json skipped = Json::array();
-  JudgeAll(options, context, judged, strokes, skipped);
+  JudgeAll(options, context, judged, skipped);
   Rank(judged);
   Report report;
   report.document["windows"] = Rows(judged, JudgedJson);
@@ -737,7 +729,6 @@ Report AuditLoops(const AuditOptions& options, const Context& context) {
                           {{"common period [s]", "period_s", Format::kPlain, 0},
                            {"loops", "loops"}});
   }
-  ReportStrokes(std::move(strokes), report);
   if (!skipped.empty()) {
     report.Line("").Table("skipped",
                           {{"not judged", "source"}, {"reason", "reason"}});
@@ -745,7 +736,7 @@ Report AuditLoops(const AuditOptions& options, const Context& context) {
   if (!options.plot.empty()) {
     DrawAll(judged, options.plot, report);
   }
-  if (judged.empty() && report.document["strokes"].empty()) {
+  if (judged.empty()) {
     report.exit_code = report::kExitData;
   }
   return report;
@@ -816,7 +807,9 @@ void AddAuditVerb(report::Program& program) {
   verb.add_option("--pv", options.pv, "Column of the controlled variable");
   verb.add_option("--sp", options.sp, "Column of the set point [as PV]");
   verb.add_option("--x", options.x, "Column of the position [%]");
-  verb.add_option("--ps", options.ps, "Column of the actuator pressure [kPa]");
+  program.AddRemoved("audit", "--ps",
+                     "stroke tests are no longer evaluated; fdi-store health "
+                     "show has dead time, T63 and T86 of ordinary steps");
   verb.add_option("--mode", options.mode,
                   "Column of the mode (MODE, or auto with 1 and 0)");
   verb.add_flag("--ignore-x", options.ignore_x,

@@ -1,12 +1,10 @@
-// fdi-store history: aggregate figures over many episodes (stats, causes,
-// shadow).
+// fdi-store history: aggregate figures over many episodes (stats, causes).
 #include <algorithm>
 #include <set>
 
 #include "programs/store/verbs.h"
 #include "storage/history/common_cause.h"
 #include "storage/history/history_reader.h"
-#include "storage/history/shadow.h"
 
 namespace fdi::storage {
 namespace {
@@ -212,86 +210,6 @@ Report Causes(const CausesOptions& options, const Context& context) {
                                  TextColumn("which", joined("valve_id"))});
 }
 
-struct ShadowOptions {
-  ShadowFilter filter;
-  report::TimeWindow window;
-};
-
-// The answers of the two sets are objects, "active" and "candidate"; columns
-// refer to their members by a path: "active/model_set".
-Json DifferenceJson(const ShadowDifference& d) {
-  return {{"valve_id", d.valve_id},
-          {"source_id", Hex(d.source_id)},
-          {"from_utc", TimeJson(d.from_ns)},
-          {"to_utc", TimeJson(d.to_ns)},
-          {"samples", d.samples},
-          {"active",
-           {{"model_set", d.active_set},
-            {"model_hash", Hex(d.active_hash)},
-            {"state", StateName(d.active.state)},
-            {"fault", TextJson(d.active.fault)}}},
-          {"candidate",
-           {{"model_set", d.candidate_set},
-            {"model_hash", Hex(d.candidate_hash)},
-            {"state", StateName(d.candidate.state)},
-            {"fault", TextJson(d.candidate.fault)}}}};
-}
-
-// "ISOLATED f1|f7", "NORMAL"
-std::string AnswerText(const Json& answer) {
-  const auto state = answer["state"].get<std::string>();
-  return answer["fault"].is_null()
-             ? state
-             : state + " " + answer["fault"].get<std::string>();
-}
-
-std::int64_t LengthNs(const Json& difference) {
-  const auto ns = [&difference](const char* key) {
-    return ParseTime(difference[key].get<std::string>(), true);
-  };
-  return ns("to_utc") - ns("from_utc");
-}
-
-Report Shadow(const ShadowOptions& options, const Context& context) {
-  ShadowFilter filter = options.filter;
-  filter.since_ns = options.window.since_ns(context);
-  filter.until_ns = options.window.until_ns(context);
-  HistoryReader history(DataOf(context).history());
-  Report report;
-  Json& rows = report.document["differences"];
-  rows = Rows(ListShadow(history.database(), filter), DifferenceJson);
-  report.Csv("differences",
-             {"valve_id", "from_utc", "to_utc", "samples", "active/model_set",
-              "active/state", "active/fault", "candidate/model_set",
-              "candidate/state", "candidate/fault"});
-  std::int64_t time_ns = 0;
-  for (const Json& row : rows) {
-    time_ns += LengthNs(row);
-  }
-  const auto answer = [](const char* of) {
-    return [of](const Json& row) { return AnswerText(row[of]); };
-  };
-  const auto lasted = [](const Json& row) {
-    return FormatDuration(LengthNs(row));
-  };
-  report.Table("differences",
-               {{"valve", "valve_id"},
-                {"from", "from_utc", Format::kTime},
-                TextColumn("lasted", lasted, 0, Align::kRight),
-                {"samples", "samples"},
-                {"active", "active/model_set"},
-                TextColumn("said", answer("active")),
-                {"candidate", "candidate/model_set"},
-                TextColumn("said", answer("candidate"))},
-               "no difference is recorded");
-  if (!rows.empty()) {
-    report.Line(std::to_string(rows.size()) +
-                (rows.size() == 1 ? " stretch, " : " stretches, ") +
-                FormatDuration(time_ns) + " in all");
-  }
-  return report;
-}
-
 }  // namespace
 
 void AddHistoryFigures(report::Program& program, CLI::App& group) {
@@ -310,17 +228,9 @@ void AddHistoryFigures(report::Program& program, CLI::App& group) {
   causes.add_flag("--open", cause.filter.open_only,
                   "Only those that still last");
   AddLimit(causes, cause.filter.limit);
-
-  auto [shadow, shown] = AddVerb(
-      program, group, "shadow",
-      "List where the candidate of fdi-monitor run --shadow differed", Shadow);
-  shadow.add_option("--valve", shown.filter.valve_glob,
-                    "Glob over valve ids: 'FV-1*'");
-  shadow.add_option("--candidate", shown.filter.candidate,
-                    "NAME or NAME@VERSION");
-  shown.window.AddTo(shadow);
-  AddLimit(shadow, shown.filter.limit);
-  program.AllowCsv(shadow, "One line per stretch");
+  program.AddRemoved("history", "shadow",
+                     "fdi-trainer compare compares two model sets on recorded "
+                     "runs");
 }
 
 }  // namespace fdi::storage

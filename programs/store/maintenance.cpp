@@ -271,7 +271,6 @@ struct PruneOptions {
   AgeAndSize runs;
   AgeAndSize history;
   AgeAndSize health;
-  AgeAndSize shadow;
   bool dry_run{false};
   bool trust_clock{false};
 };
@@ -292,9 +291,7 @@ Json PruneAll(const PruneOptions& options, const DataDirectory& data) {
         Task{options.history, "history.db", "episodes", data.history(),
              PruneHistory},
         Task{options.health, "history.db", "hours of health", data.history(),
-             PruneHealth},
-        Task{options.shadow, "history.db", "shadow differences", data.history(),
-             PruneShadow}}) {
+             PruneHealth}}) {
     if (task.asked.age.empty() && !task.asked.bytes) {
       continue;
     }
@@ -329,7 +326,7 @@ Report Prune(const PruneOptions& options, const Context& context) {
   if (databases.empty()) {
     throw ConfigError(
         "prune: choose what may be deleted: --runs-age, --runs-size, "
-        "--history-age, --history-size, --health-age or --shadow-age");
+        "--history-age, --history-size or --health-age");
   }
   Report report;
   report.document = {{"dry_run", options.dry_run}, {"databases", databases}};
@@ -367,7 +364,7 @@ void AddPrune(report::Program& program) {
   auto [verb, options] = AddVerb(
       program, program.root(), "prune",
       "Delete old recorded runs, old episodes that are closed, acknowledged "
-      "and not labelled, old hours of health and old differences of candidates",
+      "and not labelled, and old hours of health",
       Prune);
   for (auto& [what, limits] :
        {std::pair<std::string, AgeAndSize*>("--runs", &options.runs),
@@ -383,9 +380,8 @@ void AddPrune(report::Program& program) {
   verb.add_option("--health-age", options.health.age,
                   "Delete hours of health that are older than this: 1000d, "
                   "...");
-  verb.add_option("--shadow-age", options.shadow.age,
-                  "Delete differences of a candidate that are older than "
-                  "this: 90d, ...");
+  program.AddRemoved("prune", "--shadow-age",
+                     "differences of a candidate are no longer recorded");
   verb.add_flag("--dry-run", options.dry_run,
                 "Only print what would be deleted");
   verb.add_flag("--trust-clock", options.trust_clock,

@@ -7,7 +7,6 @@
 #include "planner/work_list.h"
 #include "programs/store/verbs.h"
 #include "report/fault_texts.h"
-#include "report/stroke_rows.h"
 #include "storage/history/history.h"
 
 namespace fdi::storage {
@@ -102,9 +101,7 @@ Report ShowHealth(const HealthOptions& options, const Context& context) {
     return CsvOf(rows, options.plant.asked());
   }
   Report report;
-  report.document = {{"valve_id", options.valve},
-                     {"hours", rows},
-                     {"strokes", planner::StrokesJson(hours)}};
+  report.document = {{"valve_id", options.valve}, {"hours", rows}};
   std::vector<report::Column> columns = {
       {"from", "hour_utc", Format::kTime},
       {"seen [h]", "seen_h"},
@@ -125,14 +122,7 @@ Report ShowHealth(const HealthOptions& options, const Context& context) {
     columns.insert(columns.begin() + 1, {{"host", "host", Format::kPlain, 0, 9},
                                          {"monitor", "monitor"}});
   }
-  report.Table("hours", std::move(columns));
-  if (!report.document["strokes"].empty()) {
-    std::vector<report::Column> strokes =
-        report::StrokeColumns("last_start_utc");
-    strokes.front().heading = "stroke test at";
-    report.Line("").Table("strokes", std::move(strokes));
-  }
-  return report;
+  return report.Table("hours", std::move(columns));
 }
 
 Report Trend(const HealthOptions& options, const Context& context) {

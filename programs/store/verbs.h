@@ -45,7 +45,6 @@ void AddAlarmVerbs(report::Program& program, CLI::App& group);
 void AddAuditVerb(report::Program& program);
 void AddFaultsVerb(report::Program& program);
 void AddMaintenanceVerbs(report::Program& program);
-void AddKeysVerbs(report::Program& program);
 // Of optional components; in a build without them, left_out.cpp defines these.
 void AddPlannerVerbs(report::Program& program);  ///< health, worklist
 void AddFleetVerb(report::Program& program);     ///< report

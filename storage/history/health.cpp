@@ -1,11 +1,6 @@
 #include "storage/history/health.h"
 
-#include <algorithm>
-#include <array>
-#include <cmath>
 #include <cstdint>
-#include <limits>
-#include <optional>
 #include <utility>
 
 #include "base/error.h"
@@ -19,11 +14,10 @@
 namespace fdi::storage {
 namespace sql = history_sql;
 
-// The bytes of an hour, format 2, and 3 with stroke tests:
+// The bytes of an hour, format 2:
 //
 //   hour     = head seen alarm open shut live_samples normal_factor travel
 //              reversals  counts  channels channel*  filled bin*  strength* 0
-//              [tests test*]
 //   head     = uint8: the format, with 0x80 if flow is in t/h
 //   counts   = present number*: bit i of `present` is set if number i of
 //              loop::ValveCounts follows; that of the time in automatic is
@@ -32,19 +26,13 @@ namespace sql = history_sql;
 //   filled   = uint16: bit b is set if bin b has samples
 //   bin      = for each channel: samples [residual square output]
 //   strength = fault samples strength
-//   test     = start [ns], period, stroke, 0 or 1 stroke and start of the last
-//   stroke   = samples, ends of CV and X, for CV rising and then falling: moves
-//              unanswered, the figures; those of the signature. In figures, bit
-//              i of a number says whether value i follows
 //
-// Values of stroke tests are in 10^-4 of their unit.
 // Numbers without a type are zigzag-coded LEB128; the three sums of a channel
 // are omitted if it has no samples.
 namespace {
 
 constexpr std::uint8_t kFormat = 2;
-constexpr std::uint8_t kWithStrokes = 3;  // As sql::stroke_hours knows.
-constexpr std::uint8_t kTonnes = 0x80;    // beside the format: flow in t/h
+constexpr std::uint8_t kTonnes = 0x80;  // beside the format: flow in t/h
 
 // LEB128 with zigzag coding: 0, -1, 1, -2, ... become 0, 1, 2, 3, ...
 void PutNumber(ByteWriter& out, std::int64_t value) {
@@ -145,123 +133,6 @@ void GetBins(ByteReader& in, HealthHour& hour) {
   }
 }
 
-constexpr double kStrokeQuantum = 1e-4;
-
-void PutValue(ByteWriter& out, double value) {
-  constexpr double kMost = 1e12;
-  PutNumber(out,
-            std::llround(std::clamp(value, -kMost, kMost) / kStrokeQuantum));
-}
-
-double GetValue(ByteReader& in) {
-  return static_cast<double>(GetNumber(in)) * kStrokeQuantum;
-}
-
-template <std::size_t N>
-void PutFigures(ByteWriter& out,
-                const std::array<std::optional<double>, N>& figures) {
-  std::int64_t present = 0;
-  for (std::size_t i = 0; i < N; ++i) {
-    present |= figures[i] ? std::int64_t{1} << i : 0;
-  }
-  PutNumber(out, present);
-  for (const auto& figure : figures) {
-    if (figure) {
-      PutValue(out, *figure);
-    }
-  }
-}
-
-template <std::size_t N>
-std::array<std::optional<double>, N> GetFigures(ByteReader& in) {
-  const std::size_t present =
-      GetCount(in, (std::int64_t{1} << N) - 1, "figures of a stroke test");
-  std::array<std::optional<double>, N> figures;
-  for (std::size_t i = 0; i < N; ++i) {
-    if ((present >> i & 1U) != 0) {
-      figures[i] = GetValue(in);
-    }
-  }
-  return figures;
-}
-
-void PutStroke(ByteWriter& out, const loop::Stroke& stroke) {
-  PutNumber(out, static_cast<std::int64_t>(stroke.end - stroke.begin));
-  for (const double end :
-       {stroke.cv_low, stroke.cv_high, stroke.x_low, stroke.x_high}) {
-    PutValue(out, end);
-  }
-  for (const loop::StrokeWay* way : {&stroke.rising, &stroke.falling}) {
-    PutNumber(out, way->moves);
-    PutNumber(out, way->unanswered);
-    PutFigures(out, std::array{way->delay_s, way->t63_s, way->t86_s,
-                               way->overshoot_pct, way->breakaway_pct,
-                               way->breakaway_kpa});
-  }
-  std::array<std::optional<double>, 4> signature;
-  if (const auto& s = stroke.signature) {
-    signature = {s->friction_kpa, s->spring_kpa_per_pct, s->at_0_kpa,
-                 s->at_100_kpa};
-  }
-  PutFigures(out, signature);
-}
-
-loop::Stroke GetStroke(ByteReader& in) {
-  constexpr std::int64_t kMost = 1'000'000'000;
-  loop::Stroke stroke;
-  stroke.end = GetCount(in, kMost, "samples of a stroke test");
-  for (double* end :
-       {&stroke.cv_low, &stroke.cv_high, &stroke.x_low, &stroke.x_high}) {
-    *end = GetValue(in);
-  }
-  for (loop::StrokeWay* way : {&stroke.rising, &stroke.falling}) {
-    way->moves = static_cast<int>(GetCount(in, kMost, "moves"));
-    way->unanswered = static_cast<int>(GetCount(in, kMost, "unanswered"));
-    const auto figures = GetFigures<6>(in);
-    way->delay_s = figures[0];
-    way->t63_s = figures[1];
-    way->t86_s = figures[2];
-    way->overshoot_pct = figures[3];
-    way->breakaway_pct = figures[4];
-    way->breakaway_kpa = figures[5];
-  }
-  if (const auto signature = GetFigures<4>(in); signature[0]) {
-    stroke.signature = {*signature[0], signature[1].value_or(0.0),
-                        signature[2].value_or(0.0), signature[3].value_or(0.0)};
-  }
-  return stroke;
-}
-
-void PutStrokes(ByteWriter& out, const HealthHour& hour) {
-  PutNumber(out, static_cast<std::int64_t>(hour.strokes.size()));
-  for (const StrokeTest& test : hour.strokes) {
-    PutNumber(out, test.start_ns);
-    PutValue(out, test.period_s);
-    PutStroke(out, test.stroke);
-    PutNumber(out, test.last ? 1 : 0);
-    if (test.last) {
-      PutStroke(out, *test.last);
-      PutNumber(out, test.last_ns);
-    }
-  }
-}
-
-void GetStrokes(ByteReader& in, HealthHour& hour) {
-  const std::size_t tests =
-      GetCount(in, HealthHour::kMaxStrokes, "stroke tests");
-  for (std::size_t i = 0; i < tests; ++i) {
-    StrokeTest test;
-    test.start_ns = GetNumber(in);
-    test.period_s = GetValue(in);
-    test.stroke = GetStroke(in);
-    if (GetCount(in, 1, "last stroke test") == 1) {
-      test.last = GetStroke(in);
-      test.last_ns = GetNumber(in);
-    }
-    hour.AddStroke(std::move(test));
-  }
-}
-
 // Visits the fixed numbers of an hour in storage order.
 template <typename Hour, typename Visit>
 void ForEachNumber(Hour& hour, Visit visit) {
@@ -293,58 +164,12 @@ HealthHour Sum(const HealthHour& stored, const HealthHour& part) {
   return sum;
 }
 
-// The latest test of `hour` before `test` that it can be compared with.
-const StrokeTest* LastIn(const HealthHour& hour, const StrokeTest& test) {
-  const StrokeTest* last = nullptr;
-  for (const StrokeTest& other : hour.strokes) {
-    if (other.start_ns < test.start_ns && AreAlike(other.stroke, test.stroke)) {
-      last = &other;
-    }
-  }
-  return last;
-}
-
-// Tests are rare, so a look at each hour of the valve with one is cheap enough
-// without an index.
-void CompareWithLast(Database& database, HealthHour& hour) {
-  for (StrokeTest& test : hour.strokes) {
-    std::optional<StrokeTest> newest;
-    const auto take = [&](const HealthHour& other) {
-      const StrokeTest* last = LastIn(other, test);
-      if (last != nullptr && (!newest || newest->start_ns < last->start_ns)) {
-        newest = *last;
-      }
-    };
-    take(hour);
-    Statement row = database.Prepare(sql::stroke_hours);
-    row.Bind(hour.valve_id, hour.hour);
-    std::int64_t found_in = std::numeric_limits<std::int64_t>::min();
-    while (row.Step() && row.Int64(0) >= found_in) {
-      HealthHour stored;
-      stored.valve_id = hour.valve_id;
-      row.Read(0, stored.hour, stored.model_hash, stored.epoch);
-      const std::int64_t stored_hour = stored.hour;
-      try {
-        take(Unpacked(row, 3, std::move(stored)));
-      } catch (const DataError&) {
-        continue;  // A damaged hour does not keep this one from being stored.
-      }
-      found_in = newest ? stored_hour : found_in;
-    }
-    if (newest) {
-      test.last = newest->stroke;
-      test.last_ns = newest->start_ns;
-    }
-  }
-}
-
 }  // namespace
 
 std::vector<std::byte> PackHealth(const HealthHour& hour) {
   ByteWriter out;
   out.Put(static_cast<std::uint8_t>(
-      (hour.strokes.empty() ? kFormat : kWithStrokes) |
-      (hour.flow_unit == FlowUnit::kTPerHour ? kTonnes : 0)));
+      kFormat | (hour.flow_unit == FlowUnit::kTPerHour ? kTonnes : 0)));
   ForEachNumber(hour, [&out](std::int64_t value) { PutNumber(out, value); });
   PutCounts(out, hour);
   PutNumber(out, static_cast<std::int64_t>(hour.channels.size()));
@@ -359,9 +184,6 @@ std::vector<std::byte> PackHealth(const HealthHour& hour) {
     PutNumber(out, sums.strength);
   }
   PutNumber(out, 0);  // no further fault
-  if (!hour.strokes.empty()) {
-    PutStrokes(out, hour);
-  }
   return out.Take();
 }
 
@@ -369,7 +191,7 @@ void UnpackHealth(std::span<const std::byte> bytes, HealthHour& hour) {
   ByteReader in(bytes, "health of " + hour.valve_id);
   const auto head = in.Get<std::uint8_t>();
   const int format = head & ~kTonnes;
-  if (format < kFormat || format > kWithStrokes) {
+  if (format != kFormat) {
     in.Refuse("format " + std::to_string(format) +
               " is not known to this program");
   }
@@ -392,24 +214,13 @@ void UnpackHealth(std::span<const std::byte> bytes, HealthHour& hour) {
     const std::int64_t samples = GetNumber(in);
     hour.AddStrength(static_cast<int>(fault), samples, GetNumber(in));
   }
-  hour.strokes.clear();
-  if (format == kWithStrokes) {
-    GetStrokes(in, hour);
-  }
   in.ExpectEnd();
 }
 
-std::size_t StoreHealth(Database& database, std::span<const HealthHour> hours) {
+void StoreHealth(Database& database, std::span<const HealthHour> hours) {
   Statement old = database.Prepare(sql::health_hour);
   Statement row = database.Prepare(sql::put_health_hour);
-  std::size_t worse = 0;
-  for (HealthHour part : hours) {
-    if (!part.strokes.empty()) {
-      CompareWithLast(database, part);
-      worse += static_cast<std::size_t>(std::ranges::count_if(
-          part.strokes,
-          [](const StrokeTest& test) { return !test.Worse().empty(); }));
-    }
+  for (const HealthHour& part : hours) {
     HealthHour key;
     key.valve_id = part.valve_id;
     key.hour = part.hour;
@@ -424,7 +235,6 @@ std::size_t StoreHealth(Database& database, std::span<const HealthHour> hours) {
              std::span<const std::byte>(bytes))
         .Run();
   }
-  return worse;
 }
 
 std::int64_t HourFrom(std::int64_t stamp_ns) {

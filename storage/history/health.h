@@ -20,10 +20,8 @@ std::vector<std::byte> PackHealth(const HealthHour& hour);
 /// @throws DataError if the bytes are damaged or of a later format.
 void UnpackHealth(std::span<const std::byte> bytes, HealthHour& hour);
 
-/// Adds `hours` to the stored ones, each of their stroke tests compared with
-/// the last one of the valve. Call within a transaction. @returns how many of
-/// these tests are worse than that.
-std::size_t StoreHealth(Database& database, std::span<const HealthHour> hours);
+/// Adds `hours` to the stored ones. Call within a transaction.
+void StoreHealth(Database& database, std::span<const HealthHour> hours);
 
 /// Settings of ReadHealth().
 struct HealthFilter {

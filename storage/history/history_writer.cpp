@@ -12,7 +12,6 @@
 #include "storage/history/episode.h"
 #include "storage/history/health.h"
 #include "storage/history/history_database.h"
-#include "storage/history/shadow.h"
 #include "storage/history/sql.h"
 #include "storage/history/strength.h"
 
@@ -485,28 +484,19 @@ void HistoryWriter::Resume(std::uint64_t episode_id, std::int64_t stamp_ns,
   });
 }
 
-std::size_t HistoryWriter::CommitCheckpoint(const Checkpoint& checkpoint) {
-  std::size_t worse = 0;
+void HistoryWriter::CommitCheckpoint(const Checkpoint& checkpoint) {
   CommitBatch([&] {
     // Coverage and health are added to what is stored. All of it is in one
     // transaction, so that after an error the caller can merge this checkpoint
     // into the next one.
     StoreCoverage(database_, checkpoint.coverage);
     StoreAccumulators(database_, "accumulator", checkpoint.accumulators);
-    worse = StoreHealth(database_, checkpoint.health);
-    StoreShadow(database_, checkpoint.shadow);
-    StoreAccumulators(database_, "shadow_accumulator",
-                      checkpoint.shadow_accumulators);
+    StoreHealth(database_, checkpoint.health);
   });
-  return worse;
 }
 
 std::vector<Accumulator> HistoryWriter::Accumulators() {
   return ReadAccumulators(database_, "accumulator");
-}
-
-std::vector<Accumulator> HistoryWriter::ShadowAccumulators() {
-  return ReadAccumulators(database_, "shadow_accumulator");
 }
 
 void HistoryWriter::MarkSent(const FaultEvent& event) {

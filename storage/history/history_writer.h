@@ -108,16 +108,13 @@ class HistoryWriter {
   /// The trace of the episode is complete; frees its buffer once written.
   void EndTrace(std::uint64_t episode_id) { traces_.End(episode_id); }
 
-  /// Adds coverage and health to what is stored, and replaces accumulators and
-  /// shadow stretches, together with what is pending; durable on return. Not
-  /// idempotent: twice counts twice. @returns how many stroke tests in it are
-  /// worse than the last of their valve.
-  std::size_t CommitCheckpoint(const Checkpoint& checkpoint);
+  /// Adds coverage and health to what is stored, and replaces accumulators,
+  /// together with what is pending; durable on return. Not idempotent: twice
+  /// counts twice.
+  void CommitCheckpoint(const Checkpoint& checkpoint);
 
   /// The accumulators of the last checkpoint, by valve.
   std::vector<Accumulator> Accumulators();
-  /// The same for the --shadow candidate.
-  std::vector<Accumulator> ShadowAccumulators();
 
   /// Adds a gap, once even if repeated. Buffers.
   void AddGap(const DataGap& gap) { gaps_.push_back(gap); }

@@ -209,29 +209,4 @@ PruneResult PruneHealth(const std::filesystem::path& path,
   return result;
 }
 
-PruneResult PruneShadow(const std::filesystem::path& path,
-                        const RetentionLimits& limits) {
-  constexpr std::int64_t kRowsAtOnce = 1000;
-  Database database(
-      path, HistorySchema(),
-      limits.dry_run ? Access::kReader : Access::kOccasionalWriter);
-  PruneResult result;
-  result.bytes_before = database.UsedBytes();
-  result.bytes_after = result.bytes_before;
-  const std::int64_t before_ns = limits.before_ns.value_or(0);
-  Statement old = database.Prepare(sql::old_shadow);
-  old.Bind(before_ns).Step();
-  old.Read(0, result.deleted, result.from_ns, result.to_ns);
-  old.Reset();
-  for (std::int64_t gone = 0; !limits.dry_run && gone < result.deleted;
-       gone += kRowsAtOnce) {
-    Transaction transaction(database);
-    database.Run(sql::delete_old_shadow, before_ns, kRowsAtOnce);
-    transaction.Commit();
-    std::this_thread::sleep_for(limits.pause);
-    result.bytes_after = database.UsedBytes();
-  }
-  return result;
-}
-
 }  // namespace fdi::storage

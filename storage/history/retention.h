@@ -49,9 +49,4 @@ PruneResult PruneHistory(const std::filesystem::path& path,
 PruneResult PruneHealth(const std::filesystem::path& path,
                         const RetentionLimits& limits);
 
-/// Deletes stretches of shadow_difference that ended before limits.before_ns;
-/// there is no size limit. Short transactions.
-PruneResult PruneShadow(const std::filesystem::path& path,
-                        const RetentionLimits& limits);
-
 }  // namespace fdi::storage

@@ -50,7 +50,6 @@ MovedHistory CopyProgress(Database& target, const std::filesystem::path& source,
   };
   MovedHistory moved;
   moved.accumulators = copy(sql::copy_accumulator);
-  copy(sql::copy_shadow_accumulator);
   moved.episodes = copy(sql::copy_open_episodes);
   for (const std::string_view statement :
        {sql::copy_open_faults, sql::copy_open_events, sql::copy_open_outbox,
@@ -69,7 +68,6 @@ void RemoveProgress(Database& source, const std::string& valve_id,
   Transaction transaction(source);
   source.Run(sql::log_moved_episodes, valve_id, now_ns);
   source.Run("DELETE FROM accumulator WHERE valve_id = ?", valve_id);
-  source.Run("DELETE FROM shadow_accumulator WHERE valve_id = ?", valve_id);
   source.Run("DELETE FROM episode WHERE valve_id = ? AND ended_ns IS NULL",
              valve_id);
   transaction.Commit();

@@ -257,38 +257,6 @@ test('a healthy valve shows no fault, and no number for one', async () => {
   await close(page);
 });
 
-test('stroke tests are listed, the newest first, with what is worse',
-    async () => {
-      const counts = ['travel_strokes', 'reversals', 'auto_h', 'shut_h',
-        'open_h', 'at_limit', 'slip_jumps', 'slip_jump', 'dead_band',
-        'error_band', 'delay', 't63', 't86', 'overshoot', 'travel_gain'];
-      const stroke = (day, t63, worse) => ({start_utc: `2026-11-${day}T10:00:00Z`,
-        last_start_utc: worse === null ? null : '2026-11-01T10:00:00Z',
-        kind: 'partial', cv_low_pct: 40, cv_high_pct: 50, worse: worse ?? [],
-        rising: {t63_s: t63, t86_s: null}, falling: {t63_s: 2, t86_s: 4}});
-      monitor.reset([tile('V', 'NORMAL')]);
-      monitor.answers['valves/V/trend'] =
-        trend({state: 'NORMAL', d0: 0.97, d: [1, 0.99]});
-      monitor.answers['valves/V/health'] = {
-        ...Object.fromEntries(counts.map((key) => [key, [null]])),
-        valve: 'V', step: 'day', t_ms: [kNowMs], channels: [], trends: [],
-        stroke_test: [1], exceeded: [['stroke_test']],
-        status: ['maintenance required'],
-        strokes: [stroke('01', 2, null),
-          stroke('20', 8.4, ['CV rising: T63 8.4 s after 2.0 s'])]};
-      const page = await openShared(browser, address, '#/valve/V');
-      const table = page.getByRole('region', {name: 'Stroke tests'});
-      await table.waitFor();
-
-      const rows = await table.getByRole('row').allInnerTexts();
-      assert.equal(rows.length, 3);
-      assert.match(rows[1], /11-20.*40 to 50 %.*8\.40 \/ 2.*– \/ 4.*T63/s);
-      assert.match(rows[2], /the first one with these levels/);
-      assert.match(await page.getByRole('region', {name: 'Counts'}).innerText(),
-          /Stroke test.*exceeded/s);
-      await close(page);
-    });
-
 test('words say how sure a name is; the number is a hint', async () => {
   const episode = '0000000000000001';
   const more = {episode, factor: 0.93, strength: 0.004};

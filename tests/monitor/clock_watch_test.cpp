@@ -19,7 +19,7 @@ class ClockWatchTest : public testing::Test {
             std::uint64_t source = 1) {
     Sample sample = PlantSample(0, 0.0, source);
     sample.stamp_ns += off_ns;
-    watch_.OnVerdict(valve, sample, {verdict_, nullptr, false, false});
+    watch_.OnVerdict(valve, sample, {verdict_, nullptr, false});
   }
 
   const Verdict verdict_{};

@@ -47,8 +47,7 @@ TEST_F(LiveBoardTest, AnAnswerThatFlapsKeepsItsTrend) {
   Verdict verdict;
   for (std::uint64_t k = 0; k < 500; ++k) {
     verdict.isolated = k / 5 % 2;
-    board_.OnVerdict("V1", PlantSample(k),
-                     {verdict, models_.get(), false, false});
+    board_.OnVerdict("V1", PlantSample(k), {verdict, models_.get(), false});
   }
 
   EXPECT_EQ(board_.Trend("V1").value().points.size(), 500U);
@@ -105,8 +104,7 @@ TEST_F(LiveBoardTest, AnotherModelSetBeginsTheTrendAnew) {
   const auto other = monitor::SharedLinearModels(0x5678);
   ValveEngine engine(other);
   const Sample sample = PlantSample(50);
-  board_.OnVerdict("V1", sample,
-                   {engine.Step(sample), other.get(), true, false});
+  board_.OnVerdict("V1", sample, {engine.Step(sample), other.get(), true});
 
   EXPECT_EQ(board_.Trend("V1").value().points.size(), 1U);
   EXPECT_EQ(board_.Trend("V1")->now.models->hash, 0x5678U);
@@ -115,7 +113,7 @@ TEST_F(LiveBoardTest, AnotherModelSetBeginsTheTrendAnew) {
 TEST_F(LiveBoardTest, AValveWithoutModelsHasReadingsOnly) {
   Verdict verdict;
   verdict.quality = Quality::kUnassigned;
-  board_.OnVerdict("bare", PlantSample(0), {verdict, nullptr, false, false});
+  board_.OnVerdict("bare", PlantSample(0), {verdict, nullptr, false});
 
   const LiveTrend trend = board_.Trend("bare").value();
   EXPECT_EQ(trend.now.models, nullptr);
@@ -182,8 +180,7 @@ TEST_F(LiveBoardTest, AnExpectedValveIsListedBeforeItSendsAndAfterItIsGone) {
 
   Show(0, 10);
   const Verdict verdict;
-  board_.OnVerdict("guest", PlantSample(0),
-                   {verdict, models_.get(), false, false});
+  board_.OnVerdict("guest", PlantSample(0), {verdict, models_.get(), false});
   EXPECT_EQ(board_.Valves().size(), 3U);
   board_.Expect("V1", seen_ns);  // Again, after a reload.
   EXPECT_EQ(board_.Trend("V1").value().now.silence, monitor::Silence::kNone);

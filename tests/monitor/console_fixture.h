@@ -19,7 +19,7 @@ class BoardTest : public testing::Test {
     for (std::uint64_t k = from; k < to; ++k) {
       const Sample sample = monitor::PlantSample(k, offset, source);
       board_.OnVerdict(valve, sample,
-                       {engine_.Step(sample), models_.get(), false, false});
+                       {engine_.Step(sample), models_.get(), false});
     }
   }
 

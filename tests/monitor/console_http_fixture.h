@@ -90,8 +90,8 @@ class ConsoleRoutesTest : public storage::HistoryFixture {
     for (int k = 0; k < samples; ++k) {
       const Sample sample = monitor::PlantSample(static_cast<std::uint64_t>(k),
                                                  k < 50 ? 0.0 : offset);
-      console_->live().OnVerdict(
-          id, sample, {engine.Step(sample), models.get(), false, false});
+      console_->live().OnVerdict(id, sample,
+                                 {engine.Step(sample), models.get(), false});
     }
   }
 

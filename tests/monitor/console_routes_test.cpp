@@ -82,8 +82,7 @@ TEST_F(ConsoleRoutesTest, APvAndItsSetPointHaveSevenDigitsInAnyUnit) {
   Sample sample = monitor::PlantSample(0);
   sample.Set(Signal::kPv, 1234567.891);
   sample.Set(Signal::kSp, 0.000123456789);
-  console_->live().OnVerdict("V1", sample,
-                             {verdict, models.get(), false, false});
+  console_->live().OnVerdict("V1", sample, {verdict, models.get(), false});
   const Json trend = Get("/api/v1/valves/V1/trend?seconds=9");
   EXPECT_EQ(trend["pv"], Json::array({1234568.0}));
   EXPECT_EQ(trend["sp"], Json::array({0.0001234568}));
@@ -96,7 +95,7 @@ TEST_F(ConsoleRoutesTest, AValveThatIsNotJudgedIsNotCalledNormal) {
   verdict.quality = Quality::kBadInput;
   console_->live().OnVerdict(
       "V1", monitor::PlantSample(0),
-      {verdict, models.get(), false, false, MaskOf(Signal::kF)});
+      {verdict, models.get(), false, MaskOf(Signal::kF)});
 
   const Json tile = Get("/api/v1/valves")["valves"][0];
 
@@ -112,8 +111,7 @@ TEST_F(ConsoleRoutesTest, WhatIsPartlyJudgedIsNotCalledNormal) {
   verdict.quality = Quality::kLive;
   verdict.confidence = 1.0;
   const auto show = [&](const Sample& sample) {
-    console_->live().OnVerdict("V1", sample,
-                               {verdict, models.get(), false, false});
+    console_->live().OnVerdict("V1", sample, {verdict, models.get(), false});
     return Get("/api/v1/valves")["valves"][0];
   };
   EXPECT_EQ(show(monitor::PlantSample(0))["state"], "NORMAL");

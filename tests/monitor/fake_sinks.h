@@ -165,7 +165,7 @@ class FakeHistory : public HistorySink {
       gaps.push_back(gap);
     });
   }
-  std::size_t CommitCheckpoint(const Checkpoint& checkpoint) override {
+  void CommitCheckpoint(const Checkpoint& checkpoint) override {
     notice.Apply([&] {
       FailIfBroken();
       if (checkpoint_poisoned) {
@@ -174,7 +174,6 @@ class FakeHistory : public HistorySink {
       checkpoint_sum = Merged(std::move(checkpoint_sum), checkpoint);
       ++checkpoints;
     });
-    return 0;
   }
   void MarkSent(const FaultEvent& /*event*/) override {
     notice.Apply([&] {

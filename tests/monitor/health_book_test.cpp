@@ -1,6 +1,5 @@
 #include "monitor/health_book.h"
 
-#include <algorithm>
 #include <cmath>
 #include <random>
 #include <utility>
@@ -177,62 +176,6 @@ TEST(HealthBookTest, CountsBelongToTheHourAndAreNotMadeOverAGap) {
   ASSERT_EQ(twice.size(), 1u);
   EXPECT_EQ(twice[0].counts.turns, 2);
   EXPECT_EQ(twice[0].counts.path, 2 * once[0].counts.path);
-}
-
-// The audit judges the record of the same samples as a whole. A bad reading in
-// a test ends the record, and a late sample is not part of it.
-TEST(HealthBookTest, StrokeTestsAreThoseOfTheAuditOfTheSameRecord) {
-  loop::StrokeRecord record;
-  double x = 50.0;
-  for (int k = 0; k < 5400; ++k) {
-    const int phase = k % 1800;
-    // A partial stroke by steps in AUTO, then one by ramps in MANUAL.
-    const double cv = phase < 600    ? 50.0
-                      : phase < 630  ? 40.0
-                      : phase < 1200 ? 50.0
-                                     : 50.0 + std::min(phase - 1200, 30);
-    x += (cv - x) / (k < 1800 ? 3.0 : 6.0);
-    record.cv.push_back(cv);
-    record.x.push_back(x);
-    record.ps.push_back(40.0 + x);
-    record.automatic.push_back(phase < 1200);
-  }
-  const std::vector<loop::Stroke> audit = loop::FindStrokes(record);
-  ASSERT_EQ(audit.size(), 6u);
-
-  const auto watched = [&record](int bad) {
-    HealthBook book;
-    for (int k = 0; k < 5400; ++k) {
-      const auto at = static_cast<std::size_t>(k);
-      Sample sample = At(k * kSecond, record.cv[at], record.x[at]);
-      sample.Set(Signal::kPs, record.ps[at]);
-      sample.mode =
-          record.automatic[at] ? ValveMode::kAuto : ValveMode::kManual;
-      sample.quality[Index(Signal::kX)] =
-          k == bad ? SignalQuality::kBad : SignalQuality::kGood;
-      book.Add(sample, Live(0.0), nullptr, 1.0);
-      Sample late = sample;
-      late.stamp_ns -= 5 * kSecond;
-      Verdict refused = Live(0.0);
-      refused.intake = Intake::kLate;
-      book.Add(late, refused, nullptr, 1.0);
-    }
-    std::vector<StrokeTest> tests;
-    for (const HealthHour& hour : Taken(book)) {
-      tests.insert(tests.end(), hour.strokes.begin(), hour.strokes.end());
-    }
-    return tests;
-  };
-  const auto tests = watched(-1);
-  ASSERT_EQ(tests.size(), audit.size());
-  for (std::size_t i = 0; i < tests.size(); ++i) {
-    EXPECT_EQ(tests[i].start_ns,
-              static_cast<std::int64_t>(audit[i].begin) * kSecond);
-    loop::Stroke stroke = audit[i];
-    stroke.end -= std::exchange(stroke.begin, 0);
-    EXPECT_EQ(tests[i].stroke, stroke) << i;
-  }
-  EXPECT_EQ(watched(615).size(), tests.size() - 1);
 }
 
 TEST(HealthBookTest, PartsMergeToTheWholeExactly) {

@@ -55,7 +55,6 @@ class PlannerRoutesTest : public storage::HistoryFixture {
                       {3600, 3600 * (i % 7), 3600 * 64, 3600 * 5000}};
       hours.push_back(hour);
     }
-    hours.back().AddStroke({kDetected, 1.0, {}, {}, 0});
     Checkpoint checkpoint;
     checkpoint.health = hours;
     writer_.CommitCheckpoint(checkpoint);
@@ -78,9 +77,6 @@ TEST_F(PlannerRoutesTest, HealthHasTheFiguresAndTheStatusOfEachDay) {
     EXPECT_EQ(health[key].size(), days) << key;
   }
   EXPECT_EQ(health["status"].back(), "good");
-  EXPECT_EQ(health["stroke_test"].back(), 0.0);  // As good as the last one.
-  ASSERT_EQ(health["strokes"].size(), 1u);
-  EXPECT_EQ(health["strokes"][0]["kind"], "partial");
 }
 
 TEST_F(PlannerRoutesTest, WorkListNamesValveAndReason) {

@@ -252,42 +252,6 @@ TEST_F(ReadWorkTest, AFigureBeyondItsLimitIsAReason) {
   EXPECT_TRUE(Read().empty());
 }
 
-TEST_F(ReadWorkTest, AStrokeTestThatIsWorseThanTheLastIsAReason) {
-  HealthHour hour;
-  hour.valve_id = "V9";
-  hour.hour = kDetected / (kDay / 24);
-  StrokeTest test;
-  test.stroke.cv_low = 40.0;
-  test.stroke.cv_high = 50.0;
-  test.stroke.rising.t63_s = 2.0;
-  Checkpoint checkpoint;
-  const auto store = [&](int day, double t63_s) {
-    test.start_ns = kDetected + day * kDay;
-    test.stroke.falling.t63_s = t63_s;
-    checkpoint.health = {hour};
-    checkpoint.health[0].hour += 24 * day;
-    checkpoint.health[0].AddStroke(test);
-    writer_.CommitCheckpoint(checkpoint);
-  };
-  store(0, 2.0);
-  store(1, 4.0);
-  query_.valve_glob = "V9";
-  query_.options.now_ns = kDetected + 31 * kDay;
-
-  const auto rows = Read();
-
-  ASSERT_EQ(rows.size(), 1u);
-  EXPECT_THAT(rows[0].why,
-              testing::MatchesRegex(
-                  "Stroke test worse than the last one \\(....-..-..\\): CV "
-                  "falling: T63 4.0 s after 2.0 s"));
-  EXPECT_DOUBLE_EQ(rows[0].score, 0.5);  // Low, a month ago.
-  EXPECT_EQ(WorkListReport(rows).document["rows"][0]["namur"],
-            "maintenance required");
-  store(2, 4.1);  // As bad as before: that is known.
-  EXPECT_TRUE(Read().empty());
-}
-
 TEST_F(ReadWorkTest, WhatIsShelvedIsLeftOutUntilTheShelfEnds) {
   storage::HistoryEditor(directory_.path() / "history.db")
       .Shelve("V1", std::nullopt, query_.options.now_ns + kDay,

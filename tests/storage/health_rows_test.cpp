@@ -1,4 +1,3 @@
-#include <algorithm>
 #include <random>
 
 #include <gtest/gtest.h>
@@ -52,22 +51,6 @@ HealthHour Typical(const std::string& valve, std::int64_t hour, int bins,
   return h;
 }
 
-StrokeTest StrokeAt(std::int64_t start_ns, double low, double t63_s) {
-  StrokeTest test;
-  test.start_ns = start_ns;
-  test.period_s = 0.5;
-  test.stroke.end = 181;
-  test.stroke.cv_low = low;
-  test.stroke.cv_high = 50.0;
-  test.stroke.x_low = low + 0.0123;
-  test.stroke.x_high = 50.0;
-  test.stroke.rising.moves = 2;
-  test.stroke.rising.unanswered = 1;
-  test.stroke.rising.t63_s = t63_s;
-  test.stroke.falling.breakaway_kpa = 12.5;
-  return test;
-}
-
 class HealthRowsTest : public testing::Test {
  protected:
   HealthRowsTest() : writer_(directory_.path() / "history.db") {}
@@ -92,11 +75,6 @@ TEST(HealthCodecTest, BytesGiveBackEveryNumber) {
   }
   hour.AddStrength(19, 60, -30'000);
   hour.AddStrength(3, 61, 15'000);
-  hour.AddStroke(StrokeAt(1'700'000'000'123'456'789, 40.0, 2.5));
-  hour.AddStroke(StrokeAt(1'600'000'000'123'456'789, 0.0, 2.5));
-  hour.strokes[1].last = hour.strokes[0].stroke;
-  hour.strokes[1].last->signature = {7.0, 1.5, 40.0, -160.0};
-  hour.strokes[1].last_ns = -5;
   HealthHour back;
   back.valve_id = hour.valve_id;
   back.hour = hour.hour;
@@ -112,7 +90,6 @@ TEST(HealthCodecTest, BytesGiveBackEveryNumber) {
 TEST(HealthCodecTest, DamagedBytesAreRefused) {
   std::mt19937 random(3);
   HealthHour hour = Typical("V1", 1, 2, random);
-  hour.AddStroke(StrokeAt(1, 40.0, 2.5));
   const auto bytes = PackHealth(hour);
   for (std::size_t size = 0; size < bytes.size(); ++size) {
     HealthHour back;
@@ -139,45 +116,6 @@ TEST_F(HealthRowsTest, MinutesOfAnHourAddUpExactly) {
   }
 
   EXPECT_EQ(Stored(), std::vector<HealthHour>{whole});
-}
-
-// The last one may be years and other tests ago, in another epoch, and beside
-// hours that cannot be read.
-TEST_F(HealthRowsTest, AStrokeTestIsComparedWithTheLastWithItsLevels) {
-  const auto store = [this](std::int64_t hour, std::uint32_t epoch,
-                            std::vector<StrokeTest> tests) {
-    HealthHour h = Typical("V1", hour, 1, random_);
-    h.epoch = epoch;
-    h.strokes = std::move(tests);
-    Checkpoint checkpoint;
-    checkpoint.health = {h, Typical("V2", hour, 1, random_)};
-    return writer_.CommitCheckpoint(checkpoint);
-  };
-  EXPECT_EQ(store(1, 1, {StrokeAt(10, 40.0, 2.0)}), 0u);
-  EXPECT_EQ(store(2, 1, {StrokeAt(20, 0.0, 2.0)}), 0u);
-  EXPECT_EQ(store(2, 1, {}), 0u);
-  EXPECT_EQ(store(3, 1, {}), 0u);
-  EXPECT_EQ(store(4, 1, {StrokeAt(25, 90.0, 2.0)}), 0u);
-  {
-    Transaction transaction(writer_.database());
-    writer_.database().Run(
-        "UPDATE health_hour SET bytes = x'0300' WHERE hour = 4");
-    transaction.Commit();
-  }
-  EXPECT_EQ(store(9, 2, {StrokeAt(30, 41.0, 3.5), StrokeAt(40, 40.5, 4.0)}),
-            1u);
-
-  const auto tests =
-      ReadHealth(writer_.database(), {"V1", 9 * kHourNs, 10 * kHourNs})
-          .at(0)
-          .strokes;
-  ASSERT_EQ(tests.size(), 2u);
-  EXPECT_EQ(tests[0].last, StrokeAt(10, 40.0, 2.0).stroke);
-  EXPECT_EQ(tests[0].last_ns, 10);
-  EXPECT_EQ(tests[0].Worse(),
-            std::vector<std::string>{"CV rising: T63 3.5 s after 2.0 s"});
-  EXPECT_EQ(tests[1].last_ns, 30);
-  EXPECT_TRUE(tests[1].Worse().empty());
 }
 
 TEST_F(HealthRowsTest, HoursComeByTimeWithinTheWindow) {

@@ -105,8 +105,8 @@ ip route add 224.0.0.0/4 dev lo
 echo "world: six of six peers are heard without multicast"
 
 if [ -n "$faketime" ]; then
-  "$bin/fdi-store" keys init "$out/keys" >/dev/null
-  "$bin/fdi-store" keys add "$out/keys" m1 --role monitor >/dev/null
+  "$bin/fdi-keys" init "$out/keys" >/dev/null
+  "$bin/fdi-keys" add "$out/keys" m1 --role monitor >/dev/null
   for offset in -20000d -2d; do
     code=0
     at $offset timeout 10 "$bin/fdi-monitor" --data "$out/boot" \

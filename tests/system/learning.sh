@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # The whole way of docs/learning.md with the built programs over DDS: a fault
-# that the set does not know is recorded, labelled, learnt, compared and run in
-# the shadow. Usage: learning.sh FOLDER-OF-PROGRAMS
+# that the set does not know is recorded, labelled, learnt, compared and
+# activated. Usage: learning.sh FOLDER-OF-PROGRAMS
 set -euo pipefail
 source "$(dirname "$0")/programs.sh" "$1"
 
@@ -75,15 +75,10 @@ expect 'judgement' "$(json compared.json '$.measures' \
   "select value ->> 'judgement' from j
    where value ->> 'measure' = 'final set'")" 'valve@2 is better (p = 0.0313)'
 
-start --shadow valve
+"$bin/fdi-store" models activate valve@2 >/dev/null
+start
 publish 78
 stop
-"$bin/fdi-store" history shadow --json >shadow.json
-expect 'what the shadow said' "$(json shadow.json '$.differences' \
-  "select value ->> '\$.active.model_set', value ->> '\$.active.state',
-   value ->> '\$.candidate.model_set', value ->> '\$.candidate.state',
-   value ->> '\$.candidate.fault' from j")" \
-  'valve@1|ISOLATED|valve@2|ISOLATED|f1'
-expect 'sets that have episodes' \
-  "$(history 'select distinct model_set from fault_history')" valve@1
+expect 'what the new set says' \
+  "$(history "select fault from fault_history where model_set = 'valve@2'")" f1
 echo "learning: ok"

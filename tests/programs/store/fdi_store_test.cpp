@@ -84,36 +84,19 @@ TEST_F(FdiStoreTest, AuditJudgesLoopsAndGoesOnAfterWhatItCannotRead) {
   EXPECT_THAT(Store("audit").err, HasSubstr("nothing to read"));
 }
 
-TEST_F(FdiStoreTest, AuditComparesStrokeTestsWithTheLastOne) {
-  // Two tests from 30 to 100 % and back; in the second the rod takes three
-  // times as long and rubs.
-  std::string text = "t_s,CV_pct,X_pct,Ps_kPa\n";
-  double x = 30.0;
-  for (int k = 0; k < 1200; ++k) {
-    const double cv = k % 600 < 60 || k % 600 >= 120 ? 30.0 : 100.0;
-    const double before = x;
-    x += (cv - x) / (k < 600 ? 4.0 : 12.0);
-    const double friction = k < 600 ? 5.0 : 15.0;
-    const double ps = 40.0 + x + (x > before ? friction : -friction);
-    for (const double value : {static_cast<double>(k), cv, x}) {
-      text += std::to_string(value) + ',';
-    }
-    text += std::to_string(ps) + '\n';
+// Verbs and options of earlier versions answer with what to do instead.
+TEST_F(FdiStoreTest, RemovedVerbsAndOptionsNameWhatReplacesThem) {
+  const std::vector<std::pair<std::string, std::string>> removed{
+      {"audit --ps PS a.csv", "--ps is gone: stroke tests"},
+      {"history shadow --since 1d", "shadow is gone: fdi-trainer compare"},
+      {"history shadow --help", "shadow is gone: fdi-trainer compare"},
+      {"keys init keys --days 30", "keys is gone: the script fdi-keys"},
+      {"prune --shadow-age 90d", "--shadow-age is gone: differences"}};
+  for (const auto& [call, instead] : removed) {
+    const Outcome outcome = Store(call);
+    EXPECT_EQ(outcome.code, 2) << call;
+    EXPECT_THAT(outcome.err, HasSubstr(instead));
   }
-  Write("FV1.csv", text);
-
-  const json strokes = StoreJson("audit FV1.csv")["strokes"];
-
-  ASSERT_EQ(strokes.size(), 2U);
-  EXPECT_EQ(strokes[0]["kind"], "partial");
-  EXPECT_EQ(strokes[0]["rising"]["moves"], 1);
-  EXPECT_NEAR(strokes[0]["rising"]["t63_s"].get<double>(), 2.5, 0.1);
-  EXPECT_NEAR(strokes[0]["signature"]["friction_kpa"].get<double>(), 5.0, 0.1);
-  EXPECT_TRUE(strokes[0]["worse"].empty());
-  EXPECT_EQ(strokes[1]["last_from_s"], strokes[0]["from_s"]);
-  EXPECT_THAT(strokes[1]["worse"].dump(),
-              AllOf(HasSubstr("CV rising: T63"), HasSubstr("CV falling: T86"),
-                    HasSubstr("friction 15.0 kPa after 5.0 kPa")));
 }
 
 TEST_F(FdiStoreTest, AuditSaysWhatIsUnusualAndWhatToType) {

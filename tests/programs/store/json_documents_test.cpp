@@ -255,10 +255,6 @@ class JsonDocumentsTest : public FdiStoreTest {
       hour.channels = {{Signal::kX, -10}};
       hour.bins[7] = {{3600, 3600LL * 51 * i, 0, 3600LL * 71'000}};
       hour.strengths = {{1, 3600, 3600LL * 100}};
-      StrokeTest test;
-      test.start_ns = hour.hour * 3600 * kSecond;
-      test.stroke.signature = {7.0, 1.5, 40.0, 160.0};
-      hour.strokes = {test};
     }
     Checkpoint checkpoint;
     checkpoint.coverage = {day};
@@ -274,10 +270,6 @@ class JsonDocumentsTest : public FdiStoreTest {
         "INSERT INTO common_cause_member SELECT '00000000000000aa', "
         "episode_id, "
         "valve_id, 'f7', detected_ns FROM episode");
-    database.Run(
-        "INSERT INTO shadow_difference VALUES (1, 'LV-1', 1, ?1, ?1 + 1000, 5, "
-        "'pump@1', 1, 'ISOLATED', 'f7', 'pump@2', 2, 'NORMAL', NULL)",
-        kDetected);
     transaction.Commit();
   }
 
@@ -323,17 +315,7 @@ TEST_F(JsonDocumentsTest, ProgramsAndPageHaveTheSameKeys) {
     }
     Write(loop, text);
   }
-  // A stroke test whose actuator pressure is measured, twice.
-  std::string strokes = "t_s,CV_pct,X_pct,Ps_kPa\n";
-  double x = 0.0;
-  for (int k = 0; k < 240; ++k) {
-    const double cv = k / 60 % 2 == 0 ? 0.0 : 100.0;
-    x += 0.25 * (cv - x);
-    strokes += std::to_string(k) + ',' + std::to_string(cv) + ',' +
-               std::to_string(x) + ',' + std::to_string(x + 0.1 * cv) + '\n';
-  }
-  Write("FV1.csv", strokes + "240,0,0,0\n");
-  Printed(page, "audit", "a.csv FIC1.csv FIC2.csv FV1.csv");
+  Printed(page, "audit", "a.csv FIC1.csv FIC2.csv");
   Printed(page, "runs label", id + "@0:1 f7");
   Printed(page, "runs list");
   Printed(page, "runs show", id);
@@ -370,7 +352,6 @@ TEST_F(JsonDocumentsTest, ProgramsAndPageHaveTheSameKeys) {
   Printed(page, "history report", "last -o page.html");
   Printed(page, "history stats");
   Printed(page, "history causes");
-  Printed(page, "history shadow");
   Printed(page, "history unshelve", "--valve LV-1");
   Printed(page, "faults");
   if (FDI_PLANNER) {
@@ -384,10 +365,6 @@ TEST_F(JsonDocumentsTest, ProgramsAndPageHaveTheSameKeys) {
     called_.insert({"fdi-store health show", "fdi-store health trend",
                     "fdi-store worklist", "fdi-store report"});
   }
-  Printed(page, "keys init", "keys");
-  Printed(page, "keys add", "keys monitor-1 --role monitor");
-  Printed(page, "keys renew", "keys monitor-1");
-  Printed(page, "keys list", "keys");
   Printed(page, "doctor");
   Printed(page, "backup", "copy");
   Printed(page, "prune", "--history-age 1d --dry-run");

@@ -6,7 +6,6 @@ import {getOptional, path} from '../api.js';
 import {PanelStack} from '../charts/panel.js';
 import {h} from '../dom.js';
 import {numberText, unitText} from '../format.js';
-import {strokeTests} from './strokes.js';
 import {dataTable} from './table.js';
 
 const kMinDays = 2;
@@ -61,7 +60,6 @@ const kCounts = [
   ['error_band', 'Dynamic error band', '%'], ['delay', 'Dead time', 's'],
   ['t63', 'T63', 's'], ['t86', 'T86', 's'], ['overshoot', 'Overshoot', '%'],
   ['travel_gain', 'Travel gain', ''],
-  ['stroke_test', 'Stroke test, worse figures', ''],
 ];
 
 function countsOf(health) {
@@ -110,7 +108,6 @@ export class HealthSection {
         h('h2', {}, `Counts of the last ${health.step}`),
         h('p', {}, `Status (NAMUR NE 107): ${health.status.at(-1)}`),
         dataTable('Counts', kCountColumns, countsOf(health)),
-        ...strokeTests(health.strokes),
         h('h2', {}, 'Months'),
         dataTable('Trends to limits', kTrendColumns, health.trends));
     if (health.t_ms.length < kMinDays) {

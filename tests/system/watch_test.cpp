@@ -1,0 +1,135 @@
+// `fdi-monitor watch` beside a real monitor: its table, in a pipe and on a
+// terminal.
+#include <csignal>
+#include <fstream>
+
+#include <gmock/gmock.h>
+#include <nlohmann/json.hpp>
+#include <sys/wait.h>
+
+#include "tests/system/monitor_fixture.h"
+#include "tests/system/pty_process.h"
+
+namespace fdi::monitor {
+namespace {
+
+using testing::HasSubstr;
+
+class WatchSystemTest : public MonitorFixture {
+ protected:
+  WatchSystemTest() {
+    StoreModels(data_, LinearModels());
+    monitor_ = StartMonitor();
+    Publish(0, 40);
+    Publish(40, 60, kF7Offset);
+    EXPECT_TRUE(AwaitEvent(TransitionKind::kIsolated));
+  }
+
+  std::vector<std::string> Watch() const {
+    return {FDI_MONITOR_PROGRAM,          "watch",       "--domain",
+            std::to_string(domain_.id()), "--transport", "udp"};
+  }
+  // The last table that `watch --table --json` prints.
+  nlohmann::json LastTable() const {
+    const std::filesystem::path file = directory_.path() / "tables.json";
+    std::string command;
+    for (const std::string& word : Watch()) {
+      command += "\"" + word + "\" ";
+    }
+    const int status = std::system(
+        (command + "--table --for 4 --json >" + file.string()).c_str());
+    EXPECT_EQ(WEXITSTATUS(status), 0);
+    std::ifstream lines(file);
+    std::string last;
+    for (std::string line; std::getline(lines, line);) {
+      last = line;
+    }
+    return nlohmann::json::parse(last);
+  }
+
+  std::unique_ptr<ChildProcess> monitor_;
+};
+
+// The valve sends nothing while the table is made, so nobody can tell.
+TEST_F(WatchSystemTest, ATableOfWhatWasSaidLastConfirmsNothing) {
+  const auto table = LastTable();
+
+  ASSERT_EQ(table["valves"].size(), 1U);
+  const auto& row = table["valves"][0];
+  EXPECT_EQ(row["valve_id"], "V1");
+  EXPECT_EQ(row["state"], "NOT_CONFIRMED");
+  EXPECT_EQ(row["fault"], "f7");
+  EXPECT_TRUE(row["since_utc"].is_string());
+  EXPECT_TRUE(row["unconfirmed_utc"].is_string());
+  EXPECT_THAT(table["monitor"], HasSubstr("OK"));
+}
+
+// The engine has no episode any more, and its last vector says NORMAL.
+TEST_F(WatchSystemTest, AnAlarmWhoseStreamHasEndedIsNotNormal) {
+  samples_->Dispose({"V1", {}});
+  ASSERT_TRUE(AwaitEvent(TransitionKind::kClosed));
+
+  const auto table = LastTable();
+
+  ASSERT_EQ(table["valves"].size(), 1U);
+  EXPECT_EQ(table["valves"][0]["state"], "NOT_CONFIRMED");
+  EXPECT_EQ(table["valves"][0]["fault"], "f7");
+}
+
+TEST_F(WatchSystemTest, TheTableComesAgainUntilCtrlC) {
+  std::vector<std::string> command = Watch();
+  command.emplace_back("--table");
+  PtyProcess watch(command, 120, 20);
+  const termios before = watch.Settings();
+  EXPECT_TRUE(watch.AwaitText("not confirmed since")) << watch.output();
+  Publish(60, 70, kF7Offset);
+  EXPECT_TRUE(watch.AwaitText("ISOLATED")) << watch.output();
+  watch.ClearOutput();
+  EXPECT_TRUE(watch.AwaitText("1 in alarm")) << watch.output();
+
+  watch.Type("\x03");  // Ctrl-C
+
+  EXPECT_EQ(watch.AwaitExit(), 0);
+  EXPECT_THAT(watch.output(), HasSubstr("\x1b[?25h\x1b[?1049l"));
+  EXPECT_EQ(watch.Settings().c_lflag, before.c_lflag);
+}
+
+// It waits for its reader, but not with a stop.
+TEST_F(WatchSystemTest, AWatchWhoseReaderHasStoppedReadingEnds) {
+  std::string command =
+      "exec 1> >(exec sleep 20); "
+      "timeout 0.2 head -c 1000000 /dev/zero; exec";
+  for (const std::string& word : Watch()) {
+    command += " '" + word + "'";
+  }
+  ChildProcess watch({"/bin/bash", "-c", command});
+  EXPECT_TRUE(watch.AwaitLine("watch_ready"));
+  EXPECT_TRUE(Await([&] {
+    std::string function;
+    std::ifstream("/proc/" + std::to_string(watch.pid()) + "/wchan") >>
+        function;
+    return function.find("pipe_write") != std::string::npos;
+  }));
+
+  watch.Signal(SIGTERM);
+
+  EXPECT_EQ(watch.AwaitExit(std::chrono::seconds(10)), 1);
+}
+
+// What earlier versions had answers with what to do instead.
+TEST(RemovedWordsTest, NameWhatReplacesThem) {
+  const std::vector<std::pair<std::vector<std::string>, std::string>> removed{
+      {{"top", "--once"}, "top is gone: fdi-monitor watch --table"},
+      {{"run", "--shadow", "paper@2"}, "--shadow is gone: record with"},
+      {{"run", "--shadow-valves=V*"}, "--shadow-valves is gone: record with"}};
+  for (const auto& [words, instead] : removed) {
+    std::vector<std::string> command{FDI_MONITOR_PROGRAM};
+    command.insert(command.end(), words.begin(), words.end());
+    ChildProcess program(command);
+    EXPECT_EQ(program.AwaitExit(), 2) << words.front();
+    EXPECT_THAT(program.errors(), HasSubstr(instead));
+  }
+}
+
+}  // namespace
+}  // namespace fdi::monitor
