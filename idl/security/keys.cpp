@@ -63,12 +63,9 @@ const std::vector<RoleRow>& Roles() {
       {Role::kMonitor,
        "monitor",
        {"fdi/v1/DecisionVector", "fdi/v1/DecisionBatch", "fdi/v1/FaultEvent",
-        "fdi/v1/ModelSetInfo", "fdi/v1/MonitorStatus", "fdi/v1/PairState",
-        "fdi/v1/OperatorAction", "fdi/v1/MonitorShare"},
-       // Besides samples, the topics of other monitors.
-       {"fdi/v1/ValveSample", "fdi/v2/ValveSample", "fdi/v1/DecisionVector",
-        "fdi/v1/FaultEvent", "fdi/v1/PairState", "fdi/v1/OperatorAction",
-        "fdi/v1/MonitorShare"}},
+        "fdi/v1/ModelSetInfo", "fdi/v1/MonitorStatus", "fdi/v1/MonitorShare"},
+       // The shares are those of other monitors.
+       {"fdi/v1/ValveSample", "fdi/v2/ValveSample", "fdi/v1/MonitorShare"}},
       {Role::kReader, "reader", {}, {"fdi/v1/*", "fdi/v2/*"}}};
   return kRoles;
 }

@@ -48,9 +48,6 @@ using Clock = std::chrono::steady_clock;
 // Without samples, Pipeline::Poll() runs as often as this.
 constexpr milliseconds kTakeTimeout{100};
 constexpr int kTakeLimit = 4096;  // Bounds a call of Take() under full load.
-// A pair must exchange states more often.
-constexpr milliseconds kPairTakeTimeout{20};
-constexpr int kPairTakeLimit = 256;
 constexpr milliseconds kTickPeriod{1000};
 // After a reload that failed; doubled each time, as all sets are read again.
 constexpr milliseconds kReloadPause{2000};
@@ -98,17 +95,6 @@ int IntakeValves(int max_valves) {
   constexpr int kSpareSlots = 60'000;
   constexpr int kMaxSlots = 100'000;  // See idl::DdsOptions.
   return std::min(max_valves + kSpareSlots, kMaxSlots);
-}
-
-std::vector<std::string> Partitions(const ServiceOptions& options) {
-  return options.pair ? PartitionsOf(*options.pair)
-                      : std::vector<std::string>{};
-}
-
-std::string PairText(const Pair& pair) {
-  const Pair::Status status = pair.status();
-  const std::string leader = status.leader.empty() ? "nobody" : status.leader;
-  return status.leads ? "leader" : "standby, " + leader + " leads";
 }
 
 // Notifies the service manager (systemd, Type=notify), if there is one.
@@ -165,8 +151,8 @@ Service::Service(const ServiceOptions& options, const report::Context& context)
                 : std::make_unique<RunStore>(data_.runs(), context.software)),
       decisions_(participant_,
                  options.lossless_decisions ? MonitorName() : std::string(),
-                 publication_stop_.get_token(), Partitions(options)),
-      events_(participant_, context.log, Partitions(options)),
+                 publication_stop_.get_token()),
+      events_(participant_, context.log),
       status_topic_(participant_),
       samples_(
           intake_participant_,
@@ -175,18 +161,9 @@ Service::Service(const ServiceOptions& options, const report::Context& context)
           ParsePartitions(context.options.partition, true)),
       log_(context.log),
       after_commit_(counters_, log_),
-      pair_(options.pair
-                ? std::make_unique<Pair>(participant_, *options.pair,
-                                         MonitorName(), decisions_, events_,
-                                         after_commit_.beyond(), log_)
-                : nullptr),
-      operators_(options.pair ? std::make_unique<OperatorSync>(
-                                    participant_, *options.pair, MonitorName(),
-                                    data_.history(), log_)
-                              : nullptr),
       shares_(participant_,
-              {MonitorName(), options.pair ? options.pair->name : "",
-               options.pipeline.valve_glob, context.options.partition},
+              {MonitorName(), options.pipeline.valve_glob,
+               context.options.partition},
               log_),
       shadow_(options.shadow ? std::make_unique<ShadowBank>(
                                    ShadowOptions{LoadCandidate(data_.models(),
@@ -204,9 +181,8 @@ Service::Service(const ServiceOptions& options, const report::Context& context)
                             })
                       : nullptr),
       pipeline_(WithDelivery(options.pipeline),
-                {pair_ ? static_cast<DecisionSink&>(*pair_) : decisions_,
-                 after_commit_, history_},
-                assignment_, {counters_, log_, NowNs}),
+                {decisions_, after_commit_, history_}, assignment_,
+                {counters_, log_, NowNs}),
       heartbeat_(Members(pipeline_, recorder_.get(), service_pulse_)),
       started_ns_(NowNs()),
       last_status_line_(Clock::now()) {
@@ -234,8 +210,7 @@ void Service::AttachListeners() {
   }
 }
 
-// What becomes of an event, in this order. The page of a standby shows all
-// events; beyond the pair is what only the leader tells, at a takeover later.
+// What becomes of an event, in this order.
 void Service::ListAfterCommit() {
   if (console_) {
     after_commit_.Add("console", [this](const FaultEvent& event, bool stored) {
@@ -245,9 +220,6 @@ void Service::ListAfterCommit() {
   if (options_.follower) {
     after_commit_.Add("follower",
                       [this](const FaultEvent&, bool) { follower_->Wake(); });
-  }
-  if (pair_) {
-    after_commit_.AddGate(*pair_);
   }
   after_commit_.Add(events_);
   if (hook_) {
@@ -283,11 +255,8 @@ std::vector<storage::Shelf> Service::ShelvesInForce() {
 PipelineOptions Service::WithDelivery(PipelineOptions options) {
   options.severities = std::make_shared<const SeverityCatalogue>(
       report::LoadFaultTexts(context_.options).Severities());
-  // A standby publishes nothing itself: its events are delivered once it has
-  // heard them from the leader.
   options.journal.acknowledged = [this](milliseconds patience) {
-    return (!pair_ || pair_->AllEventsCovered()) &&
-           events_.WaitForAcknowledged(patience);
+    return events_.WaitForAcknowledged(patience);
   };
   return options;
 }
@@ -332,8 +301,7 @@ void Service::Start() {
            Guarded(counters_, log_, part, step);
          },
          [this](const report::Json& json) {
-           // Both of a pair find it; the leader notifies.
-           if (hook_ && (!pair_ || pair_->status().leads)) {
+           if (hook_) {
              hook_->Notify(json);
            }
          }});
@@ -349,13 +317,8 @@ void Service::Start() {
   if (recorder_) {
     recorder_->Start();
   }
-  pipeline_.StandBy(pair_ != nullptr);
-  pipeline_.Start(history_.OpenEpisodes(), history_.Accumulators(),
-                  pair_ ? history_.LastEnds() : std::vector<EndedEpisode>{});
+  pipeline_.Start(history_.OpenEpisodes(), history_.Accumulators());
   diagnosis_.Start([this] { Diagnose(); });
-  if (operators_) {
-    operators_->Start();
-  }
   if (http_) {
     ServeProbes();
   }
@@ -417,9 +380,9 @@ void Service::ExpectAssignedValves() {
 void Service::ServeConsole() {
   const auto facts = [this] {
     const idl::MonitorStatusMessage status = StatusOf(Facts());
-    return console::MonitorFacts{
-        idl::HealthName(status.health), status.counters,
-        pipeline_.census().open_episodes, pair_ ? PairText(*pair_) : ""};
+    return console::MonitorFacts{idl::HealthName(status.health),
+                                 status.counters,
+                                 pipeline_.census().open_episodes};
   };
   console_->Start({data_.history(), data_.models(), context_.software,
                    started_ns_, facts, NowNs});
@@ -460,25 +423,16 @@ void Service::Diagnose() {
           const idl::Reception& reception) {
         pipeline_.OnStreamEnded(message.valve_id, reception.writer_id);
       }};
-  const int limit = pair_ ? kPairTakeLimit : kTakeLimit;
   const auto take = [&](milliseconds timeout) {
     // Recomputed each time, because the UTC clock may have been set.
     utc_to_steady_ns =
         Clock::now().time_since_epoch() / std::chrono::nanoseconds(1) - NowNs();
-    return samples_.Take(handlers, timeout, limit);
+    return samples_.Take(handlers, timeout, kTakeLimit);
   };
   while (!stopping_) {
     // While samples wait, silence is measured up to the newest one handled.
-    const int taken = take(pair_ ? kPairTakeTimeout : kTakeTimeout);
-    pipeline_.Poll(taken < limit ? Clock::now() : received);
-    if (pair_) {
-      pair_->Tick(counters_[Counter::kReceived], pipeline_);
-    }
-  }
-  // Before the queue is drained: the standby takes over at once, without
-  // waiting for its patience to pass.
-  if (pair_) {
-    pair_->StepDown(pipeline_);
+    const int taken = take(kTakeTimeout);
+    pipeline_.Poll(taken < kTakeLimit ? Clock::now() : received);
   }
   // Drains what has arrived already; publishers that continue to send do not
   // delay the shutdown beyond drain_until_.
@@ -632,7 +586,6 @@ StatusFacts Service::Facts() const {
           pipeline_.history_degraded(),
           RecordingDegraded(),
           heartbeat_.StalledSince(Clock::now() - kStallLimit),
-          pair_ ? std::optional(pair_->status()) : std::nullopt,
           shares_.contested(),
           idl::MissingInterfaces()};
 }
@@ -703,9 +656,6 @@ void Service::Stop() {
   }
   if (console_) {
     errors.Try([this] { console_->Stop(); });
-  }
-  if (operators_) {
-    operators_->Stop();
   }
   errors.Try([this] { StopDiagnosis(); });
   if (follower_) {

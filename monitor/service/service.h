@@ -17,8 +17,6 @@
 #include "monitor/console/console.h"
 #include "monitor/heartbeat.h"
 #include "monitor/http/http_server.h"
-#include "monitor/pair/operator_sync.h"
-#include "monitor/pair/pair.h"
 #include "monitor/pipeline.h"
 #include "monitor/recorder.h"
 #include "monitor/service/event_hook.h"
@@ -44,9 +42,8 @@ struct ServiceOptions {
   std::optional<storage::ModelReference> model_set;
   Recording recording{Recording::kOff};
   bool lossless_decisions{false};
-  bool best_effort{false};          ///< ValveSample without retransmission.
-  double status_period_s{60.0};     ///< Of the status line in the log.
-  std::optional<PairOptions> pair;  ///< This monitor has a standby.
+  bool best_effort{false};       ///< ValveSample without retransmission.
+  double status_period_s{60.0};  ///< Of the status line in the log.
   /// Runs beside the active sets; without a version the newest one.
   std::optional<storage::ModelReference> shadow;
   std::string shadow_valves{"*"};
@@ -141,8 +138,6 @@ class Service {
   Counters counters_;
   ThrottledLog log_;
   AfterCommit after_commit_;
-  std::unique_ptr<Pair> pair_;               // Null: not in a pair.
-  std::unique_ptr<OperatorSync> operators_;  // Set together with pair_.
   ShareWatch shares_;
   std::unique_ptr<ShadowBank> shadow_;         // Null: no candidate.
   std::unique_ptr<Recorder> recorder_;         // Set together with runs_.

@@ -77,17 +77,6 @@ Json LargestOf(const Json& factors) {
   return largest;
 }
 
-// "leader host:1 "; empty for a monitor that is not in a pair.
-std::string PairText(const idl::MonitorStatusMessage& status) {
-  const auto leads =
-      std::ranges::find(status.counters, "pair_leader",
-                        &std::pair<std::string, std::uint64_t>::first);
-  return leads == status.counters.end()
-             ? ""
-             : (leads->second != 0 ? "leader " : "standby ") + status.monitor +
-                   " ";
-}
-
 // Lines other than rows: title, blank, heading, "too narrow", "more below",
 // and the one that the last newline leads to.
 constexpr std::size_t kOtherLines = 6;
@@ -168,7 +157,7 @@ std::string TopBoard::Health(Clock::time_point now) const {
   for (const auto& [monitor, heard] : monitors_) {
     const auto& [status, at] = heard;
     if (now - at <= kMonitorSilence) {
-      text += (text.empty() ? "" : ", ") + PairText(status) +
+      text += (text.empty() ? "" : ", ") +
               std::string(idl::HealthName(status.health)) +
               (status.text.empty() ? "" : ": " + status.text);
     }

@@ -60,8 +60,8 @@ class TopBoard {
                         Clock::time_point now) const;
 
   std::size_t valves() const { return decisions_.size(); }
-  /// "OK", "DEGRADED: why", for a pair "leader host:1 OK, standby host:2 OK";
-  /// empty if no status has arrived recently.
+  /// "OK", "DEGRADED: why", of several monitors "OK, OK"; empty if no status
+  /// has arrived recently.
   std::string Health(Clock::time_point now) const;
 
  private:

@@ -12,8 +12,8 @@
 #include <nlohmann/json.hpp>
 
 #include "tests/idl/test_domain.h"
-#include "tests/survival/pair_plant.h"
 #include "tests/survival/plant_fixture.h"
+#include "tests/survival/shared_plant.h"
 #include "tests/system/monitor_process.h"
 
 namespace fdi::storage {
@@ -32,11 +32,11 @@ class PlantConsoleTest : public PlantFixture {
     if (IsSkipped()) {
       return;
     }
-    plant_ = std::make_unique<monitor::PairPlant>(domain_.Options(), kValves,
-                                                  kValves, milliseconds(100));
+    plant_ = std::make_unique<monitor::SharedPlant>(domain_.Options(), kValves,
+                                                    milliseconds(100));
     Init();
     for (const auto& [name, valves] : globs_) {
-      monitor::StorePairModels(Folder(name));
+      monitor::StoreLinearModels(Folder(name));
       StartMonitor(name);
     }
     StartConsole();
@@ -117,7 +117,7 @@ class PlantConsoleTest : public PlantFixture {
   const std::map<std::string, std::string> globs_{
       {"a", "V[01]"}, {"b", "V[23]"}, {"c", "V[45]"}};
   const idl::TestDomain domain_;
-  std::unique_ptr<monitor::PairPlant> plant_;
+  std::unique_ptr<monitor::SharedPlant> plant_;
   std::map<std::string, std::unique_ptr<ChildProcess>> monitors_;
   std::unique_ptr<ChildProcess> console_;
   std::unique_ptr<httplib::Client> client_;

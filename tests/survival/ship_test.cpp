@@ -218,25 +218,6 @@ TEST_F(ShipTest, WhatChangesIsShippedAgain) {
     follow("labelled");
     editor.Acknowledge(id, By("anna", kDetected, "Tell the shift"));
     follow("acknowledged with a comment");
-    OperatorAction action;
-    action.kind = OperatorActionKind::kLabel;
-    action.episode_id = Id();
-    action.value = "f1";
-    action.stamp_ns = kDetected + 2;
-    action.who = "carl";
-    action.origin = "test";
-    editor.Adopt(action);
-    follow("labelled at the other one of a pair");
-    action.kind = OperatorActionKind::kShelve;
-    action.valve_id = "V2";
-    action.until_ns = kDetected + 3600 * kSecond;
-    editor.Adopt(action);
-    follow("shelved there");
-    action.ended_ns = kDetected + kSecond;
-    action.ended_by = "carl";
-    action.ended_origin = "test";
-    editor.Adopt(action);
-    follow("taken off the shelf there");
     editor.Acknowledge(id, By("bert", kDetected + 1,
                               "Gr\xfc\xdf"
                               "e"));
@@ -821,9 +802,9 @@ TEST_F(ShipTest, AnEpisodeThatMovesEndsWhereItWas) {
   EXPECT_EQ(episodes[1].ended_ns, kDetected);
 }
 
-// Both of a pair have an episode and an hour: there is one in the work list,
-// and one alarm. The fuller hour counts.
-TEST_F(ShipTest, WhatAPairSawCountsOnce) {
+// Two monitors that take the same valve have an episode and an hour each: there
+// is one in the work list, and one alarm. The fuller hour counts.
+TEST_F(ShipTest, WhatTwoMonitorsSawCountsOnce) {
   Init();
   for (const char* monitor : {"a", "b"}) {
     HistoryWriter writer(Folder(monitor) / "history.db");
@@ -856,9 +837,9 @@ TEST_F(ShipTest, WhatAPairSawCountsOnce) {
   EXPECT_NE(reader.Version(), before);
 }
 
-// Both of a pair have each episode: the limit counts it once. Open episodes
-// come first.
-TEST_F(ShipTest, TheAlarmsOfAPairAreUpToTheLimit) {
+// Two monitors that take the same valves have each episode: the limit counts it
+// once. Open episodes come first.
+TEST_F(ShipTest, TheAlarmsOfTwoMonitorsAreUpToTheLimit) {
   Init();
   for (const char* monitor : {"a", "b"}) {
     HistoryWriter writer(Folder(monitor) / "history.db");
