@@ -26,7 +26,6 @@
 #include "diagnosis/loop/loop_watch.h"
 #include "diagnosis/records/partitions.h"
 #include "diagnosis/records/valve_glob.h"
-#include "idl/interface_watch.h"
 #include "idl/library_log.h"
 #include "monitor/bus/dds_options.h"
 #include "monitor/clock_watch.h"
@@ -463,6 +462,7 @@ void Service::Serve(report::StopSignals& signals) {
     const TimePoint now = Clock::now();
     service_pulse_.Beat();
     if (now >= next_tick) {
+      participant_.RequireInterfaces();
       Tick();
       next_tick = now + kTickPeriod;
     }
@@ -586,8 +586,7 @@ StatusFacts Service::Facts() const {
           pipeline_.history_degraded(),
           RecordingDegraded(),
           heartbeat_.StalledSince(Clock::now() - kStallLimit),
-          shares_.contested(),
-          idl::MissingInterfaces()};
+          shares_.contested()};
 }
 
 std::string Service::Metrics() const {

@@ -71,8 +71,9 @@ class Service {
   Service(const Service&) = delete;
   Service& operator=(const Service&) = delete;
 
-  /// Serves until a signal requests a stop or a thread fails, then stores and
-  /// publishes what was received and ends all threads in any case.
+  /// Serves until a signal requests a stop, a thread fails or an interface is
+  /// gone, then stores and publishes what was received and ends all threads in
+  /// any case.
   /// @returns the exit code. @throws the first error.
   int Run(report::StopSignals& signals);
 

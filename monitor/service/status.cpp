@@ -282,10 +282,6 @@ idl::MonitorStatusMessage StatusOf(const StatusFacts& facts) {
     status.text +=
         status.text.empty() ? "persistence degraded: runs" : ", runs";
   }
-  if (!facts.missing_interfaces.empty()) {
-    status.text += status.text.empty() ? "" : "; ";
-    status.text += "no interface has " + facts.missing_interfaces;
-  }
   if (facts.contested.count > 0) {
     status.text += status.text.empty() ? "" : "; ";
     status.text +=

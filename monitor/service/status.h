@@ -39,7 +39,6 @@ struct StatusFacts {
   bool recording_degraded{false};
   std::vector<std::string_view> stalled{};  ///< Names of threads.
   ContestedValves contested{};
-  std::string missing_interfaces{};  ///< Of DDS; see MissingInterfaces().
 };
 
 /// All counters and gauges, the counters first.
