@@ -46,7 +46,6 @@ FDI_LAST(State::kIsolated, v1::State::STATE_ISOLATED)
 FDI_LAST(TransitionKind::kClosed, v1::Transition::TRANSITION_CLOSED)
 FDI_LAST(EndReason::kUnknown, v1::EndReason::END_UNKNOWN)
 FDI_LAST(Health::kFailing, v1::Health::HEALTH_FAILING)
-FDI_LAST(OperatorActionKind::kShelve, v1::OperatorActionKind::ACTION_SHELVE)
 #undef FDI_LAST
 static_assert(static_cast<unsigned>(SignalQuality::kBad) ==
                   static_cast<unsigned>(v2::SignalQuality::SIGNAL_BAD) &&
@@ -363,18 +362,8 @@ void Fields(auto& t, Is<MonitorStatusMessage> auto& m, auto& w) {
   t.List("counters", m.counters, w.counters(), kMaxCounters);
 }
 
-void Fields(auto& t, Is<PairState> auto& m, auto& w) {
-  FDI_FOR_EACH(FDI_FIELD, pair, rank, instance, leads, leaving, judged,
-               received)
-}
-
 void Fields(auto& t, Is<MonitorShare> auto& m, auto& w) {
-  FDI_FOR_EACH(FDI_FIELD, pair, valves, partitions)
-}
-
-void Fields(auto& t, Is<OperatorAction> auto& m, auto& w) {
-  FDI_FOR_EACH(FDI_FIELD, kind, episode_id, valve_id, value, stamp_ns, who,
-               comment, origin, until_ns, ended_ns, ended_by, ended_origin)
+  FDI_FOR_EACH(FDI_FIELD, valves, partitions)
 }
 
 #undef FDI_FIELD
@@ -410,8 +399,6 @@ template struct Codec<DecisionBatchMessage>;
 template struct Codec<FaultEvent>;
 template struct Codec<ModelSetInfoMessage>;
 template struct Codec<MonitorStatusMessage>;
-template struct Codec<PairState>;
-template struct Codec<OperatorAction>;
 template struct Codec<MonitorShare>;
 
 }  // namespace fdi::idl

@@ -44,8 +44,6 @@ FDI_TOPIC(DecisionBatchMessage, DecisionBatch, 1)
 FDI_TOPIC(FaultEvent, FaultEvent, 1)
 FDI_TOPIC(ModelSetInfoMessage, ModelSetInfo, 1)
 FDI_TOPIC(MonitorStatusMessage, MonitorStatus, 1)
-FDI_TOPIC(PairState, PairState, 1)
-FDI_TOPIC(OperatorAction, OperatorAction, 1)
 FDI_TOPIC(MonitorShare, MonitorShare, 1)
 #undef FDI_TOPIC
 

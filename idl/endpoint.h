@@ -54,7 +54,7 @@ struct PublisherStatus {
 /// does not permit it, they go out on version 1 without PV, which is logged
 /// once. Readers count once.
 ///
-/// Message is one of the nine of wire.h; no others are instantiated.
+/// Message is one of the seven of wire.h; no others are instantiated.
 template <typename Message>
 class Publisher {
  public:
@@ -88,10 +88,6 @@ class Publisher {
   PublisherStatus status() const;
   /// PublisherStatus::matched, at the cost of one atomic load.
   int matched() const;
-  /// Readers matched since the start, including those that have left.
-  int total_matched() const;
-  /// Later readers do not get what was written before.
-  void ClearHistory();
 
  private:
   struct Impl;
@@ -203,8 +199,6 @@ extern template class Publisher<DecisionBatchMessage>;
 extern template class Publisher<FaultEvent>;
 extern template class Publisher<ModelSetInfoMessage>;
 extern template class Publisher<MonitorStatusMessage>;
-extern template class Publisher<PairState>;
-extern template class Publisher<OperatorAction>;
 extern template class Publisher<MonitorShare>;
 extern template class Subscriber<ValveSampleMessage>;
 extern template class Subscriber<DecisionMessage>;
@@ -212,8 +206,6 @@ extern template class Subscriber<DecisionBatchMessage>;
 extern template class Subscriber<FaultEvent>;
 extern template class Subscriber<ModelSetInfoMessage>;
 extern template class Subscriber<MonitorStatusMessage>;
-extern template class Subscriber<PairState>;
-extern template class Subscriber<OperatorAction>;
 extern template class Subscriber<MonitorShare>;
 
 }  // namespace fdi::idl

@@ -17,7 +17,7 @@
 #include "base/headroom.h"
 #include "base/passing_error.h"
 #include "base/time_units.h"
-#include "idl/interface_watch.h"
+#include "idl/interfaces.h"
 #include "idl/library_log.h"
 #include "idl/participant_impl.h"
 #include "idl/security/key_folder.h"
@@ -394,7 +394,7 @@ Participant::Impl::Impl(const DdsOptions& options, LogSink log,
       key_(CheckedKey(options.security, log_)) {
   SetUpLibraryOnce();
   if (options_.transport != "shm") {
-    interfaces_.emplace(options_.interfaces, log_);
+    interfaces_.emplace(options_.interfaces);
   }
   RequireDescriptors(kDescriptors);
   RequireHeadroom(kThreads, kHeadroomBytes);
@@ -411,7 +411,6 @@ Participant::Impl::Impl(const DdsOptions& options, LogSink log,
 }
 
 Participant::Impl::~Impl() {
-  interfaces_.reset();  // Before the sockets close: their numbers are reused.
   handle_->set_listener(nullptr);
   // A Participant outlives its endpoints, so only topics are left. They go
   // first: the library does not delete a participant that contains entities.
@@ -564,6 +563,10 @@ const DdsOptions& Participant::options() const {
 
 std::uint64_t Participant::refused_participants() const {
   return impl_->refused_participants();
+}
+
+void Participant::RequireInterfaces() const {
+  impl_->RequireInterfaces();
 }
 
 DatagramCounts Participant::datagrams() const {

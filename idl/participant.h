@@ -60,6 +60,10 @@ class Participant {
   /// Number of participants refused because they have no key of our authority;
   /// the first is logged.
   std::uint64_t refused_participants() const;
+  /// Call about once a second: looks whether the interfaces are still those of
+  /// the start. @throws PassingError if one is gone or was made anew, after
+  /// which this participant hears nothing there.
+  void RequireInterfaces() const;
 
   class Impl;
   Impl& impl() { return *impl_; }

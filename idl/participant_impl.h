@@ -18,7 +18,7 @@
 
 #include "base/mutex.h"
 #include "idl/fast_dds.h"
-#include "idl/interface_watch.h"
+#include "idl/interfaces.h"
 #include "idl/participant.h"
 #include "idl/profile_file.h"
 #include "idl/qos.h"
@@ -146,6 +146,11 @@ class Participant::Impl : private dds::DomainParticipantListener {
   const ProfileFile& profiles() const { return profiles_; }
   DatagramCounts datagrams() const { return datagrams_->counts(); }
   std::uint64_t refused_participants() const { return refused_; }
+  void RequireInterfaces() const {
+    if (interfaces_) {
+      interfaces_->Require();
+    }
+  }
 
  private:
   using RemoteKey = std::pair<std::string, bool>;  // Topic, is a writer.
@@ -186,7 +191,7 @@ class Participant::Impl : private dds::DomainParticipantListener {
   Mutex topics_mutex_;             // Separate: held during library calls.
   std::map<std::string, dds::Topic*> topics_ GUARDED_BY(topics_mutex_);
   dds::DomainParticipant* handle_{nullptr};
-  std::optional<InterfaceWatch> interfaces_;
+  std::optional<Interfaces> interfaces_;  // None: shared memory alone.
 };
 
 }  // namespace fdi::idl

@@ -164,13 +164,8 @@ struct TopicWriter : dds::DataWriterListener {
             incompatible.load(kOrder), readers()};
   }
   int readers() const { return matched.count(); }
+  // Since the start, including those that have left.
   int total_readers() const { return total_matched.load(); }
-
-  void ClearHistory() {
-    const MutexLock lock(mutex);
-    std::size_t removed = 0;
-    writer->clear_history(&removed);
-  }
 
   // The instance of `message`, which is already encoded in `wire`; nullptr
   // beyond the limit.
@@ -364,14 +359,6 @@ class SampleWriter {
   int readers() const {
     return std::max(first_.readers(), second_ ? second_->readers() : 0);
   }
-  int total_readers() const {
-    return std::max(first_.total_readers(),
-                    second_ ? second_->total_readers() : 0);
-  }
-
-  void ClearHistory() {
-    ForEach([](auto& writer) { writer.ClearHistory(); });
-  }
 
  private:
   using milliseconds = std::chrono::milliseconds;
@@ -501,24 +488,12 @@ int Publisher<Message>::matched() const {
   return impl_->readers();
 }
 
-template <typename Message>
-int Publisher<Message>::total_matched() const {
-  return impl_->total_readers();
-}
-
-template <typename Message>
-void Publisher<Message>::ClearHistory() {
-  impl_->ClearHistory();
-}
-
 template class Publisher<ValveSampleMessage>;
 template class Publisher<DecisionMessage>;
 template class Publisher<DecisionBatchMessage>;
 template class Publisher<FaultEvent>;
 template class Publisher<ModelSetInfoMessage>;
 template class Publisher<MonitorStatusMessage>;
-template class Publisher<PairState>;
-template class Publisher<OperatorAction>;
 template class Publisher<MonitorShare>;
 
 }  // namespace fdi::idl

@@ -21,7 +21,6 @@ constexpr int kSamplesInDatagram = 1024;
 // Samples of all valves that a live writer keeps for retransmission.
 constexpr int kLiveHistory = 32768;
 constexpr int kBatchesInFlight = 64;  // Up to 48 kB each.
-constexpr int kActionsInFlight = 64;
 constexpr int kModelSets = 256;
 constexpr int kMonitors = 64;
 
@@ -255,25 +254,11 @@ EndpointQos QosFor<MonitorStatusMessage>(Profile /*profile*/, int /*valves*/) {
   return qos;
 }
 
-// Only the newest state matters.
-template <>
-EndpointQos QosFor<PairState>(Profile /*profile*/, int /*valves*/) {
-  EndpointQos qos = Common("fdi_pair_state");
-  SetKeepLast(qos, kMonitors, 1, 1);
-  return qos;
-}
-
+// Only the newest share matters.
 template <>
 EndpointQos QosFor<MonitorShare>(Profile /*profile*/, int /*valves*/) {
   EndpointQos qos = Common("fdi_monitor_share");
   SetKeepLast(qos, kMonitors, 1, 1);
-  return qos;
-}
-
-template <>
-EndpointQos QosFor<OperatorAction>(Profile /*profile*/, int /*valves*/) {
-  EndpointQos qos = Common("fdi_operator_action");
-  SetKeepAll(qos, kActionsInFlight);
   return qos;
 }
 
@@ -286,8 +271,6 @@ const std::set<std::string>& EndpointNames() {
                                            "fdi_fault_event",
                                            "fdi_model_set_info",
                                            "fdi_monitor_status",
-                                           "fdi_pair_state",
-                                           "fdi_operator_action",
                                            "fdi_monitor_share"};
   return names;
 }

@@ -37,11 +37,7 @@ EndpointQos QosFor<ModelSetInfoMessage>(Profile profile, int valves);
 template <>
 EndpointQos QosFor<MonitorStatusMessage>(Profile profile, int valves);
 template <>
-EndpointQos QosFor<PairState>(Profile profile, int valves);
-template <>
 EndpointQos QosFor<MonitorShare>(Profile profile, int valves);
-template <>
-EndpointQos QosFor<OperatorAction>(Profile profile, int valves);
 
 /// EndpointQos::name of every topic and profile.
 const std::set<std::string>& EndpointNames();

@@ -565,8 +565,6 @@ template class Subscriber<DecisionBatchMessage>;
 template class Subscriber<FaultEvent>;
 template class Subscriber<ModelSetInfoMessage>;
 template class Subscriber<MonitorStatusMessage>;
-template class Subscriber<PairState>;
-template class Subscriber<OperatorAction>;
 template class Subscriber<MonitorShare>;
 
 }  // namespace fdi::idl

@@ -12,8 +12,6 @@
 #include "diagnosis/model/verdict.h"
 #include "diagnosis/records/fault_event.h"
 #include "diagnosis/records/monitor_share.h"
-#include "diagnosis/records/operator_action.h"
-#include "diagnosis/records/pair_state.h"
 
 /// The messages on the wire as plain structs, one per topic.
 /// Doubles are transmitted bit for bit, including NaN.

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <cstddef>
 #include <functional>
 #include <string>
 #include <utility>
@@ -29,16 +28,18 @@ class AfterCommit : public EventSink {
   }
   /// A step whose result, and error, is that of Publish().
   void Add(EventSink& sink) { steps_.push_back({"", {}, &sink}); }
-  /// Publish() ends with `gate`, which passes what it lets through to beyond(),
-  /// now or later: the steps added after it.
-  void AddGate(EventSink& gate) {
-    Add(gate);
-    gate_ = steps_.size();
-  }
-  EventSink& beyond() { return beyond_; }
 
   bool Publish(const FaultEvent& event, bool persisted) override {
-    return Run(0, gate_ == 0 ? steps_.size() : gate_, event, persisted);
+    bool sent = true;
+    for (const Step& step : steps_) {
+      if (step.sink != nullptr) {
+        sent = step.sink->Publish(event, persisted) && sent;
+      } else {
+        Guarded(counters_, log_, step.name,
+                [&] { step.tell(event, persisted); });
+      }
+    }
+    return sent;
   }
 
  private:
@@ -47,33 +48,10 @@ class AfterCommit : public EventSink {
     Tell tell;
     EventSink* sink;  // Instead of `tell`.
   };
-  struct Beyond : EventSink {
-    explicit Beyond(AfterCommit& all) : list(all) {}
-    bool Publish(const FaultEvent& event, bool persisted) override {
-      return list.Run(list.gate_, list.steps_.size(), event, persisted);
-    }
-    AfterCommit& list;
-  };
-
-  bool Run(std::size_t from, std::size_t to, const FaultEvent& event,
-           bool persisted) {
-    bool sent = true;
-    for (std::size_t i = from; i < to; ++i) {
-      if (steps_[i].sink != nullptr) {
-        sent = steps_[i].sink->Publish(event, persisted) && sent;
-      } else {
-        Guarded(counters_, log_, steps_[i].name,
-                [&] { steps_[i].tell(event, persisted); });
-      }
-    }
-    return sent;
-  }
 
   Counters& counters_;
   ThrottledLog& log_;
   std::vector<Step> steps_;
-  std::size_t gate_{0};  // Steps up to the gate; 0: there is none.
-  Beyond beyond_{*this};
 };
 
 }  // namespace fdi::monitor

@@ -8,7 +8,6 @@
 
 #include "diagnosis/model/model_set.h"
 #include "diagnosis/model/verdict.h"
-#include "diagnosis/records/ended_episode.h"
 #include "diagnosis/records/episode_look.h"
 #include "diagnosis/records/fault_event.h"
 #include "diagnosis/records/service_records.h"
@@ -48,30 +47,12 @@ class EpisodeOutlet {
 /// if the same source goes on and is detected abnormal again within the first
 /// minute (or twice the settling time, if that is longer); else it is closed
 /// with `unknown`. What it is called, EpisodeName says.
-///
-/// Of a pair of monitors the leader's word is the record of both, because two
-/// of them may detect a fault at different samples. The standby takes over the
-/// ids and ends of the leader's episodes and keeps what it finds itself: it
-/// tells that when it leads, or of an episode that the leader has not found
-/// within the time above. If both have told of one, the leader's stays and the
-/// other is closed as superseded, dated with the later one of the detections.
 class EpisodeTracker {
  public:
   EpisodeTracker(std::string valve_id, const TraceOptions& options);
 
-  /// Before the first Step(). What has ended is never resumed.
-  void Recover(const OpenEpisode& episode);
-  void Recover(const EndedEpisode& episode) { ended_ = episode; }
-
-  /// Whether the other monitor of a pair has the word.
-  /// @returns the name, by its word, of the open episode that this monitor
-  ///   tells of from now on; nothing if it takes over none.
-  std::optional<FaultSet> StandBy(bool standby, EpisodeOutlet& outlet);
-
-  /// Takes what the other monitor of a pair has published of this valve: its
-  /// open episode goes on here under the same id, or has ended. A repeat
-  /// changes nothing. @returns whether that names the open episode.
-  bool Adopt(const FaultEvent& event, EpisodeOutlet& outlet);
+  /// An earlier session left `episode` open. Before the first Step().
+  void Recover(const OpenEpisode& episode) { recovered_ = episode; }
 
   /// The next sample and what the engine with `models` said about it: the gap
   /// before it, and whether recovering() may still go on. Comes before the
@@ -108,28 +89,23 @@ class EpisodeTracker {
   /// Hands over evidence that is not written yet; for an orderly stop.
   void Flush(EpisodeOutlet& outlet);
 
-  /// What is to be resumed, or open by the word of the leader; null: nothing.
+  /// The episode that is to be resumed; null: none is.
   const OpenEpisode* recovering() const {
     return recovered_ ? &*recovered_ : nullptr;
   }
-  /// What a detection of this source with these models resumes; likewise.
+  /// The episode that a detection of this source with these models resumes;
+  /// null: it begins a new one.
   const OpenEpisode* Resumable(std::uint64_t source_id,
                                const ModelSet& models) const;
-  /// The leader has ended the episode long ago, and here it goes on.
-  bool Outlasts() const {
-    return open_ && IsOver(open_->episode) &&
-           accepted_stamp_ns_ - ended_.ended_ns > window_ns_;
-  }
   std::size_t trace_bytes() const { return trace_.bytes(); }
   /// The instants are evidence of an open episode.
   bool tracing() const { return open_ && open_->tracing; }
 
  private:
-  enum class Teller : std::uint8_t { kNobody, kWe, kLeader };
-
   struct Open {
-    OpenEpisode episode;  // As told last; detected as recorded.
-    Teller teller{Teller::kWe};
+    std::uint64_t episode_id{0};
+    std::uint64_t source_id{0};
+    std::int64_t detection_stamp_ns{0};  // As recorded.
     std::int64_t trace_until_ns{0};
     bool tracing{true};
     FaultSet faults{0};  // Its name.
@@ -144,26 +120,12 @@ class EpisodeTracker {
                       EpisodeOutlet& outlet);
   FaultEvent EndOf(const OpenEpisode& episode, EndReason reason,
                    std::int64_t stamp_ns) const;
-  void Supersede(const OpenEpisode& episode, std::int64_t other_detection_ns,
-                 EpisodeOutlet& outlet);
-  void Follow(const OpenEpisode& said, EpisodeOutlet& outlet);
-  void Tell(FaultEvent event, EpisodeOutlet& outlet);
-  void TellAll(std::vector<FaultEvent>& events, EpisodeOutlet& outlet);
-  void TellIfAlone(std::int64_t stamp_ns, EpisodeOutlet& outlet);
-  bool IsOver(const OpenEpisode& episode) const {
-    return episode.episode_id == ended_.episode_id;
-  }
-  bool IsOver(const FaultEvent& event) const;
-  // The history knows it.
-  bool IsRecorded() const { return open_ && open_->teller != Teller::kNobody; }
-  bool WaitsForLeader() const { return standby_ && by_leader_; }
   void Take(const Transition& transition, const Verdict& verdict,
             const std::shared_ptr<const ModelSet>& models,
             EpisodeOutlet& outlet);
   // @returns whether it resumes an episode.
   bool Begin(const Transition& transition, const Verdict& verdict,
              const ModelSet& models, EpisodeOutlet& outlet);
-  void FollowName(const Verdict& verdict, const ModelSet& models);
   void FollowUnknown(const Verdict& verdict, const ModelSet& models);
   void Emit(Transition transition,
             const std::shared_ptr<const ModelSet>& models,
@@ -174,15 +136,7 @@ class EpisodeTracker {
   TraceOptions options_;
   Trace trace_;
   std::optional<Open> open_;
-  // Left by an earlier session, or open by the word of the leader; on a standby
-  // also while it is open here.
-  std::optional<OpenEpisode> recovered_;
-  bool by_leader_{false};  // recovered_ is open by the word of the leader.
-  EndedEpisode ended_;     // The last one, by whomever.
-  bool standby_{false};
-  std::vector<FaultEvent> untold_;  // Of the last episode here.
-  std::vector<FaultEvent> ends_;    // Of the leader's episodes.
-  std::int64_t window_ns_{0};       // For what goes on after a restart.
+  std::optional<OpenEpisode> recovered_;  // Left by an earlier session.
   bool seen_{false};
   bool rejected_since_{false};
   std::int64_t first_stamp_ns_{0};

@@ -34,9 +34,6 @@ constexpr std::array<LogId, kIntakeCount> kRejectionIds{
     LogId::kUnit,
     LogId::kPeriod};
 
-// Without a slot, of which something is remembered, unless more are open.
-constexpr std::size_t kMaxKnownValves = 10'000;
-
 // "F|T1"
 std::string SignalNames(SignalMask signals) {
   std::string names;
@@ -111,8 +108,7 @@ void Pipeline::Tell(Call call) {
 }
 
 void Pipeline::Start(const std::vector<OpenEpisode>& open,
-                     std::vector<Accumulator> accumulators,
-                     const std::vector<EndedEpisode>& ended) {
+                     std::vector<Accumulator> accumulators) {
   // All reservations come before the first sample, so that unknown ids cannot
   // take the slots of known valves.
   for (const std::string& id : resolver_->AssignedValves()) {
@@ -126,9 +122,6 @@ void Pipeline::Start(const std::vector<OpenEpisode>& open,
     accumulators_[accumulator.valve_id] = std::move(accumulator);
   }
   last_poll_ = last_checkpoint_ = std::chrono::steady_clock::now();
-  for (const EndedEpisode& episode : ended) {
-    Recovered(episode.valve_id).Recover(episode);
-  }
   Recover(open);
   started_ = true;
   journal_.Start();
@@ -140,25 +133,13 @@ void Pipeline::Start(const std::vector<OpenEpisode>& open,
   }
 }
 
-EpisodeTracker& Pipeline::Recovered(const std::string& valve_id) {
-  // What has ended is remembered against repeats of the other of a pair.
-  if (recovered_.size() >= kMaxKnownValves) {
-    std::erase_if(recovered_, [](const auto& known) {
-      return known.second.recovering() == nullptr;
-    });
-  }
-  const auto [found, fresh] =
-      recovered_.try_emplace(valve_id, valve_id, options_.trace);
-  if (fresh) {
-    found->second.StandBy(standby_, journal_);
-  }
-  return found->second;
-}
-
 // A valve has at most one open episode; the older of two is closed.
 void Pipeline::Recover(const std::vector<OpenEpisode>& episodes) {
   for (const OpenEpisode& episode : episodes) {
-    EpisodeTracker& tracker = Recovered(episode.valve_id);
+    EpisodeTracker& tracker =
+        recovered_
+            .try_emplace(episode.valve_id, episode.valve_id, options_.trace)
+            .first->second;
     OpenEpisode newer = episode;
     if (const OpenEpisode* known = tracker.recovering()) {
       OpenEpisode older = *known;
@@ -171,7 +152,7 @@ void Pipeline::Recover(const std::vector<OpenEpisode>& episodes) {
     tracker.Recover(newer);
   }
   if (!episodes.empty()) {
-    AwaitRecovery();
+    recovery_deadline_ = last_poll_ + options_.recovery_window;
   }
 }
 
@@ -323,7 +304,6 @@ Pipeline::Valve& Pipeline::AddValve(std::string_view valve_id) {
                          options_.severities, audits_.get()),
             reserved_.erase(id) > 0});
   valve->monitor.HoldIsolation(resolver_->IsolationHeld(id));
-  valve->monitor.StandBy(standby_, journal_);
   if (auto known = recovered_.extract(id)) {
     valve->monitor.Recover(std::move(known.mapped()));
   }
@@ -405,53 +385,6 @@ void Pipeline::OnStreamEnded(std::string_view valve_id, std::uint64_t writer) {
   Tell([&](ValveListener& each) {
     each.OnSilence(valve->monitor.id(), Silence::kEnded);
   });
-}
-
-void Pipeline::Adopt(FaultEvent event) {
-  std::optional<EngineParts> parts;
-  Resolve(event.valve_id, parts);
-  // The faults of an event are bits of its model set. With another set here
-  // they would mean other faults, but an end is an end.
-  if (parts && parts->plan->models().content_hash == event.model_hash) {
-    event.models = parts->plan->shared_models();
-  } else if (auto audit = AuditModels(event.model_hash)) {
-    event.models = std::move(audit);
-  } else if (event.transition.kind != TransitionKind::kClosed) {
-    log_.Line(LogLevel::kInfo,
-              "event_not_adopted valve=" + LogValue(event.valve_id) +
-                  " model_set=" + LogValue(event.model_set) + "@" +
-                  std::to_string(event.model_version));
-    return;
-  }
-  // Severities are not on the bus.
-  event.transition.severity = SeverityOf(event, *options_.severities);
-  journal_.OnEvent(event);
-  if (const auto found = by_id_.find(event.valve_id); found != by_id_.end()) {
-    found->second->monitor.Adopt(event, journal_);
-    return;
-  }
-  // Nothing of this valve was received here yet. Its episode is treated like
-  // one that the last session left open: its first samples continue it, or the
-  // recovery window closes it.
-  EpisodeTracker& tracker = Recovered(event.valve_id);
-  tracker.Adopt(event, journal_);
-  if (tracker.recovering() != nullptr) {
-    AwaitRecovery();
-    Reserve(event.valve_id);
-  }
-}
-
-void Pipeline::StandBy(bool standby) {
-  if (std::exchange(standby_, standby) == standby) {
-    return;
-  }
-  for (const std::unique_ptr<Valve>& valve : valves_) {
-    valve->monitor.StandBy(standby, journal_);
-  }
-  for (auto& [id, tracker] : recovered_) {
-    tracker.StandBy(standby, journal_);
-  }
-  AwaitRecovery();
 }
 
 void Pipeline::Count(Valve& valve, const Sample& sample,
@@ -562,12 +495,6 @@ void Pipeline::CheckSilentValves(TimePoint now) {
   UpdateCensus();
 }
 
-// A standby waits for longer than its leader, whose ends are those of both.
-void Pipeline::AwaitRecovery() {
-  recovery_deadline_ =
-      last_poll_ + (standby_ ? 2 : 1) * options_.recovery_window;
-}
-
 void Pipeline::ExpireRecovery() {
   const std::int64_t now_ns = context_.utc_now_ns();
   for (const std::unique_ptr<Valve>& valve : valves_) {
@@ -588,11 +515,6 @@ void Pipeline::UpdateCensus() {
     census.ended += monitor.ended() ? 1 : 0;
     census.open_episodes += monitor.episode_open() ? 1 : 0;
     census.trace_bytes += monitor.trace_bytes();
-    census.judged += monitor.models() != nullptr && monitor.seen() &&
-                             !monitor.stale() && !monitor.ended() &&
-                             monitor.verdict().quality != Quality::kSettling
-                         ? 1
-                         : 0;
   }
   // Counted without the lock: readers wait for the copy, not for all valves.
   const MutexLock lock(mutex_);

@@ -12,7 +12,6 @@
 #include <vector>
 
 #include "base/mutex.h"
-#include "diagnosis/records/ended_episode.h"
 #include "monitor/counters.h"
 #include "monitor/heartbeat.h"
 #include "monitor/journal.h"
@@ -65,7 +64,6 @@ struct ValveCensus {
   std::uint64_t ended{0};
   std::uint64_t open_episodes{0};
   std::uint64_t trace_bytes{0};
-  std::uint64_t judged{0};  ///< Not silent, with a model set, and settled.
 };
 
 /// From samples to decisions, events and records. The thread that takes samples
@@ -101,11 +99,8 @@ class Pipeline {
 
   /// @param open episodes that the last session left open.
   /// @param accumulators of the valves, from the last checkpoint.
-  /// @param ended the last one of each valve: what the other monitor of a pair
-  ///   repeats of it or earlier ones is over.
   void Start(const std::vector<OpenEpisode>& open,
-             std::vector<Accumulator> accumulators = {},
-             const std::vector<EndedEpisode>& ended = {});
+             std::vector<Accumulator> accumulators = {});
 
   /// Reports that `event`, of an earlier session, was published. Before
   /// Start().
@@ -115,11 +110,6 @@ class Pipeline {
   void OnSample(std::string_view valve_id, const Sample& sample,
                 std::uint64_t writer,
                 TimePoint received = std::chrono::steady_clock::now());
-  /// Whether the other monitor of a pair has the word; see EpisodeTracker.
-  void StandBy(bool standby);
-  /// The other monitor of a pair published `event`: records it and, if its
-  /// episode is open, continues that here.
-  void Adopt(FaultEvent event);
   /// The writer ended the stream of the valve.
   void OnStreamEnded(std::string_view valve_id, std::uint64_t writer);
 
@@ -183,10 +173,8 @@ class Pipeline {
   void Count(Valve& valve, const Sample& sample, const ValveOutcome& outcome);
   void Publish(const Valve& valve, const ValveOutcome& outcome);
   void Recover(const std::vector<OpenEpisode>& episodes);
-  EpisodeTracker& Recovered(const std::string& valve_id);
   void AdoptNextResolver();
   void CheckSilentValves(TimePoint now);
-  void AwaitRecovery();
   void ExpireRecovery();
   void UpdateCensus();
   void PublishLast();
@@ -215,7 +203,6 @@ class Pipeline {
   std::unordered_set<std::size_t> refused_;  // Hashes of ids.
   // What is known of the episodes of valves without a slot.
   std::unordered_map<std::string, EpisodeTracker> recovered_;
-  bool standby_{false};
   std::unordered_map<std::string, Accumulator> accumulators_;
   std::optional<TimePoint> recovery_deadline_;  // Empty: none is left.
 

@@ -43,9 +43,7 @@ enum class LogId : std::uint8_t {
   kRecordFailed = 132,   ///< record_failed
   kTransport = 141,      ///< transport_loss
   kStalled = 151,        ///< threads_stalled
-  kPairTwin = 152,       ///< pair_rank_taken
-  kOperatorSync = 153,   ///< operator_action_waits, operator_action_refused
-  kContested = 154,      ///< valves_contested, outside a pair
+  kContested = 154,      ///< valves_contested
   kPartFailed = 155,     ///< part_failed
   kLookDropped = 161,    ///< second_look_dropped
   kLookFailed = 162,     ///< second_look_failed

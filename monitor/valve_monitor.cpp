@@ -62,22 +62,6 @@ void ValveMonitor::NameEpisodes() {
                    : nullptr;
 }
 
-// The name by the word of the leader is one more input of the name.
-void ValveMonitor::StandBy(bool standby, EpisodeOutlet& outlet) {
-  const std::optional<FaultSet> announced = tracker_.StandBy(standby, outlet);
-  if (announced && names_ && !judge_.watch().episode_open()) {
-    names_->SetAnnounced(*announced);
-  }
-}
-
-void ValveMonitor::Adopt(const FaultEvent& event, EpisodeOutlet& outlet) {
-  if (tracker_.Adopt(event, outlet) && names_ &&
-      event.model_hash == models_->content_hash) {
-    const OpenEpisode episode = OpenEpisodeOf(event);
-    names_->Inherit(&episode);
-  }
-}
-
 bool ValveMonitor::RestartsEngine(const Sample& sample) const {
   const std::int64_t moved = sample.stamp_ns - stamp_ns_;
   const std::int64_t longest =
@@ -123,9 +107,6 @@ ValveOutcome ValveMonitor::Step(const Sample& sample, std::uint64_t writer,
     return StepLoop(sample, writer, swapped, outlet);
   }
   RestoreOnce(sample.source_id);
-  if (tracker_.Outlasts()) {
-    Close(EndReason::kUnknown, outlet);
-  }
   const bool was_open = engine_->episode_open();
   const Verdict& engine = engine_->Step(sample);
   tracker_.Advance(sample, engine, *models_, outlet);

@@ -45,10 +45,6 @@ class ValveMonitor {
   /// The same. @param tracker knows earlier episodes of the valve.
   void Recover(EpisodeTracker tracker);
 
-  /// See EpisodeTracker.
-  void StandBy(bool standby, EpisodeOutlet& outlet);
-  void Adopt(const FaultEvent& event, EpisodeOutlet& outlet);
-
   /// The accumulators from the last checkpoint of an earlier session; used if
   /// the first sample comes from the same source. Before the first Step().
   void Resume(Accumulator accumulator) { saved_ = std::move(accumulator); }
@@ -119,7 +115,7 @@ class ValveMonitor {
     return (engine_ && engine_->episode_open()) ||
            judge_.watch().episode_open();
   }
-  /// An episode of an earlier session or another monitor may go on here.
+  /// An episode of an earlier session may go on here.
   bool recovering() const { return tracker_.recovering() != nullptr; }
   std::size_t trace_bytes() const { return tracker_.trace_bytes(); }
 

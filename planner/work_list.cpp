@@ -221,7 +221,7 @@ std::vector<Episode> EpisodesOf(storage::History& history,
   for (Episode& episode : history.List(filter)) {
     episodes.push_back(std::move(episode));
   }
-  // The plant history has each episode of a pair twice.
+  // The plant history has an episode that moved with its valve twice.
   std::set<std::string> seen;
   std::erase_if(episodes, [&seen](const Episode& episode) {
     return !seen.insert(episode.episode_id).second;

@@ -444,8 +444,8 @@ std::vector<CoverageTime> PlantReader::Coverage(const EpisodeFilter& filter) {
 
 std::vector<Alarm> PlantReader::AlarmList(std::int64_t now_ns,
                                           std::int64_t limit) {
-  // Both of a pair have an episode, so `limit` of them may take twice as many
-  // rows.
+  // An episode that moved with its valve has a row of both monitors, so `limit`
+  // episodes may take twice as many rows.
   EpisodeFilter filter;
   filter.limit = 2 * limit;
   std::vector<Episode> episodes;

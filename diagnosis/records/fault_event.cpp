@@ -44,25 +44,4 @@ Severity SeverityOf(const FaultEvent& event,
   return gravest.value_or(at(0, 0.0));
 }
 
-OpenEpisode OpenEpisodeOf(const FaultEvent& event) {
-  const Transition& transition = event.transition;
-  OpenEpisode episode;
-  episode.valve_id = event.valve_id;
-  episode.source_id = event.source_id;
-  episode.episode_id = event.episode_id;
-  episode.detection_stamp_ns = transition.detection_stamp_ns;
-  episode.last_stamp_ns = transition.stamp_ns;
-  episode.faults = transition.faults;
-  std::ranges::copy_if(event.candidates, std::back_inserter(episode.candidates),
-                       &FaultCandidate::isolated);
-  episode.isolated = transition.faults != 0;
-  episode.layer = transition.layer;
-  episode.severity = transition.severity;
-  episode.second = transition.second;
-  episode.model_set = event.model_set;
-  episode.model_version = event.model_version;
-  episode.model_hash = event.model_hash;
-  return episode;
-}
-
 }  // namespace fdi

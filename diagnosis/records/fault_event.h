@@ -87,7 +87,4 @@ struct OpenEpisode {
   std::uint64_t model_hash{0};
 };
 
-/// The episode after `event`, which must not close it.
-OpenEpisode OpenEpisodeOf(const FaultEvent& event);
-
 }  // namespace fdi

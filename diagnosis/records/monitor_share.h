@@ -4,11 +4,10 @@
 
 namespace fdi {
 
-/// Which valves a monitor takes, as published on the topic MonitorShare. Of
-/// monitors that do not form a pair, at most one should take a valve.
+/// Which valves a monitor takes, as published on the topic MonitorShare. At
+/// most one monitor should take a valve.
 struct MonitorShare {
   std::string monitor;     ///< Unique name of the process, e.g. host:pid.
-  std::string pair;        ///< As in --pair; empty: not in a pair.
   std::string valves;      ///< Glob of ids.
   std::string partitions;  ///< Where it takes samples, as in --partition.
 };

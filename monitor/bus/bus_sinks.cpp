@@ -33,10 +33,8 @@ std::string IsolatedNames(const FaultEvent& message) {
 
 BusDecisionSink::BusDecisionSink(idl::Participant& participant,
                                  const std::string& batches_of,
-                                 std::stop_token stop,
-                                 const std::vector<std::string>& partitions)
-    : live_(participant, {idl::Profile::kLive, 0, partitions, true}),
-      stop_(std::move(stop)) {
+                                 std::stop_token stop)
+    : live_(participant, {.replaces = true}), stop_(std::move(stop)) {
   if (!batches_of.empty()) {
     batches_.emplace(participant,
                      idl::PublisherOptions{idl::Profile::kLossless, 0});
@@ -45,17 +43,16 @@ BusDecisionSink::BusDecisionSink(idl::Participant& participant,
 }
 
 void BusDecisionSink::Fill(const std::string& valve_id, const ModelSet* models,
-                           const Verdict& verdict,
-                           idl::DecisionMessage& message) {
-  message.valve_id = valve_id;
-  message.model_hash = models != nullptr ? models->content_hash : 0;
-  message.channel_count =
+                           const Verdict& verdict) {
+  message_.valve_id = valve_id;
+  message_.model_hash = models != nullptr ? models->content_hash : 0;
+  message_.channel_count =
       models != nullptr ? static_cast<int>(models->channels.size()) : 0;
-  message.fault_count =
+  message_.fault_count =
       models != nullptr ? static_cast<int>(models->faults.size()) : 0;
-  message.observer_count =
+  message_.observer_count =
       models != nullptr ? static_cast<int>(models->observers.size()) : 0;
-  message.verdict = verdict;
+  message_.verdict = verdict;
 }
 
 // While nobody reads, vectors are not even filled in. Whoever comes then gets
@@ -71,15 +68,11 @@ bool BusDecisionSink::Publish(const std::string& valve_id,
   if (!ToLive() && !ToBatches()) {
     return true;
   }
-  Fill(valve_id, models, verdict, message_);
-  return Send(message_);
-}
-
-bool BusDecisionSink::Send(const idl::DecisionMessage& message) {
+  Fill(valve_id, models, verdict);
   if (ToBatches()) {
-    AddToBatch(message);
+    AddToBatch(message_);
   }
-  return !ToLive() || live_.Write(message) == idl::WriteResult::kSent;
+  return !ToLive() || live_.Write(message_) == idl::WriteResult::kSent;
 }
 
 void BusDecisionSink::AddToBatch(const idl::DecisionMessage& message) {
@@ -120,7 +113,7 @@ bool BusDecisionSink::LastValuesDue() {
 void BusDecisionSink::PublishLast(const std::string& valve_id,
                                   const ModelSet* models,
                                   const Verdict& verdict) {
-  Fill(valve_id, models, verdict, message_);
+  Fill(valve_id, models, verdict);
   live_.Write(message_);
 }
 
@@ -146,20 +139,14 @@ idl::PublisherStatus BusDecisionSink::status() const {
   return status;
 }
 
-BusEventSink::BusEventSink(idl::Participant& participant, LogSink log,
-                           const std::vector<std::string>& partitions)
-    : publisher_(participant, {idl::Profile::kLive, 0, partitions, true}),
-      log_(std::move(log)) {}
-
-bool BusEventSink::Publish(const FaultEvent& event, bool persisted) {
-  FaultEvent message = event;
-  message.persisted = persisted;
-  return Send(message);
-}
+BusEventSink::BusEventSink(idl::Participant& participant, LogSink log)
+    : publisher_(participant, {.replaces = true}), log_(std::move(log)) {}
 
 // The log names the transition itself. On the bus a kind that its type does not
 // know goes by an older one (OnTheBus).
-bool BusEventSink::Send(const FaultEvent& message) {
+bool BusEventSink::Publish(const FaultEvent& event, bool persisted) {
+  FaultEvent message = event;
+  message.persisted = persisted;
   if (log_) {
     const Transition& transition = message.transition;
     log_(
@@ -172,9 +159,8 @@ bool BusEventSink::Send(const FaultEvent& message) {
                    {"episode", storage::EpisodeIdText(message.episode_id)},
                    {"persisted", message.persisted ? "true" : "false"}}));
   }
-  FaultEvent sent = message;
-  sent.transition.kind = OnTheBus(sent.transition.kind);
-  return publisher_.Write(sent) == idl::WriteResult::kSent;
+  message.transition.kind = OnTheBus(message.transition.kind);
+  return publisher_.Write(message) == idl::WriteResult::kSent;
 }
 
 }  // namespace fdi::monitor

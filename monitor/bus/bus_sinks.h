@@ -20,11 +20,8 @@ namespace fdi::monitor {
 class BusDecisionSink : public DecisionSink {
  public:
   /// @param batches_of monitor name in the batches; empty: no batches.
-  /// @param partitions where subscribers and a standby monitor read; empty: the
-  ///   default partition.
   BusDecisionSink(idl::Participant& participant, const std::string& batches_of,
-                  std::stop_token stop,
-                  const std::vector<std::string>& partitions = {});
+                  std::stop_token stop);
 
   bool Publish(const std::string& valve_id, const ModelSet* models,
                const Verdict& verdict) override;
@@ -34,16 +31,6 @@ class BusDecisionSink : public DecisionSink {
                    const Verdict& verdict) override;
   void Remove(const std::string& valve_id) override;
 
-  /// Fills the message that Publish() sends.
-  static void Fill(const std::string& valve_id, const ModelSet* models,
-                   const Verdict& verdict, idl::DecisionMessage& message);
-  /// Publishes a message that Fill() has prepared.
-  bool Send(const idl::DecisionMessage& message);
-  /// Drops the last-value cache: later subscribers get nothing sent before.
-  void ClearHistory() { live_.ClearHistory(); }
-  /// Subscribers matched so far; see idl::Publisher.
-  int total_matched() const { return live_.total_matched(); }
-
   /// Waits until all subscribers have acknowledged what was published.
   bool WaitForAcknowledged(std::chrono::milliseconds timeout);
   /// Combined status of both streams; `written` excludes batches.
@@ -52,6 +39,8 @@ class BusDecisionSink : public DecisionSink {
  private:
   bool ToLive();
   bool ToBatches() const { return batches_ && batches_->matched() > 0; }
+  void Fill(const std::string& valve_id, const ModelSet* models,
+            const Verdict& verdict);
   void AddToBatch(const idl::DecisionMessage& message);
   void SendBatch();
 
@@ -68,23 +57,15 @@ class BusDecisionSink : public DecisionSink {
 /// Publishes fault events over DDS, and logs one line for each.
 class BusEventSink : public EventSink {
  public:
-  /// @param partitions as in BusDecisionSink.
-  BusEventSink(idl::Participant& participant, LogSink log,
-               const std::vector<std::string>& partitions = {});
+  BusEventSink(idl::Participant& participant, LogSink log);
 
   bool Publish(const FaultEvent& event, bool persisted) override;
-  /// Republishes `event`, first published by another monitor, for new
-  /// subscribers.
-  void Repeat(const FaultEvent& event) { publisher_.Write(event); }
-  int total_matched() const { return publisher_.total_matched(); }
 
   bool WaitForAcknowledged(std::chrono::milliseconds timeout) {
     return publisher_.WaitForAcknowledged(timeout);
   }
 
  private:
-  bool Send(const FaultEvent& message);
-
   idl::Publisher<FaultEvent> publisher_;
   LogSink log_;
 };

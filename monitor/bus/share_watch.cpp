@@ -33,8 +33,7 @@ bool Overlap(const std::string& a, const std::string& b) {
 }
 
 bool AreCompetitors(const MonitorShare& own, const MonitorShare& other) {
-  const bool stands_in = !own.pair.empty() && other.pair == own.pair;
-  return other.monitor != own.monitor && !stands_in &&
+  return other.monitor != own.monitor &&
          Overlap(own.partitions, other.partitions);
 }
 

@@ -13,7 +13,7 @@
 
 namespace fdi::monitor {
 
-/// Valves that are also taken by a monitor outside our pair.
+/// Valves that another monitor takes, too.
 struct ContestedValves {
   std::size_t count{0};
   std::string example;  ///< Id of the first.
@@ -21,7 +21,7 @@ struct ContestedValves {
 };
 
 /// Those of `valves` that a monitor of `others` takes as well.
-/// @param own its pair partner and the monitor itself are ignored.
+/// @param own the monitor itself, which is ignored among `others`.
 ContestedValves FindContested(const MonitorShare& own,
                               const std::vector<MonitorShare>& others,
                               const std::vector<std::string>& valves);

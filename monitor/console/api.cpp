@@ -147,7 +147,6 @@ Json PlantJson(const Api& api) {
                     {"software", m.software},
                     {"health", TextOrNull(m.health)},
                     {"text", TextOrNull(m.text)},
-                    {"pair", TextOrNull(m.pair)},
                     {"valves", m.valves},
                     {"heard_ms", Ms(m.heard_ns)},
                     {"silent", m.silent}});

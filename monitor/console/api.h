@@ -30,7 +30,6 @@ struct MonitorFacts {
   std::string_view health;  ///< "OK", "DEGRADED"
   std::vector<std::pair<std::string, std::uint64_t>> counters;
   std::uint64_t open_episodes{0};
-  std::string pair{};  ///< "leader", "standby, host:1 leads"; empty: none.
 };
 
 /// A monitor whose valves the plant page shows.
@@ -39,7 +38,6 @@ struct MonitorLine {
   std::string software;
   std::string health;       ///< "OK", ...; empty: no status has arrived yet.
   std::string text;         ///< Why it is not OK.
-  std::string pair;         ///< "leader", "standby"; empty: not in a pair.
   std::uint64_t valves{0};  ///< Valves for which its vectors came last.
   std::int64_t heard_ns{0};
   bool silent{false};
@@ -119,8 +117,8 @@ void AddStreamRoute(httplib::Server& server, const Api& api);
 void AddActionRoutes(httplib::Server& server, const Api& api);
 
 /// For a plant: {"monitors": [{"monitor", "host", "software", "health", "text",
-/// "pair", "valves", "heard_ms", "silent"}], "history_away": {"since_ms",
-/// "reason"} or null}. Otherwise null.
+/// "valves", "heard_ms", "silent"}], "history_away": {"since_ms", "reason"} or
+/// null}. Otherwise null.
 Json PlantJson(const Api& api);
 
 void SendJson(httplib::Response& response, const Json& json);

@@ -53,7 +53,6 @@ Json Status(const Api& api, const httplib::Request& request) {
           {"instance", api.instance},
           {"software", api.sources.software},
           {"health", facts.health},
-          {"pair", facts.pair.empty() ? Json() : Json(facts.pair)},
           {"plant", PlantJson(api)},
           {"write", !api.sources.monitors && api.access.MayWrite(request)},
           {"user", visitor ? Json(visitor->name) : Json()},

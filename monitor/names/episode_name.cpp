@@ -44,13 +44,6 @@ void EpisodeName::Inherit(const OpenEpisode* episode) {
   waited_ = 0;
 }
 
-void EpisodeName::SetAnnounced(FaultSet faults) {
-  if (open_) {
-    told_ = faults;
-    named_ = faults != 0;
-  }
-}
-
 const Verdict& EpisodeName::Step(const Inputs& inputs) {
   // Usually there is no episode, and the verdict of 2.5 kB is not copied.
   if (!open_ && inputs.engine.transition_count == 0) {
@@ -88,7 +81,7 @@ const Verdict& EpisodeName::Step(const Inputs& inputs) {
     now_.unknown = choice.unknown;
     now_.source = choice.source;
     FollowLook(inputs);
-    if (choice.faults != now_.faults || choice.faults != told_) {
+    if (choice.faults != now_.faults) {
       Rename(choice, inputs);
     }
     FollowSecond(inputs);
@@ -211,7 +204,7 @@ bool EpisodeName::TakesTwoForOne(FaultSet faults) const {
 }
 
 void EpisodeName::Rename(const Choice& choice, const Inputs& inputs) {
-  now_.faults = told_ = choice.faults;
+  now_.faults = choice.faults;
   now_.layer = choice.layer;
   Estimates(inputs);
   now_.severity =
@@ -361,7 +354,6 @@ void EpisodeName::Reset() {
   inherited_.reset();
   open_ = false;
   named_ = false;
-  told_ = 0;
   second_ = {};
   beside_ = {};
   now_ = {};

@@ -21,7 +21,7 @@ enum class NameSource : std::uint8_t {
   kFloor,      ///< Limits alone found it.
   kObservers,  ///< The observers, or what they named before.
   kLook,       ///< A simulation of the valve.
-  kRestart,    ///< An earlier session or the leader; it still stands.
+  kRestart,    ///< An earlier session; it still stands.
 };
 
 /// How strong one fault of a name is.
@@ -51,11 +51,10 @@ struct EpisodeNow {
 /// next. The inputs, the strongest first:
 ///
 /// 1. a second look whose answer counts (simulator::LookBook);
-/// 2. the name that an earlier session or the leader of a pair gave: one by a
-///    look until a look of this session has an answer, or for ten minutes;
-///    then, like any other, until the observers name a fault, for which the
-///    floor is not enough; with a second fault on top, both until the first one
-///    is named by itself;
+/// 2. the name that an earlier session gave: one by a look until a look of this
+///    session has an answer, or for ten minutes; then, like any other, until the
+///    observers name a fault, for which the floor is not enough; with a second
+///    fault on top, both until the first one is named by itself;
 /// 3. the observers, with their memory, and the floor until they have a name.
 ///
 /// The engine is an input and never changed: its transitions that name a fault
@@ -84,14 +83,9 @@ class EpisodeName {
   EpisodeName(const EpisodeName&) = delete;
   EpisodeName& operator=(const EpisodeName&) = delete;
 
-  /// `episode`, left by an earlier session or open by the word of the leader of
-  /// a pair, is the open one or the one that the next detection continues;
-  /// null: none is.
+  /// `episode`, left by an earlier session, is the one that the next detection
+  /// continues; null: none is.
   void Inherit(const OpenEpisode* episode);
-
-  /// Another monitor has announced the open episode as `faults`: if it is
-  /// called otherwise here, the next sample announces that.
-  void SetAnnounced(FaultSet faults);
 
   /// The next sample. @returns the verdict with the name that counts; stands as
   ///   long as the engine's and until the next call.
@@ -145,7 +139,6 @@ class EpisodeName {
   bool named_{false};  // The episode has had a name.
   NameBeside beside_;
   SecondFault second_;  // As it was announced last.
-  FaultSet told_{0};    // As it was announced last.
   Severity announced_{Severity::kMedium};
   EpisodeNow now_;
   Verdict verdict_;  // With the name.

@@ -47,9 +47,6 @@ class EpisodeNames {
   /// See EpisodeName::Inherit().
   void Inherit(const OpenEpisode* episode) { name_.Inherit(episode); }
 
-  /// See EpisodeName::SetAnnounced().
-  void SetAnnounced(FaultSet faults) { name_.SetAnnounced(faults); }
-
   /// Takes a sample and the verdict of the engine. @param held nothing is to be
   /// named; see ModelResolver::IsolationHeld().
   /// @returns the verdict with the name that counts; stands until the next

@@ -30,7 +30,7 @@ struct FollowerContext {
   /// Runs `step`; what it throws is counted and logged (`part_failed`).
   std::function<void(std::string_view part, const std::function<void()>& step)>
       guard;
-  /// Notifies whom --on-event names, unless the other one of a pair does.
+  /// Notifies whom --on-event names.
   std::function<void(const report::Json&)> notify;
 };
 

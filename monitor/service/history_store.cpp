@@ -67,13 +67,6 @@ std::vector<FaultEvent> HistoryStore::UnsentEvents() {
   return events;
 }
 
-std::vector<EndedEpisode> HistoryStore::LastEnds() {
-  std::vector<std::string> damaged;
-  auto episodes = writer_.LastEnds(&damaged);
-  ReportDamage(damaged);
-  return episodes;
-}
-
 void HistoryStore::ReportDamage(const std::vector<std::string>& damaged) {
   for (const std::string& reason : damaged) {
     log_(LogLevel::kError, EventLine("history_damaged", {{"reason", reason}}));

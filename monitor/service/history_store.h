@@ -38,8 +38,6 @@ class HistoryStore : public HistorySink {
                     const std::map<std::string, std::string>& fault_names = {});
   /// Episodes that earlier sessions left open. Call before recording anything.
   std::vector<OpenEpisode> OpenEpisodes();
-  /// Of each valve the episode that ended last.
-  std::vector<EndedEpisode> LastEnds();
   /// The accumulators as of the last checkpoint.
   std::vector<Accumulator> Accumulators() { return writer_.Accumulators(); }
   /// Events that an earlier session committed but may not have sent. Unreadable

@@ -26,7 +26,6 @@
 #include "diagnosis/loop/loop_watch.h"
 #include "diagnosis/records/partitions.h"
 #include "diagnosis/records/valve_glob.h"
-#include "idl/interface_watch.h"
 #include "idl/library_log.h"
 #include "monitor/bus/dds_options.h"
 #include "monitor/clock_watch.h"
@@ -47,9 +46,6 @@ using Clock = std::chrono::steady_clock;
 // Without samples, Pipeline::Poll() runs as often as this.
 constexpr milliseconds kTakeTimeout{100};
 constexpr int kTakeLimit = 4096;  // Bounds a call of Take() under full load.
-// A pair must exchange states more often.
-constexpr milliseconds kPairTakeTimeout{20};
-constexpr int kPairTakeLimit = 256;
 constexpr milliseconds kTickPeriod{1000};
 // After a reload that failed; doubled each time, as all sets are read again.
 constexpr milliseconds kReloadPause{2000};
@@ -97,17 +93,6 @@ int IntakeValves(int max_valves) {
   constexpr int kSpareSlots = 60'000;
   constexpr int kMaxSlots = 100'000;  // See idl::DdsOptions.
   return std::min(max_valves + kSpareSlots, kMaxSlots);
-}
-
-std::vector<std::string> Partitions(const ServiceOptions& options) {
-  return options.pair ? PartitionsOf(*options.pair)
-                      : std::vector<std::string>{};
-}
-
-std::string PairText(const Pair& pair) {
-  const Pair::Status status = pair.status();
-  const std::string leader = status.leader.empty() ? "nobody" : status.leader;
-  return status.leads ? "leader" : "standby, " + leader + " leads";
 }
 
 // Notifies the service manager (systemd, Type=notify), if there is one.
@@ -164,8 +149,8 @@ Service::Service(const ServiceOptions& options, const report::Context& context)
                 : std::make_unique<RunStore>(data_.runs(), context.software)),
       decisions_(participant_,
                  options.lossless_decisions ? MonitorName() : std::string(),
-                 publication_stop_.get_token(), Partitions(options)),
-      events_(participant_, context.log, Partitions(options)),
+                 publication_stop_.get_token()),
+      events_(participant_, context.log),
       status_topic_(participant_),
       samples_(
           intake_participant_,
@@ -174,18 +159,9 @@ Service::Service(const ServiceOptions& options, const report::Context& context)
           ParsePartitions(context.options.partition, true)),
       log_(context.log),
       after_commit_(counters_, log_),
-      pair_(options.pair
-                ? std::make_unique<Pair>(participant_, *options.pair,
-                                         MonitorName(), decisions_, events_,
-                                         after_commit_.beyond(), log_)
-                : nullptr),
-      operators_(options.pair ? std::make_unique<OperatorSync>(
-                                    participant_, *options.pair, MonitorName(),
-                                    data_.history(), log_)
-                              : nullptr),
       shares_(participant_,
-              {MonitorName(), options.pair ? options.pair->name : "",
-               options.pipeline.valve_glob, context.options.partition},
+              {MonitorName(), options.pipeline.valve_glob,
+               context.options.partition},
               log_),
       recorder_(runs_ ? std::make_unique<Recorder>(
                             *runs_, MonitorContext{counters_, log_, NowNs},
@@ -196,9 +172,8 @@ Service::Service(const ServiceOptions& options, const report::Context& context)
                             })
                       : nullptr),
       pipeline_(WithDelivery(options.pipeline),
-                {pair_ ? static_cast<DecisionSink&>(*pair_) : decisions_,
-                 after_commit_, history_},
-                assignment_, {counters_, log_, NowNs}),
+                {decisions_, after_commit_, history_}, assignment_,
+                {counters_, log_, NowNs}),
       heartbeat_(Members(pipeline_, recorder_.get(), service_pulse_)),
       started_ns_(NowNs()),
       last_status_line_(Clock::now()) {
@@ -223,8 +198,7 @@ void Service::AttachListeners() {
   }
 }
 
-// What becomes of an event, in this order. The page of a standby shows all
-// events; beyond the pair is what only the leader tells, at a takeover later.
+// What becomes of an event, in this order.
 void Service::ListAfterCommit() {
   if (console_) {
     after_commit_.Add("console", [this](const FaultEvent& event, bool stored) {
@@ -234,9 +208,6 @@ void Service::ListAfterCommit() {
   if (options_.follower) {
     after_commit_.Add("follower",
                       [this](const FaultEvent&, bool) { follower_->Wake(); });
-  }
-  if (pair_) {
-    after_commit_.AddGate(*pair_);
   }
   after_commit_.Add(events_);
   if (hook_) {
@@ -272,11 +243,8 @@ std::vector<storage::Shelf> Service::ShelvesInForce() {
 PipelineOptions Service::WithDelivery(PipelineOptions options) {
   options.severities = std::make_shared<const SeverityCatalogue>(
       report::LoadFaultTexts(context_.options).Severities());
-  // A standby publishes nothing itself: its events are delivered once it has
-  // heard them from the leader.
   options.journal.acknowledged = [this](milliseconds patience) {
-    return (!pair_ || pair_->AllEventsCovered()) &&
-           events_.WaitForAcknowledged(patience);
+    return events_.WaitForAcknowledged(patience);
   };
   return options;
 }
@@ -321,8 +289,7 @@ void Service::Start() {
            Guarded(counters_, log_, part, step);
          },
          [this](const report::Json& json) {
-           // Both of a pair find it; the leader notifies.
-           if (hook_ && (!pair_ || pair_->status().leads)) {
+           if (hook_) {
              hook_->Notify(json);
            }
          }});
@@ -335,13 +302,8 @@ void Service::Start() {
   if (recorder_) {
     recorder_->Start();
   }
-  pipeline_.StandBy(pair_ != nullptr);
-  pipeline_.Start(history_.OpenEpisodes(), history_.Accumulators(),
-                  pair_ ? history_.LastEnds() : std::vector<EndedEpisode>{});
+  pipeline_.Start(history_.OpenEpisodes(), history_.Accumulators());
   diagnosis_.Start([this] { Diagnose(); });
-  if (operators_) {
-    operators_->Start();
-  }
   if (http_) {
     ServeProbes();
   }
@@ -403,9 +365,9 @@ void Service::ExpectAssignedValves() {
 void Service::ServeConsole() {
   const auto facts = [this] {
     const idl::MonitorStatusMessage status = StatusOf(Facts());
-    return console::MonitorFacts{
-        idl::HealthName(status.health), status.counters,
-        pipeline_.census().open_episodes, pair_ ? PairText(*pair_) : ""};
+    return console::MonitorFacts{idl::HealthName(status.health),
+                                 status.counters,
+                                 pipeline_.census().open_episodes};
   };
   console_->Start({data_.history(), data_.models(), context_.software,
                    started_ns_, facts, NowNs});
@@ -446,25 +408,16 @@ void Service::Diagnose() {
           const idl::Reception& reception) {
         pipeline_.OnStreamEnded(message.valve_id, reception.writer_id);
       }};
-  const int limit = pair_ ? kPairTakeLimit : kTakeLimit;
   const auto take = [&](milliseconds timeout) {
     // Recomputed each time, because the UTC clock may have been set.
     utc_to_steady_ns =
         Clock::now().time_since_epoch() / std::chrono::nanoseconds(1) - NowNs();
-    return samples_.Take(handlers, timeout, limit);
+    return samples_.Take(handlers, timeout, kTakeLimit);
   };
   while (!stopping_) {
     // While samples wait, silence is measured up to the newest one handled.
-    const int taken = take(pair_ ? kPairTakeTimeout : kTakeTimeout);
-    pipeline_.Poll(taken < limit ? Clock::now() : received);
-    if (pair_) {
-      pair_->Tick(counters_[Counter::kReceived], pipeline_);
-    }
-  }
-  // Before the queue is drained: the standby takes over at once, without
-  // waiting for its patience to pass.
-  if (pair_) {
-    pair_->StepDown(pipeline_);
+    const int taken = take(kTakeTimeout);
+    pipeline_.Poll(taken < kTakeLimit ? Clock::now() : received);
   }
   // Drains what has arrived already; publishers that continue to send do not
   // delay the shutdown beyond drain_until_.
@@ -495,6 +448,7 @@ void Service::Serve(report::StopSignals& signals) {
     const TimePoint now = Clock::now();
     service_pulse_.Beat();
     if (now >= next_tick) {
+      participant_.RequireInterfaces();
       Tick();
       next_tick = now + kTickPeriod;
     }
@@ -618,9 +572,7 @@ StatusFacts Service::Facts() const {
           pipeline_.history_degraded(),
           RecordingDegraded(),
           heartbeat_.StalledSince(Clock::now() - kStallLimit),
-          pair_ ? std::optional(pair_->status()) : std::nullopt,
-          shares_.contested(),
-          idl::MissingInterfaces()};
+          shares_.contested()};
 }
 
 std::string Service::Metrics() const {
@@ -685,9 +637,6 @@ void Service::Stop() {
   }
   if (console_) {
     errors.Try([this] { console_->Stop(); });
-  }
-  if (operators_) {
-    operators_->Stop();
   }
   errors.Try([this] { StopDiagnosis(); });
   if (follower_) {

@@ -17,8 +17,6 @@
 #include "monitor/console/console.h"
 #include "monitor/heartbeat.h"
 #include "monitor/http/http_server.h"
-#include "monitor/pair/operator_sync.h"
-#include "monitor/pair/pair.h"
 #include "monitor/pipeline.h"
 #include "monitor/recorder.h"
 #include "monitor/service/event_hook.h"
@@ -43,9 +41,8 @@ struct ServiceOptions {
   std::optional<storage::ModelReference> model_set;
   Recording recording{Recording::kOff};
   bool lossless_decisions{false};
-  bool best_effort{false};          ///< ValveSample without retransmission.
-  double status_period_s{60.0};     ///< Of the status line in the log.
-  std::optional<PairOptions> pair;  ///< This monitor has a standby.
+  bool best_effort{false};       ///< ValveSample without retransmission.
+  double status_period_s{60.0};  ///< Of the status line in the log.
   /// Runs beside the active sets; without a version the newest one.
   /// Serve metrics and probes over HTTP.
   std::optional<HttpAddress> http;
@@ -71,8 +68,9 @@ class Service {
   Service(const Service&) = delete;
   Service& operator=(const Service&) = delete;
 
-  /// Serves until a signal requests a stop or a thread fails, then stores and
-  /// publishes what was received and ends all threads in any case.
+  /// Serves until a signal requests a stop, a thread fails or an interface is
+  /// gone, then stores and publishes what was received and ends all threads in
+  /// any case.
   /// @returns the exit code. @throws the first error.
   int Run(report::StopSignals& signals);
 
@@ -138,8 +136,6 @@ class Service {
   Counters counters_;
   ThrottledLog log_;
   AfterCommit after_commit_;
-  std::unique_ptr<Pair> pair_;               // Null: not in a pair.
-  std::unique_ptr<OperatorSync> operators_;  // Set together with pair_.
   ShareWatch shares_;
   std::unique_ptr<Recorder> recorder_;         // Set together with runs_.
   std::unique_ptr<HistoryFollower> follower_;  // Null: nothing follows.

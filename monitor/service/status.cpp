@@ -189,10 +189,9 @@ void AddRefusals(const StatusFacts& facts, std::vector<Measure>& measures) {
 
 }  // namespace
 
-// The status on the bus has room for idl::kMaxCounters = 64 names, and a
-// monitor of a pair uses all of them. What is added here therefore gets a
-// family and no name. Values of one family are adjacent, and the page shows the
-// help of the first.
+// The status on the bus has room for idl::kMaxCounters = 64 names and uses 63
+// of them, so what is added here gets a family and no name. Values of one
+// family are adjacent, and the page shows the help of the first.
 // NOLINTNEXTLINE(readability-function-size): a table.
 std::vector<Measure> MeasuresOf(const StatusFacts& facts) {
   constexpr Type kCounter = Type::kCounter;
@@ -248,8 +247,7 @@ std::vector<Measure> MeasuresOf(const StatusFacts& facts) {
       {"valves_ended", "fdi_valves_silent", kGauge, kSilentHelp, "reason",
        "ended", census.ended},
       {"valves_contested", "fdi_valves_contested", kGauge,
-       "Valves that another monitor takes, too, which is not of our pair", "",
-       "", facts.contested.count},
+       "Valves that another monitor takes, too", "", "", facts.contested.count},
       {"open_episodes", "fdi_open_episodes", kGauge, "Fault episodes now", "",
        "", census.open_episodes},
       {"trace_bytes", "fdi_trace_bytes", kGauge,
@@ -267,20 +265,6 @@ std::vector<Measure> MeasuresOf(const StatusFacts& facts) {
       {"", "fdi_waiting", kGauge, kWaitingHelp, "queue", "evidence",
        facts.journal.trace_points}};
   measures.insert(measures.end(), others.begin(), others.end());
-  if (facts.pair) {
-    measures.insert(measures.end(),
-                    {{"pair_leader", "fdi_pair_leader", kGauge,
-                      "1 while this monitor publishes for its pair", "", "",
-                      std::uint64_t{facts.pair->leads}},
-                     {"", "fdi_pair_rank", kGauge, "Of --rank", "", "",
-                      number(facts.pair->rank)},
-                     {"", "fdi_pair_others", kGauge,
-                      "Monitors of the pair that are there to take over", "",
-                      "", number(facts.pair->others)},
-                     {"", "fdi_pair_takeovers_total", kCounter,
-                      "Times this monitor began to publish for its pair", "",
-                      "", facts.pair->takeovers}});
-  }
   return measures;
 }
 
@@ -297,14 +281,6 @@ idl::MonitorStatusMessage StatusOf(const StatusFacts& facts) {
   if (facts.recording_degraded) {
     status.text +=
         status.text.empty() ? "persistence degraded: runs" : ", runs";
-  }
-  if (facts.pair && facts.pair->others == 0) {
-    status.text += status.text.empty() ? "" : "; ";
-    status.text += "nobody stands by";
-  }
-  if (!facts.missing_interfaces.empty()) {
-    status.text += status.text.empty() ? "" : "; ";
-    status.text += "no interface has " + facts.missing_interfaces;
   }
   if (facts.contested.count > 0) {
     status.text += status.text.empty() ? "" : "; ";
@@ -366,10 +342,6 @@ std::string ManagerLine(const idl::MonitorStatusMessage& status) {
   std::string line(idl::HealthName(status.health));
   for (const char* name : {"valves", "valves_stale", "open_episodes"}) {
     line += std::string(" ") + name + "=" + std::to_string(counters.at(name));
-  }
-  if (const auto leads = counters.find("pair_leader");
-      leads != counters.end()) {
-    line += leads->second != 0 ? " leads its pair" : " stands by";
   }
   return status.text.empty() ? line : line + " (" + status.text + ")";
 }

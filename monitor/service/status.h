@@ -16,7 +16,6 @@
 #include "monitor/counters.h"
 #include "monitor/heartbeat.h"
 #include "monitor/http/http_server.h"
-#include "monitor/pair/pair.h"
 #include "monitor/pipeline.h"
 #include "storage/database/data_directory.h"
 #include "storage/history/alarm.h"
@@ -39,9 +38,7 @@ struct StatusFacts {
   bool history_degraded{false};
   bool recording_degraded{false};
   std::vector<std::string_view> stalled{};  ///< Names of threads.
-  std::optional<Pair::Status> pair{};       ///< Nothing: not in a pair.
   ContestedValves contested{};
-  std::string missing_interfaces{};  ///< Of DDS; see MissingInterfaces().
 };
 
 /// All counters and gauges, the counters first.

@@ -10,16 +10,6 @@ constexpr std::chrono::seconds kMinPatience{3};
 constexpr std::chrono::seconds kMonitorExpiry{60};
 constexpr double kSilentPeriods = 3.0;
 
-// "leader" or "standby"; empty for a monitor that is not in a pair.
-std::string PairOf(const idl::MonitorStatusMessage& status) {
-  const auto leads =
-      std::ranges::find(status.counters, "pair_leader",
-                        &std::pair<std::string, std::uint64_t>::first);
-  return leads == status.counters.end() ? ""
-         : leads->second != 0           ? "leader"
-                                        : "standby";
-}
-
 }  // namespace
 
 std::shared_ptr<const console::ModelFacts> PlantFeed::Add(
@@ -67,7 +57,7 @@ void PlantFeed::Add(const idl::DecisionMessage& message,
       valve.source_id == verdict.source_id && verdict.seq <= valve.seq;
   valve.participant = reception.participant_id;
   if (repeated || OutOfOrder(verdict.intake)) {
-    return;  // A new leader of a pair repeats some vectors.
+    return;
   }
   const auto models = models_.find(message.model_hash);
   const auto facts = models == models_.end() ? nullptr : models->second;
@@ -90,7 +80,6 @@ void PlantFeed::Add(const idl::MonitorStatusMessage& status,
   line.software = status.software;
   line.health = idl::HealthName(status.health);
   line.text = status.text;
-  line.pair = PairOf(status);
 }
 
 void PlantFeed::Poll(Clock::time_point now) {

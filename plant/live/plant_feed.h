@@ -15,9 +15,8 @@ namespace fdi::monitor {
 
 /// Feeds a board with what the monitors of a plant publish, and tells which of
 /// them are silent. A valve belongs to the monitor that published its last
-/// vector, in a pair the leader. A monitor is identified by its DDS
-/// participant, which sends both its vectors and its status. One thread, except
-/// for monitors().
+/// vector. A monitor is identified by its DDS participant, which sends both its
+/// vectors and its status. One thread, except for monitors().
 class PlantFeed {
  public:
   using Clock = std::chrono::steady_clock;

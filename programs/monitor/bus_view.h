@@ -38,7 +38,8 @@ class BusView {
   /// Calls `on_message` with each received message and its Reception, model
   /// sets first because they explain the decision vectors, and `on_ended` with
   /// the id of each valve whose monitor disposed of it. Blocks briefly if
-  /// nothing has arrived.
+  /// nothing has arrived. @throws PassingError as
+  /// idl::Participant::RequireInterfaces()
   template <typename OnMessage, typename OnEnded>
   void Take(OnMessage on_message, OnEnded on_ended) {
     constexpr std::chrono::milliseconds kNow{0};
@@ -48,6 +49,7 @@ class BusView {
         on_message(message, reception);
       }
     };
+    participant_.RequireInterfaces();
     models_.Take({on_message, {}}, kNow);
     events_.Take({matching, {}}, decisions_ || batches_ ? kNow : kMoment);
     status_.Take({on_message, {}}, kNow);

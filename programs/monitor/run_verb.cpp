@@ -26,7 +26,6 @@ struct RunArguments {
   std::string http{"off"};
   std::string console{"off"};
   console::ConsoleOptions console_options;
-  PairOptions pair;
   std::filesystem::path groups;
   ServiceOptions service;
 };
@@ -102,27 +101,6 @@ void AddOnEventOptions(CLI::App& run, ServiceOptions& service) {
       ->capture_default_str();
 }
 
-void AddPairOptions(CLI::App& run, PairOptions& pair) {
-  CLI::Option* name =
-      run.add_option(
-             "--pair", pair.name,
-             "Diagnose beside another monitor of the same NAME: one of the "
-             "two publishes, the other one takes over when it fails")
-          ->type_name("NAME");
-  run.add_option("--rank", pair.rank,
-                 "Of this monitor in the pair; when both may lead, 1 does "
-                 "before 2")
-      ->default_str("")
-      ->type_name("1..9")
-      ->needs(name);
-  run.add_option("--pair-patience", pair.patience_s,
-                 "Take over when nothing was heard from the diagnosis of the "
-                 "leader for this time [s]")
-      ->check(CLI::Range(0.1, 60.0))
-      ->capture_default_str()
-      ->needs(name);
-}
-
 int Run(const RunArguments& arguments, const report::Context& context) {
   ServiceOptions options = arguments.service;
   if (!arguments.model_set.empty()) {
@@ -131,9 +109,6 @@ int Run(const RunArguments& arguments, const report::Context& context) {
   if (arguments.record != "off") {
     options.recording =
         arguments.record == "lossless" ? Recording::kLossless : Recording::kOn;
-  }
-  if (!arguments.pair.name.empty()) {
-    Validate(options.pair.emplace(arguments.pair));
   }
   if (arguments.http != "off") {
     options.http = ParseHttpAddress(arguments.http, "--http");
@@ -211,7 +186,6 @@ void AddRunVerb(report::Program& program) {
       ->capture_default_str();
   AddGroupsOption(program, run, arguments.groups);
   AddOnEventOptions(run, service);
-  AddPairOptions(run, arguments.pair);
   run.add_option("--http", arguments.http,
                  "Serve /metrics, /healthz and /readyz; port 0: any free one")
       ->expected(0, 1)
@@ -224,6 +198,12 @@ void AddRunVerb(report::Program& program) {
     program.AddRemoved("run", option,
                        "record with --record, then compare the two sets with "
                        "fdi-trainer compare SET@1 SET@2 --runs ID,...");
+  }
+  for (const char* gone : {"--pair", "--rank", "--pair-patience"}) {
+    program.AddRemoved("run", gone,
+                       "let a cluster manager start the monitor on another "
+                       "host with a copy of its data folder: "
+                       "docs/operations.md, Another host takes over");
   }
   run.add_option("--status-period", service.status_period_s,
                  "Time between status lines in the log [s]")

@@ -71,6 +71,7 @@ void SamplePublisher::AwaitReader() {
       steady_clock::now() + std::chrono::duration_cast<milliseconds>(
                                 std::chrono::duration<double>(wait_s));
   while (!writer_.WaitForReaders(1, kLook)) {
+    participant_.RequireInterfaces();
     if (signals_.stop_requested()) {
       return;
     }
@@ -98,6 +99,7 @@ void SamplePublisher::AwaitReader() {
 bool SamplePublisher::Publish(std::size_t valve, const Sample& sample) {
   message_.valve_id = valve_ids_[valve];
   message_.sample = sample;
+  participant_.RequireInterfaces();
   int looks = 0;
   while (!signals_.stop_requested()) {
     if (options_.needs_reader && readers() == 0) {

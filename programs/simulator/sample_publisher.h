@@ -47,7 +47,8 @@ class SamplePublisher {
   /// If lossless, blocks until there is room. If a reader is required and none
   /// is left, waits for another.
   /// @returns false if a stop was requested before the sample was sent.
-  /// @throws NoReaderError, TransportError
+  /// @throws NoReaderError, TransportError; PassingError as
+  ///   idl::Participant::RequireInterfaces()
   bool Publish(std::size_t valve, const Sample& sample);
 
   /// Waits for acknowledgement, disposes the instances (unless keep_alive) and

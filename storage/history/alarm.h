@@ -43,8 +43,7 @@ bool IsOver(const Shelf& shelf, std::int64_t now_ns);
 
 /// In force: until it is over, and if it was planned, from its beginning on. Of
 /// any other it does not matter whether now is before its beginning: then a
-/// clock was set back, or that of the other monitor of a pair is ahead, and
-/// what somebody has shelved stays shelved.
+/// clock was set back, and what somebody has shelved stays shelved.
 bool IsActive(const Shelf& shelf, std::int64_t now_ns);
 
 /// Whether `shelf` applies to this valve and diagnosis. A shelved fault covers

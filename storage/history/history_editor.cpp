@@ -15,8 +15,6 @@ namespace fdi::storage {
 namespace sql = history_sql;
 namespace {
 
-// A shelf of the other monitor that begins later than clocks differ is planned.
-constexpr std::int64_t kClocksDifferNs = 60'000'000'000;
 constexpr std::size_t kMaxWhoLength = 128;
 constexpr std::size_t kMaxCommentLength = 2000;
 
@@ -44,16 +42,6 @@ OperatorNote Checked(const OperatorNote& note) {
   Require(!note.origin.empty(), "HistoryEditor: origin is empty");
   return {Plain(note.who), Plain(note.comment), Plain(note.origin),
           note.now_ns};
-}
-
-// Actions from versions without an origin take the monitor's name.
-std::string OriginOf(const OperatorAction& action, const std::string& origin) {
-  return origin.empty() ? action.monitor : origin;
-}
-
-OperatorNote NoteOf(const OperatorAction& action) {
-  return Checked({action.who, action.comment, OriginOf(action, action.origin),
-                  action.stamp_ns});
 }
 
 void CheckShelfTime(std::int64_t from_ns, std::int64_t until_ns) {
@@ -164,7 +152,7 @@ std::uint64_t HistoryEditor::Acknowledge(std::string_view id,
   const std::uint64_t episode_id = ResolveEpisode(database_, id);
   const std::string episode = EpisodeIdText(episode_id);
   database_.Run(sql::acknowledge, checked.who, checked.now_ns, episode);
-  database_.Run(sql::end_by_hand, episode, checked.now_ns, 0);
+  database_.Run(sql::end_by_hand, episode);
   AddNote(database_, episode, "ACK", std::nullopt, checked);
   transaction.Commit();
   return episode_id;
@@ -182,77 +170,6 @@ std::uint64_t HistoryEditor::Label(std::string_view id, std::string_view label,
   AddNote(database_, episode, "LABEL", value, checked);
   transaction.Commit();
   return episode_id;
-}
-
-bool HistoryEditor::HasEventsOf(const OperatorAction& action) {
-  database_.Refresh();
-  return action.kind != OperatorActionKind::kAck ||
-         database_.QueryInt64(sql::has_events_to,
-                              EpisodeIdText(action.episode_id),
-                              action.until_ns) == 1;
-}
-
-bool HistoryEditor::Adopt(const OperatorAction& action) {
-  database_.Refresh();
-  return action.kind == OperatorActionKind::kShelve ? AdoptShelf(action)
-                                                    : AdoptNote(action);
-}
-
-bool HistoryEditor::AdoptNote(const OperatorAction& action) {
-  const OperatorNote note = NoteOf(action);
-  const bool label = action.kind == OperatorActionKind::kLabel;
-  const std::optional<std::string> value =
-      label ? std::optional(CheckedLabel(action.value)) : std::nullopt;
-  const std::string episode = EpisodeIdText(action.episode_id);
-  Transaction transaction(database_);
-  ResolveEpisode(database_, episode);
-  database_.Run(sql::insert_note, episode, label ? "LABEL" : "ACK",
-                action.stamp_ns, UtcNow(), value, note.who, note.comment,
-                note.origin);
-  const bool fresh = database_.Changes() > 0;
-  if (fresh && label) {
-    database_.Run(sql::adopt_label, value, episode, action.stamp_ns);
-  } else if (fresh) {
-    database_.Run(sql::adopt_ack, note.who, action.stamp_ns, episode,
-                  action.until_ns);
-    database_.Run(sql::end_by_hand, episode, action.stamp_ns, action.until_ns);
-  }
-  transaction.Commit();
-  return fresh;
-}
-
-bool HistoryEditor::AdoptShelf(const OperatorAction& action) {
-  const OperatorNote note = NoteOf(action);
-  RequireLength(action.valve_id, "valve", 1, kMaxIdLength);
-  CheckShelfTime(action.stamp_ns, action.until_ns);
-  const std::optional<std::string> fault =
-      action.value.empty() ? std::nullopt
-                           : std::optional(CheckedFaults(action.value));
-  const std::int64_t now_ns = UtcNow();
-  const bool planned = action.stamp_ns > now_ns + kClocksDifferNs;
-  Transaction transaction(database_);
-  const auto find = [&] {
-    return database_.QueryInt64(sql::find_shelf, action.valve_id, fault,
-                                action.stamp_ns, note.who);
-  };
-  std::optional<std::int64_t> shelf_id = find();
-  const bool fresh = !shelf_id;
-  if (fresh) {
-    database_.Run(sql::insert_shelf, action.valve_id, fault, action.stamp_ns,
-                  action.until_ns, note.who, note.comment, note.origin,
-                  planned ? std::optional(now_ns) : std::nullopt);
-    shelf_id = find();
-  }
-  const bool ended =
-      action.ended_ns != 0 && !ReadShelf(database_, *shelf_id).ended_ns;
-  if (ended) {
-    const OperatorNote end =
-        Checked({action.ended_by, "", OriginOf(action, action.ended_origin),
-                 action.ended_ns});
-    database_.Run(sql::end_shelf, end.now_ns, end.who, end.origin, *shelf_id);
-  }
-  transaction.Commit();
-  return fresh || ended;
 }
 
 Shelf HistoryEditor::Shelve(std::string_view valve_id,

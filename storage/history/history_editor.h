@@ -6,7 +6,6 @@
 #include <string>
 #include <string_view>
 
-#include "diagnosis/records/operator_action.h"
 #include "storage/database/database.h"
 #include "storage/history/alarm.h"
 
@@ -65,22 +64,7 @@ class HistoryEditor {
   /// @throws NotFoundError; DataError if it has ended already.
   Shelf EndShelf(std::int64_t shelf_id, const OperatorNote& note);
 
-  /// Records an action from another monitor unchanged. Both histories converge,
-  /// whatever the order of arrival: the earliest acknowledgement and the latest
-  /// label are shown.
-  /// @returns false if it is already recorded.
-  /// @throws NotFoundError if its episode does not exist; ConfigError if it
-  ///   says what no action of this class would.
-  bool Adopt(const OperatorAction& action);
-
-  /// @returns whether the history has the events that an acknowledgement
-  /// covers. If it is adopted before, the next of them may undo it.
-  bool HasEventsOf(const OperatorAction& action);
-
  private:
-  bool AdoptNote(const OperatorAction& action);
-  bool AdoptShelf(const OperatorAction& action);
-
   Database database_;
 };
 

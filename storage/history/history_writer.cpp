@@ -175,14 +175,12 @@ bool StoreEvent(Database& database, const Entry& entry) {
   // A second fault wants an answer, whatever its priority; its end does not.
   const bool second = t.kind == TransitionKind::kSecond && t.second.open;
   if (second) {
-    database.Cached(sql::raise_alarm)
-        .Bind(entry.id, true, std::nullopt, entry.recorded_ns, t.stamp_ns)
-        .Run();
+    database.Cached(sql::raise_alarm).Bind(entry.id, true, std::nullopt).Run();
   } else if (IsIsolation(t.kind) || t.kind == TransitionKind::kChanged) {
     // Before the new priority replaces the one that was acknowledged.
     database.Cached(sql::raise_alarm)
         .Bind(entry.id, t.kind == TransitionKind::kChanged,
-              PriorityOf(t.severity), entry.recorded_ns, t.stamp_ns)
+              PriorityOf(t.severity))
         .Run();
     StoreStrengthNow(database, entry.id, {t.strength, t.lowest, t.highest},
                      t.severity);
@@ -331,13 +329,6 @@ auto ReadUndamaged(Statement& rows, const std::string& what, Read read,
     }
   }
   return records;
-}
-
-EndedEpisode ReadEnded(const Statement& row) {
-  EndedEpisode episode;
-  episode.episode_id = RequireEpisodeId(row, 0);
-  row.Read(1, episode.valve_id, episode.source_id, episode.ended_ns);
-  return episode;
 }
 
 }  // namespace
@@ -565,12 +556,6 @@ std::vector<OpenEpisode> HistoryWriter::OpenEpisodes(
     std::vector<std::string>* damaged) {
   Statement rows = database_.Prepare(sql::open_episodes);
   return ReadUndamaged(rows, "episode", ReadOpen, damaged);
-}
-
-std::vector<EndedEpisode> HistoryWriter::LastEnds(
-    std::vector<std::string>* damaged) {
-  Statement rows = database_.Prepare(sql::last_ends);
-  return ReadUndamaged(rows, "episode", ReadEnded, damaged);
 }
 
 }  // namespace fdi::storage

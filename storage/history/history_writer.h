@@ -10,7 +10,6 @@
 #include <string>
 #include <vector>
 
-#include "diagnosis/records/ended_episode.h"
 #include "diagnosis/records/episode_look.h"
 #include "diagnosis/records/fault_event.h"
 #include "diagnosis/records/service_records.h"
@@ -137,10 +136,6 @@ class HistoryWriter {
       std::vector<std::string>* damaged = nullptr);
   /// Episodes that have not ended, ordered by detection; `damaged` likewise.
   std::vector<OpenEpisode> OpenEpisodes(
-      std::vector<std::string>* damaged = nullptr);
-
-  /// Of each valve the episode that ended last; `damaged` likewise.
-  std::vector<EndedEpisode> LastEnds(
       std::vector<std::string>* damaged = nullptr);
 
   Database& database() { return database_; }

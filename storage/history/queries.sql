@@ -115,11 +115,9 @@ UPDATE episode SET strength = ?1, lowest = ?2, highest = ?3, priority = ?4,
     coalesce(worst_strength, ?1))
 WHERE episode_id = ?5
 -- A higher priority has to be acknowledged again. ?2: it did rise, if what it was
--- is not known. It rose with the sample of ?5, or at most 5 s before it was
--- recorded at ?4: the other monitor of a pair may have recorded it sooner.
+-- is not known.
 -- name: raise_alarm
-UPDATE episode SET acked_by = NULL, acked_ns = NULL,
-  raised_ns = max(min(?5, ?4), ?4 - 5000000000)
+UPDATE episode SET acked_by = NULL, acked_ns = NULL
 WHERE episode_id = ?1 AND coalesce(priority > ?3, ?2)
 -- name: release_faults
 UPDATE episode_fault SET held = 0 WHERE episode_id = ?
@@ -145,14 +143,10 @@ WHERE valve_id = ? AND unconfirmed_ns IS NOT NULL AND episode_id <> ?
 -- name: confirm_normal
 UPDATE episode SET cleared_ns = max(?1, ended_ns), unconfirmed_ns = NULL
 WHERE valve_id = ?2 AND unconfirmed_ns IS NOT NULL
--- Somebody acknowledged it at ?2, or on the other monitor of a pair with the
--- events up to the sample of ?3, knowing of its end.
+-- Somebody acknowledged it, knowing of its end.
 -- name: end_by_hand
 UPDATE episode SET unconfirmed_ns = NULL
-WHERE episode_id = ?1 AND unconfirmed_ns IS NOT NULL AND NOT EXISTS (
-  SELECT 1 FROM episode_event
-  WHERE episode_id = ?1 AND kind = 'CLOSED' AND recorded_ns > ?2
-    AND stamp_ns > ?3)
+WHERE episode_id = ?1 AND unconfirmed_ns IS NOT NULL
 -- name: raise_peak
 UPDATE episode SET peak_factor = max(peak_factor, ?1)
 WHERE episode_id = ?2 AND peak_factor < ?1
@@ -171,10 +165,6 @@ SELECT episode_id, valve_id, source_id, detected_ns,
    WHERE s.episode_id = e.episode_id AND s.kind = 'SECOND'
    ORDER BY s.stamp_ns DESC LIMIT 1)
 FROM episode e WHERE ended_ns IS NULL ORDER BY detected_ns, valve_id
--- The columns make an EndedEpisode; beside max() they are of the same row.
--- name: last_ends
-SELECT episode_id, valve_id, source_id, max(ended_ns) FROM episode
-WHERE ended_ns IS NOT NULL GROUP BY valve_id
 
 -- ---- Events.
 -- Nothing is inserted if the event is there already, or its episode has ended.
@@ -199,36 +189,6 @@ ON CONFLICT (episode_id, kind, stamp_ns) DO NOTHING
 -- name: acknowledge
 UPDATE episode SET acked_by = ?, acked_ns = ?
 WHERE episode_id = ? AND acked_by IS NULL
--- Not one from before the priority rose: by the clocks, unless no event is
--- newer than those that were seen there, up to the sample of ?4.
--- name: adopt_ack
-UPDATE episode SET acked_by = ?1, acked_ns = ?2
-WHERE episode_id = ?3 AND (acked_ns IS NULL OR acked_ns > ?2)
-  AND (raised_ns IS NULL OR raised_ns < ?2 OR NOT EXISTS (
-    SELECT 1 FROM episode_event
-    WHERE episode_id = ?3 AND kind NOT IN ('ACK', 'LABEL', 'RESUMED')
-      AND stamp_ns > ?4))
--- name: has_events_to
-SELECT EXISTS (
-  SELECT 1 FROM episode_event
-  WHERE episode_id = ? AND kind NOT IN ('ACK', 'LABEL', 'RESUMED')
-    AND stamp_ns >= ?)
--- name: adopt_label
-UPDATE episode SET label = ?1
-WHERE episode_id = ?2 AND NOT EXISTS (
-  SELECT 1 FROM episode_event
-  WHERE episode_id = ?2 AND kind = 'LABEL' AND stamp_ns > ?3)
--- name: last_event
-SELECT coalesce(max(event_id), 0) FROM episode_event
--- name: notes
-SELECT episode_id, kind, stamp_ns, value, who, comment, origin,
-  (SELECT max(e.stamp_ns) FROM episode_event e
-   WHERE e.episode_id = n.episode_id AND e.event_id < n.event_id
-     AND e.kind NOT IN ('ACK', 'LABEL', 'RESUMED'))
-FROM episode_event n
-WHERE event_id > ? AND event_id <= ? AND recorded_ns >= ?
-  AND kind IN ('ACK', 'LABEL')
-ORDER BY event_id
 -- name: insert_unsent
 INSERT INTO event_outbox (event_id) VALUES (?)
 -- name: delete_unsent
@@ -366,9 +326,6 @@ ORDER BY shelf_id
 INSERT INTO shelf
   (valve_id, fault, from_ns, until_ns, who, comment, origin, planned_ns)
 VALUES (?, ?, ?, ?, ?, nullif(?, ''), ?, ?)
--- name: find_shelf
-SELECT shelf_id FROM shelf
-WHERE valve_id = ? AND fault IS ? AND from_ns = ? AND who = ?
 -- name: end_shelf
 UPDATE shelf SET ended_ns = ?, ended_by = ?, ended_origin = ?
 WHERE shelf_id = ?
@@ -529,12 +486,11 @@ WHERE excluded.stamp_ns > shadow_accumulator.stamp_ns
 INSERT OR IGNORE INTO episode (episode_id, valve_id, source_id, detected_ns,
   isolated_ns, cleared_ns, fault_bits, peak_factor, strength, model_set,
   model_hash, flow_unit, channels, faults, known, label, acked_by, acked_ns,
-  unknown_kind, fault, layer, lowest, highest, priority, worst_strength,
-  raised_ns)
+  unknown_kind, fault, layer, lowest, highest, priority, worst_strength)
 SELECT episode_id, valve_id, source_id, detected_ns, isolated_ns, cleared_ns,
   fault_bits, peak_factor, strength, model_set, model_hash, flow_unit,
   channels, faults, known, label, acked_by, acked_ns, unknown_kind, fault,
-  layer, lowest, highest, priority, worst_strength, raised_ns
+  layer, lowest, highest, priority, worst_strength
 FROM source.episode WHERE valve_id = ? AND ended_ns IS NULL
 -- name: copy_open_faults
 INSERT OR IGNORE INTO episode_fault

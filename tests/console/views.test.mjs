@@ -40,7 +40,7 @@ class Monitor {
     this.asked = [];
     this.answers = {
       status: {now_ms: kNowMs, started_ms: kNowMs, instance: '1', health: 'OK',
-        software: '0', pair: null, plant: null, write: false, user: null,
+        software: '0', plant: null, write: false, user: null,
         role: null, session: false, model_sets: []},
       faults: {faults: [{fault: 'f19', name: 'Flow transmitter wrong',
         check: 'Compare it.', severity: [{from: 0, level: 'high'}],
@@ -843,10 +843,10 @@ test('every other view and dialog can be read, at any size, light and dark',
             highest: 9 * kDayMs}, at_ms: kNowMs}]};
       const plant = {history_away: null, monitors: [
         {monitor: 'host-a:1', host: 'host-a', software: '0', health: 'OK',
-          text: '', pair: 'leader', valves: 1, heard_ms: kNowMs, silent: false},
+          text: '', valves: 1, heard_ms: kNowMs, silent: false},
         {monitor: 'host-b:4711', host: 'host-b', software: '0',
           health: 'DEGRADED', text: 'the history does not respond',
-          pair: null, valves: 1, heard_ms: kNowMs - kDayMs, silent: true}]};
+          valves: 1, heard_ms: kNowMs - kDayMs, silent: true}]};
       for (const [width, height] of [[1400, 900], [390, 800]]) {
         const page = await openShared(browser, address, '#/',
             {viewport: {width, height}});

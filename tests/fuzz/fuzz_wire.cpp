@@ -30,7 +30,7 @@ extern "C" int LLVMFuzzerTestOneInput(const unsigned char* data,
   if (size < 5) {
     return 0;
   }
-  switch (data[0] % 10) {
+  switch (data[0] % 8) {
     case 0:
       Receive<fdi::idl::ValveSampleMessage>(data + 1, size - 1);
       break;
@@ -50,16 +50,10 @@ extern "C" int LLVMFuzzerTestOneInput(const unsigned char* data,
       Receive<fdi::idl::DecisionBatchMessage>(data + 1, size - 1);
       break;
     case 6:
-      Receive<fdi::OperatorAction>(data + 1, size - 1);
-      break;
-    case 7:
       Receive<fdi::MonitorShare>(data + 1, size - 1);
       break;
-    case 9:
-      Receive<fdi::idl::ValveSampleMessage, 2>(data + 1, size - 1);
-      break;
     default:
-      Receive<fdi::PairState>(data + 1, size - 1);
+      Receive<fdi::idl::ValveSampleMessage, 2>(data + 1, size - 1);
   }
   return 0;
 }

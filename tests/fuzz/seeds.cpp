@@ -122,7 +122,7 @@ void WriteMessages() {
   WriteMessage(0, fdi::idl::ValveSampleMessage{"V1", PlantSample(7)});
   fdi::Sample with_pv = PlantSample(7);
   with_pv.Set(fdi::Signal::kPv, 3.2);
-  WriteMessage<2>(9, fdi::idl::ValveSampleMessage{"V1", with_pv});
+  WriteMessage<2>(7, fdi::idl::ValveSampleMessage{"V1", with_pv});
   fdi::idl::DecisionMessage decision;
   decision.valve_id = "V1";
   decision.channel_count = static_cast<int>(models.channels.size());
@@ -141,10 +141,7 @@ void WriteMessages() {
   WriteMessage(4, status);
   WriteMessage(5,
                fdi::idl::DecisionBatchMessage{"host:1", {decision, decision}});
-  WriteMessage(6, fdi::OperatorAction{"host:1", fdi::OperatorActionKind::kAck,
-                                      7, "", "", 8, "anna", "seen", "console"});
-  WriteMessage(7, fdi::MonitorShare{"host:1", "plant", "FV-*", "hall-1"});
-  WriteMessage(8, fdi::PairState{"host:1", "plant", 1, 7, true, false, 10, 20});
+  WriteMessage(6, fdi::MonitorShare{"host:1", "FV-*", "hall-1"});
 }
 
 void WriteDatagrams() {

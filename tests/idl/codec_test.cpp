@@ -318,28 +318,11 @@ TEST(CodecTest, ABatchArrivesWhole) {
   EXPECT_THROW(RoundTrip(sent), DataError);
 }
 
-TEST(CodecTest, PairStateArrivesWhole) {
-  PairState sent{"host:1", "plant", 2,    1ULL << 63U,
-                 true,     true,    1000, 1U << 31U};
-
-  const PairState got = RoundTrip(sent);
-
-  EXPECT_EQ(got.monitor, "host:1");
-  EXPECT_EQ(got.pair, "plant");
-  EXPECT_EQ(got.rank, 2);
-  EXPECT_EQ(got.instance, sent.instance);
-  EXPECT_TRUE(got.leads);
-  EXPECT_TRUE(got.leaving);
-  EXPECT_EQ(got.judged, 1000);
-  EXPECT_EQ(got.received, sent.received);
-}
-
 TEST(CodecTest, MonitorShareArrivesWhole) {
   const MonitorShare got =
-      RoundTrip(MonitorShare{"host:1", "plant", "FV-*", "hall-1,yard"});
+      RoundTrip(MonitorShare{"host:1", "FV-*", "hall-1,yard"});
 
   EXPECT_EQ(got.monitor, "host:1");
-  EXPECT_EQ(got.pair, "plant");
   EXPECT_EQ(got.valves, "FV-*");
   EXPECT_EQ(got.partitions, "hall-1,yard");
 }

@@ -289,8 +289,8 @@ TEST_F(DeliveryTest, AnInterruptWakesATakeThatWaits) {
 
   std::jthread waker([&] { subscriber.Interrupt(); });
 
-  EXPECT_EQ(subscriber.Take({}, kPatience), 0);
-  EXPECT_LT(steady_clock::now() - start, kPatience / 2);
+  EXPECT_EQ(subscriber.Take({}, 10 * kPatience), 0);
+  EXPECT_LT(steady_clock::now() - start, 5 * kPatience);
 }
 
 TEST_F(DeliveryTest, DomainsDoNotMeet) {

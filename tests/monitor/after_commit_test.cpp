@@ -57,20 +57,6 @@ TEST_F(AfterCommitTest, StepsAreTakenInTheirOrderByNewAndResentEvents) {
   EXPECT_THAT(notes_, ElementsAre("page", "bus again", "hook"));
 }
 
-TEST_F(AfterCommitTest, BeyondTheGateIsWhatTheGatePasses) {
-  Noting pair{"pair", notes_};
-  list_.Add("page", Tell("page"));
-  list_.AddGate(pair);
-  list_.Add(bus_);
-  list_.Add("hook", Tell("hook"));
-
-  EXPECT_TRUE(list_.Publish({}, true));
-  EXPECT_THAT(notes_, ElementsAre("page", "pair"));
-  notes_.clear();
-  EXPECT_TRUE(list_.beyond().Publish({}, true));
-  EXPECT_THAT(notes_, ElementsAre("bus", "hook"));
-}
-
 TEST_F(AfterCommitTest, AStepThatFailsIsCountedAndStopsNothing) {
   list_.Add("page", [](const FaultEvent&, bool) {
     throw std::runtime_error("no page");

@@ -23,10 +23,10 @@ TimePoint Now() {
   return Pulse::Clock::now();
 }
 
-// Waits for what threads bring about without a word; 10 s at most.
+// Waits for what threads bring about without a word; 60 s at most.
 template <typename Condition>
 bool Eventually(Condition condition) {
-  const TimePoint deadline = Now() + std::chrono::seconds(10);
+  const TimePoint deadline = Now() + std::chrono::seconds(60);
   while (!condition()) {
     if (Now() > deadline) {
       return false;

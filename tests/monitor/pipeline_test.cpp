@@ -117,32 +117,6 @@ TEST_F(PipelineTest, AValveThatIsNoLongerAssignedHasNoPlaceReserved) {
   EXPECT_THAT(pipeline_->valve_names(), testing::ElementsAre("S1"));
 }
 
-// Nobody would be left to close it.
-TEST_F(PipelineTest, AnAdoptedEpisodeKeepsThePlaceOfItsValveUntilItEnds) {
-  options_.max_valves = 1;
-  Start();
-  const auto start = std::chrono::steady_clock::now();
-  pipeline_->OnSample("S1", PlantSample(0), 1, start);
-  FaultEvent event;
-  event.valve_id = "S1";
-  event.source_id = 1;
-  event.episode_id = 42;
-  event.transition.kind = TransitionKind::kDetected;
-  event.transition.stamp_ns = PlantSample(0).stamp_ns;
-  event.model_hash = models_->content_hash;
-  pipeline_->Adopt(event);
-
-  for (const int silence_s : {70, 3700, 3701}) {  // It is closed after 3600.
-    const auto now = start + std::chrono::seconds(silence_s);
-    pipeline_->Poll(now);
-    pipeline_->OnSample("S2", PlantSample(0), 1, now);
-  }
-  EXPECT_EQ(counters_[Counter::kRefusedSamples], 2U);
-  EXPECT_THAT(pipeline_->valve_names(), testing::ElementsAre("S2"));
-  pipeline_->Stop();
-  EXPECT_EQ((history_.recorded.count({42, TransitionKind::kClosed})), 1U);
-}
-
 // Else recorder and bus would keep something of every id that was ever heard.
 TEST_F(PipelineTest, TheRunOfAnEvictedValveEndsAndItsLastVectorGoes) {
   options_.max_valves = 1;

@@ -495,9 +495,7 @@ TEST_F(LookWorkerTest, AStopWaitsForNoLook) {
   while (worker_.waiting() > 1) {  // Until the first is in work.
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   }
-  const auto before = std::chrono::steady_clock::now();
   worker_.Stop();
-  EXPECT_LT(std::chrono::steady_clock::now() - before, seconds(2));
   EXPECT_EQ(counters_[Counter::kLooks], 0U);
   EXPECT_FALSE(Ready(second));
 }

@@ -16,7 +16,7 @@
 namespace fdi::monitor {
 namespace {
 
-const MonitorShare kOwn{"host:1", "", "V*", ""};
+const MonitorShare kOwn{"host:1", "V*", ""};
 
 std::size_t Contested(const MonitorShare& own, const MonitorShare& other) {
   return FindContested(own, {other}, {"V1", "V2", "W1"}).count;
@@ -24,25 +24,21 @@ std::size_t Contested(const MonitorShare& own, const MonitorShare& other) {
 
 TEST(FindContestedTest, AnotherMonitorContestsWhatItsGlobMatches) {
   const ContestedValves found =
-      FindContested(kOwn, {{"host:2", "", "*1", ""}}, {"V2", "V1"});
+      FindContested(kOwn, {{"host:2", "*1", ""}}, {"V2", "V1"});
   EXPECT_EQ(found.count, 1U);
   EXPECT_EQ(found.example, "V1");
   EXPECT_EQ(found.monitor, "host:2");
-  EXPECT_EQ(Contested(kOwn, {"host:2", "", "X*", ""}), 0U);
+  EXPECT_EQ(Contested(kOwn, {"host:2", "X*", ""}), 0U);
 }
 
-TEST(FindContestedTest, ThePairAndTheMonitorItselfDoNot) {
+TEST(FindContestedTest, TheMonitorItselfDoesNot) {
   EXPECT_EQ(Contested(kOwn, kOwn), 0U);
-  MonitorShare own = kOwn;
-  own.pair = "plant";
-  EXPECT_EQ(Contested(own, {"host:2", "plant", "V*", ""}), 0U);
-  EXPECT_EQ(Contested(own, {"host:2", "other", "V*", ""}), 2U);
-  EXPECT_EQ(Contested(own, {"host:2", "", "V*", ""}), 2U);
+  EXPECT_EQ(Contested(kOwn, {"host:2", "V*", ""}), 2U);
 }
 
 TEST(FindContestedTest, OnlyWherePartitionsOverlap) {
   const auto contested = [](const char* a, const char* b) {
-    return Contested({"host:1", "", "V*", a}, {"host:2", "", "V*", b}) > 0;
+    return Contested({"host:1", "V*", a}, {"host:2", "V*", b}) > 0;
   };
   EXPECT_TRUE(contested("hall-1", "hall-1"));
   EXPECT_TRUE(contested("hall-*", "yard,hall-1"));
@@ -89,7 +85,7 @@ TEST(MonitorNameTest, InContainersOfOneHostNameItIsUnique) {
 
   EXPECT_NE(first.find(":1-"), std::string::npos) << first;
   EXPECT_NE(first, second);
-  EXPECT_EQ(Contested({first, "", "V*", ""}, {second, "", "V*", ""}), 2U);
+  EXPECT_EQ(Contested({first, "V*", ""}, {second, "V*", ""}), 2U);
 }
 
 // Whatever others call themselves, the status goes out.

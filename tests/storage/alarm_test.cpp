@@ -49,7 +49,7 @@ TEST(AlarmStateTest, AnEpisodeReturnsWhenItIsClearedOrEndsOtherwise) {
   EXPECT_EQ(AlarmStateOf(superseded, true), AlarmState::kShelved);
 }
 
-// A clock that was set back, or that of a standby, may say a time before it.
+// A clock that was set back may say a time before it.
 TEST(ShelfTest, HoldsUntilItsEndWhateverTheClockWasSetTo) {
   Shelf shelf = ShelfOf("V", 10, 20);
   EXPECT_TRUE(IsActive(shelf, 9));

@@ -5,7 +5,6 @@
 #include <gmock/gmock.h>
 
 #include "base/error.h"
-#include "storage/history/operator_log.h"
 #include "tests/storage/history_fixture.h"
 #include "tests/storage/message_of.h"
 
@@ -145,13 +144,6 @@ TEST_F(UnconfirmedTest, WhatWasAcknowledgedBeforeStaysToo) {
   EXPECT_EQ(Find().state, AlarmState::kAcked);
   EXPECT_THAT(Listed(), ElementsAre("open", "LV-2", "LV-1"));
   EXPECT_EQ(CountOf(EpisodeState::kAlarmAcked), 1U);
-  OperatorAction same;  // From the other of a pair.
-  same.episode_id = Id("open");
-  same.stamp_ns = now_ - 2;
-  same.who = "anna";
-  same.origin = "test";
-  EXPECT_TRUE(editor_.Adopt(same));
-  EXPECT_EQ(Find().state, AlarmState::kAcked);
 
   editor_.Acknowledge(IdText("open"), By("jan", now_ + 1));
   EXPECT_EQ(Find().state, AlarmState::kNormal);
@@ -210,7 +202,7 @@ TEST_F(HistoryEditorTest, AShelfOutlivesTheProgramAndEndsByItself) {
   EXPECT_EQ(in_force[0].comment, "seat ordered");
   EXPECT_TRUE(reader.Shelves(until).empty());
   EXPECT_EQ(reader.Shelves().size(), 1U);
-  // The clock is set back by an hour, or a standby is behind.
+  // The clock is set back by an hour.
   EXPECT_EQ(reader.Shelves(now_ - 3600 * kSecond).size(), 1U);
   const auto alarms = reader.Alarms(reader.List(), now_);
   EXPECT_TRUE(alarms[0].shelf);
@@ -290,23 +282,6 @@ TEST_F(HistoryEditorTest, APlannedShelfBeginsAtItsTime) {
                ConfigError);
 }
 
-TEST_F(HistoryEditorTest, AShelfPlannedOnTheOtherMonitorIsPlannedHere) {
-  OperatorAction action;
-  action.monitor = "host:1";
-  action.kind = OperatorActionKind::kShelve;
-  action.valve_id = "LV-1";
-  action.who = "anna";
-  action.stamp_ns = UtcNow() + 3600 * kSecond;
-  action.until_ns = action.stamp_ns + kSecond;
-  ASSERT_TRUE(editor_.Adopt(action));
-  EXPECT_FALSE(IsActive(HistoryReader(path_).Shelves().back(), UtcNow()));
-  // Clocks differ by less than this.
-  action.valve_id = "LV-2";
-  action.stamp_ns = UtcNow() + 5 * kSecond;
-  ASSERT_TRUE(editor_.Adopt(action));
-  EXPECT_TRUE(IsActive(HistoryReader(path_).Shelves().back(), UtcNow()));
-}
-
 TEST_F(HistoryEditorTest, TheShelfIsAppendOnly) {
   editor_.Shelve("LV-1", std::nullopt, now_ + kSecond, By("anna", now_));
   Database file(path_, HistorySchema(), Access::kOccasionalWriter);
@@ -330,158 +305,6 @@ TEST_F(HistoryEditorTest, FiguresComeFromTheFilterAndTheFile) {
   EXPECT_EQ(HistoryReader(path_).AlarmFigures(filter, now_).valves.size(), 1U);
   filter.since_ns = kDetected + 92 * kSecond;
   EXPECT_TRUE(HistoryReader(path_).AlarmFigures(filter, now_).valves.empty());
-}
-
-// As those of a pair, whose operators worked while the link was cut.
-TEST_F(HistoryEditorTest, TwoHistoriesThatAdoptFromEachOtherShowTheSame) {
-  const std::filesystem::path there = directory_.path() / "there.db";
-  HistoryWriter writer(there);
-  RecordEpisode(writer, 0b010, "LV-1");
-  HistoryEditor editor(there);
-  const std::string id = IdText("LV-1");
-  editor_.Acknowledge(id, By("jan", now_ + 5));
-  editor.Acknowledge(id, By("anna", now_, "seen"));
-  editor.Label(id, "f1", By("anna", now_ + 9));
-  editor_.Label(id, "true", By("jan", now_ + 7));
-  const Shelf shelf = editor_.Shelve("LV-9", "f19|f1", now_ + 60 * kSecond,
-                                     By("jan", now_, "works on it"));
-  editor.Shelve("LV-8", std::nullopt, now_ + 60 * kSecond, By("anna", now_));
-  editor_.Acknowledge(IdText("LV-2"), By("jan", now_));  // Not there.
-
-  OperatorLog done_here(path_);
-  OperatorLog done_there(there);
-  const auto adopt = [this](OperatorLog& from, HistoryEditor& into) {
-    std::size_t fresh = 0;
-    for (const OperatorAction& action : from.Next(now_ - kSecond)) {
-      try {
-        fresh += into.Adopt(action) ? 1 : 0;
-      } catch (const NotFoundError&) {
-      }
-    }
-    return fresh;
-  };
-  EXPECT_EQ(adopt(done_here, editor), 3U);
-  EXPECT_EQ(adopt(done_there, editor_), 3U);
-  EXPECT_EQ(adopt(done_here, editor), 0U);  // What came back.
-  editor_.EndShelf(shelf.shelf_id, By("jan", now_ + kSecond));
-  EXPECT_EQ(adopt(done_here, editor), 1U);
-  done_here.Rewind();
-  EXPECT_EQ(adopt(done_here, editor), 0U);
-
-  for (const std::filesystem::path& path : {path_, there}) {
-    HistoryReader reader(path);
-    EXPECT_EQ(reader.Show(id).acked_by, "anna");
-    EXPECT_EQ(reader.Show(id).acked_ns, now_);
-    EXPECT_EQ(reader.Show(id).label, "f1");
-    const std::vector<Shelf> shelves = reader.Shelves();
-    ASSERT_EQ(shelves.size(), 2U);
-    const Shelf& ended = shelves[shelves[0].valve_id == "LV-9" ? 0 : 1];
-    EXPECT_EQ(ended.fault, "f1|f19");
-    EXPECT_EQ(ended.comment, "works on it");
-    EXPECT_EQ(ended.ended_ns, now_ + kSecond);
-  }
-}
-
-// Two monitors of a pair, of which one records an episode half a minute later.
-class LateHistoryTest : public HistoryEditorTest {
- protected:
-  void Record(TransitionKind kind, double after_s, double here_s,
-              EndReason reason = EndReason::kNone) {
-    FaultEvent event = Event(kind, after_s, 0b10, 0.9, reason, "pair");
-    event.transition.severity =
-        kind == TransitionKind::kDetected ? Severity::kLow : Severity::kHigh;
-    const auto at = [&](double s) {
-      return kDetected + static_cast<std::int64_t>((after_s + s) * 1e9);
-    };
-    writer_.Record(event, at(here_s));
-    late_.push_back({event, at(here_s + 30.0)});
-  }
-  // Anna acknowledges here all that is recorded so far.
-  OperatorAction Acknowledged(double after_s) {
-    editor_.Acknowledge(
-        IdText("pair"),
-        By("anna", kDetected + static_cast<std::int64_t>(after_s * 1e9)));
-    return OperatorLog(path_).Next(0).back();
-  }
-  void RecordThere(std::size_t count) {
-    for (; count > 0; --count) {
-      there_.Record(late_.front().first, late_.front().second);
-      late_.erase(late_.begin());
-    }
-  }
-  Episode There() { return HistoryReader(path()).Show(IdText("pair")); }
-  std::filesystem::path path() const { return directory_.path() / "there.db"; }
-
-  HistoryWriter there_{path()};
-  HistoryEditor editor_there_{path()};
-  std::vector<std::pair<FaultEvent, std::int64_t>> late_;
-};
-
-TEST_F(LateHistoryTest, AnAcknowledgementWaitsForWhatItCovers) {
-  Record(TransitionKind::kDetected, 0, 1);
-  Record(TransitionKind::kIsolated, 20, 1);
-  const OperatorAction seen = Acknowledged(22);
-  EXPECT_FALSE(editor_there_.HasEventsOf(seen));
-  RecordThere(1);
-  EXPECT_FALSE(editor_there_.HasEventsOf(seen));
-  RecordThere(1);
-  ASSERT_TRUE(editor_there_.HasEventsOf(seen));
-  EXPECT_TRUE(editor_there_.Adopt(seen));
-  EXPECT_EQ(There().acked_by, "anna");
-}
-
-TEST_F(LateHistoryTest, APriorityThatRoseAfterItIsNotCovered) {
-  Record(TransitionKind::kDetected, 0, 1);
-  const OperatorAction seen = Acknowledged(19);
-  Record(TransitionKind::kIsolated, 20, 1);
-  RecordThere(2);
-  ASSERT_TRUE(editor_there_.HasEventsOf(seen));
-  EXPECT_TRUE(editor_there_.Adopt(seen));
-  EXPECT_EQ(There().acked_by, std::nullopt);
-}
-
-TEST_F(LateHistoryTest, AnEndThatWasSeenIsKnownThereToo) {
-  Record(TransitionKind::kDetected, 0, 1);
-  Record(TransitionKind::kClosed, 120, 1, EndReason::kStaleTimeout);
-  const OperatorAction seen = Acknowledged(122);
-  RecordThere(2);
-  EXPECT_TRUE(There().unconfirmed_ns);
-  EXPECT_TRUE(editor_there_.Adopt(seen));
-  EXPECT_FALSE(There().unconfirmed_ns);
-}
-
-// Of version 2: the column is younger.
-TEST_F(HistoryEditorTest, AdoptsANoteWithoutAnOrigin) {
-  OperatorAction action;
-  action.monitor = "host:1";
-  action.episode_id = Id("LV-1");
-  action.who = "anna";
-  action.stamp_ns = now_;
-  EXPECT_TRUE(editor_.Adopt(action));
-  ASSERT_EQ(Notes("LV-1").size(), 1U);
-  EXPECT_EQ(Notes("LV-1")[0].origin, "host:1");
-}
-
-TEST_F(HistoryEditorTest, AdoptsShelvesOfAtMostNinetyDays) {
-  OperatorAction action;
-  action.monitor = "host:1";
-  action.kind = OperatorActionKind::kShelve;
-  action.valve_id = "LV-9";
-  action.who = "anna";
-  action.stamp_ns = now_;
-  for (const std::int64_t until_ns :
-       {now_, now_ - 1, now_ + kMaxShelfNs + 1,
-        std::numeric_limits<std::int64_t>::max()}) {
-    action.until_ns = until_ns;
-    EXPECT_THROW(editor_.Adopt(action), ConfigError) << until_ns;
-  }
-  action.until_ns = now_ + kMaxShelfNs;
-  action.ended_ns = now_ + kSecond;
-  action.ended_by = "jan";
-  EXPECT_TRUE(editor_.Adopt(action));
-  const std::vector<Shelf> shelves = HistoryReader(path_).Shelves();
-  ASSERT_EQ(shelves.size(), 1U);
-  EXPECT_EQ(shelves[0].ended_origin, "host:1");
 }
 
 }  // namespace

@@ -278,17 +278,6 @@ TEST_F(HistoryWriterTest, NoSessionEndsBeforeItBegins) {
   EXPECT_EQ(Sql("SELECT session_id FROM episode"), "2");
 }
 
-TEST_F(HistoryWriterTest, KnowsWhichEpisodeOfAValveEndedLast) {
-  HistoryWriter writer(path_);
-  EXPECT_TRUE(writer.LastEnds().empty());
-  RecordEpisode(writer, 0b010);
-  const auto ends = writer.LastEnds();
-  ASSERT_EQ(ends.size(), 1U);
-  EXPECT_EQ(ends[0].episode_id, Id());
-  EXPECT_EQ(std::to_string(ends[0].ended_ns),
-            Sql("SELECT ended_ns FROM episode"));
-}
-
 TEST_F(HistoryWriterTest, EpisodeOfADeadMonitorCanBeClosedOnce) {
   { HistoryWriter(path_).Record(Event(Kind::kDetected, 0, 0, 0.3), kDetected); }
   HistoryWriter writer(path_);
@@ -503,23 +492,13 @@ TEST_F(GrowingAlarmTest, AHigherPriorityHasToBeAcknowledgedAgain) {
             Severity::kCritical);
   EXPECT_EQ(writer_.OpenEpisodes().at(0).severity, Severity::kCritical);
 
-  // It comes late from the other of a pair, which may have recorded the rise up
-  // to 5 s earlier.
-  OperatorAction before;
-  before.episode_id = Id();
-  before.stamp_ns = rose - 5 * kSecond;
-  before.who = "jan";
-  before.origin = "test";
-  EXPECT_TRUE(editor_.Adopt(before));
-  EXPECT_EQ(Shown().acked_by, std::nullopt);
   const auto critical = [&] {
     const AlarmCounts counts = HistoryReader(path_).CountAlarms(rose);
     const auto i = static_cast<std::size_t>(Severity::kCritical);
     return std::pair(counts.active[i], counts.unacked[i]);
   };
   EXPECT_EQ(critical(), std::pair(1UL, 1UL));
-  before.stamp_ns += 1;
-  EXPECT_TRUE(editor_.Adopt(before));
+  editor_.Acknowledge(EpisodeIdText(Id()), By("jan", rose));
   EXPECT_EQ(Shown().acked_by, "jan");
   EXPECT_EQ(critical(), std::pair(1UL, 0UL));
   editor_.Shelve("LV-1", std::nullopt, rose + kSecond, By("jan", rose - 1));

@@ -1,17 +1,18 @@
 #!/usr/bin/env bash
-# Everything at once for FDI_MIXED_SECONDS (default 60, long form 600): a pair of
-# monitors on two hosts (network namespaces), 300 valves in five streams with
-# faults that come and go, the history of each monitor shipped to PostgreSQL by a
-# shipper of its own. Every few seconds one of these: a monitor is killed or
-# stopped for a while, its link is cut, its shipper is killed, PostgreSQL crashes.
-# Afterwards the episodes that subscribers heard of, those of both histories and
-# those of the plant have to be the same ones with the same ends.
+# Everything at once for FDI_MIXED_SECONDS (default 60, long form 600): monitors on
+# two hosts (network namespaces) share 300 valves in five streams with faults that
+# come and go, the history of each monitor is shipped to PostgreSQL by a shipper of
+# its own. Every few seconds one of these: a monitor is killed or stopped for a
+# while, its link is cut, its shipper is killed, PostgreSQL crashes. Afterwards the
+# history of each monitor and the plant's have to hold the same episodes with the
+# same ends, and subscribers have to have heard of each of them.
 # Usage: mixed.sh BIN_DIRECTORY    77 without namespaces or PostgreSQL.
 set -euo pipefail
 bin=$1
 seconds=${FDI_MIXED_SECONDS:-60}
 seed=${FDI_MIXED_SEED:-1}
 streams=5 valves=60
+share=('' 'S[1-3]*' 'S[45]*')  # Of the streams S1 to S5, by monitor.
 tag=$$
 out=$(mktemp -d)
 hub=fdi-h-$tag
@@ -105,7 +106,7 @@ cp "$out"/data1/* "$out/data2"
 
 start_monitor() {  # MONITOR
   ip netns exec "$(space "$1")" "$bin/fdi-monitor" --interface "10.79.0.$1" \
-    --data "$out/data$1" run --model-set quick --pair mixed --rank "$1" \
+    --data "$out/data$1" run --model-set quick --valves "${share[$1]}" \
     2>>"$out/monitor$1.log" &
   monitor[$1]=$!
 }
@@ -190,32 +191,30 @@ kill -TERM "$watcher"
 wait "$watcher" || true
 watcher=
 
-# An episode that gave way to the other monitor's is not counted.
 columns="episode_id || ' ' || coalesce(ended_ns, 0) || ' ' || coalesce(end_reason, '')"
-where="coalesce(end_reason, '') <> 'superseded'"
 for i in 1 2; do
   sqlite3 -readonly "$out/data$i/history.db" \
-    "SELECT $columns FROM episode WHERE $where" | sort >"$out/history$i.txt"
+    "SELECT $columns FROM episode" | sort >"$out/history$i.txt"
   psql "$url" -At -c "SELECT $columns FROM fdi.episode JOIN fdi.monitor m
-    USING (monitor_id) WHERE m.monitor = 'm$i' AND $where" | sort >"$out/plant$i.txt"
+    USING (monitor_id) WHERE m.monitor = 'm$i'" | sort >"$out/plant$i.txt"
 done
 closed() { grep -c ' ' "$1" || true; }
 jq_id='s/.*"episode_id": *"\([^"]*\)".*/\1/p'
 sed -n "$jq_id" "$out/bus" | sort -u >"$out/heard.txt"
-"$bin/fdi-store" --data "$out/data1" history list --state any --json 2>/dev/null |
-  sed -n "$jq_id" | sort -u >"$out/listed.txt"
+for i in 1 2; do
+  "$bin/fdi-store" --data "$out/data$i" history list --state any --json 2>/dev/null
+done | sed -n "$jq_id" | sort -u >"$out/listed.txt"
 echo "mixed: $seconds s, seed $seed, strikes:" \
   "$(for kind in "${!strikes[@]}"; do echo -n "$kind ${strikes[$kind]} "; done)"
 echo "mixed: $(wc -l <"$out/heard.txt") episodes on the bus," \
   "$(closed "$out/history1.txt") and $(closed "$out/history2.txt") in the" \
   "histories, $(closed "$out/plant1.txt") and $(closed "$out/plant2.txt") in" \
   "the plant's; open $(grep -c ' 0 ' "$out/history1.txt" || true)"
-cmp "$out/history1.txt" "$out/history2.txt" || fail "the histories differ"
 for i in 1 2; do
   cmp "$out/history$i.txt" "$out/plant$i.txt" || fail "the plant's m$i differs"
 done
-# A fault that falls into the restarts of both monitors is missed.
-[ "$(closed "$out/history1.txt")" -ge $((streams * valves)) ] ||
+# A fault that falls into a restart or a cut of its monitor is missed.
+[ "$(cat "$out"/history?.txt | wc -l)" -ge $((streams * valves / 2)) ] ||
   fail "too few episodes"
 missing=$(comm -13 "$out/heard.txt" "$out/listed.txt" | wc -l)
 unknown=$(comm -23 "$out/heard.txt" "$out/listed.txt" | wc -l)

@@ -452,7 +452,7 @@ class ShiftTest : public MonitorFixture {
   // The moment is reached, and all say so.
   void Moment(const char* what, const std::vector<Expected>& expected) {
     SCOPED_TRACE(what);
-    const auto deadline = Clock::now() + std::chrono::seconds(10);
+    const auto deadline = Clock::now() + std::chrono::seconds(60);
     std::string wrong;
     do {
       Take();

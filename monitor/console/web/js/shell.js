@@ -67,12 +67,12 @@ function historyText() {
 }
 
 // Of a plant how many monitors there are; of a monitor how it is.
-function healthText({plant, health, pair, write}) {
+function healthText({plant, health, write}) {
   const silent = plant?.monitors.filter((m) => m.silent).length;
   return (!plant ? (health === 'OK' ? 'Monitor OK' : 'Monitor degraded') :
     `${plant.monitors.length} monitors` +
       (silent ? `, ${silent} silent` : health === 'OK' ? '' : ', degraded')) +
-      (pair ? `, ${pair}` : '') + (write ? '' : ', read-only');
+      (write ? '' : ', read-only');
 }
 
 export function createShell(top, banner) {

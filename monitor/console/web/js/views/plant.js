@@ -96,8 +96,6 @@ class Plant extends View {
           () => this.#choose(monitor), {'class': 'chip',
             'aria-pressed': String(monitor === this.#monitor)})},
       {text: 'Host', class: 'wide', cell: ({host}) => host},
-      {text: 'Pair', class: 'wide', cell: ({pair}) => pair === null ? '–' :
-        pair === 'leader' ? 'leads' : 'stands by'},
       {text: 'Health', cell: ({health, text, silent}) => silent ? 'silent' :
         [health ?? '–', text && `: ${text}`]},
       {text: 'Valves', class: 'num', cell: ({valves}) => String(valves)},
