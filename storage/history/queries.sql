@@ -298,22 +298,9 @@ VALUES (?, ?, ?, ?, ?, ?) ON CONFLICT DO UPDATE SET
 SELECT hour, model_hash, epoch, live_ms, bytes FROM health_hour
 WHERE valve_id = ? AND hour >= ? AND hour < ?
 ORDER BY hour, epoch, model_hash
--- Those with stroke tests: format 3, see health.cpp.
--- name: stroke_hours
-SELECT hour, model_hash, epoch, live_ms, bytes FROM health_hour
-WHERE valve_id = ? AND hour <= ? AND substr(bytes, 1, 1) IN (x'03', x'83')
-ORDER BY hour DESC
 -- Skips from valve to valve along the key.
 -- name: next_health_valve
 SELECT min(valve_id) FROM health_hour WHERE valve_id > ?
-
--- ---- Shadow.
--- name: shadow_differences
-FROM shadow_difference
-WHERE valve_id GLOB ?1 AND from_ns >= ?2 AND from_ns < ?3
-  AND (?4 = '' OR candidate_set = ?4
-       OR substr(candidate_set, 1, length(?4) + 1) = ?4 || '@')
-ORDER BY from_ns DESC, difference_id DESC LIMIT ?5
 
 -- ---- Shelves. The columns are kFieldsOf<Shelf>.
 -- name: shelves
@@ -442,14 +429,6 @@ DELETE FROM health_hour WHERE valve_id = ?1 AND hour < ?2
     SELECT part FROM change
     WHERE number > (SELECT min(number) FROM ship_cursor)
       AND item = 'hour' AND key = ?1)
--- name: old_shadow
-SELECT count(*), min(from_ns), max(from_ns) FROM shadow_difference
-WHERE to_ns < ?
--- name: delete_old_shadow
-DELETE FROM shadow_difference WHERE difference_id IN (
-  SELECT difference_id FROM shadow_difference WHERE to_ns < ?
-  ORDER BY from_ns LIMIT ?)
-
 -- ---- Integrity: one finding per row, see Schema::checks.
 -- name: damaged_episode_ids
 SELECT 'episode ' || quote(episode_id) || ': its id is not 16 hex digits'
@@ -475,13 +454,6 @@ ON CONFLICT (valve_id) DO UPDATE SET source_id = excluded.source_id,
   model_hash = excluded.model_hash, stamp_ns = excluded.stamp_ns,
   bytes = excluded.bytes
 WHERE excluded.stamp_ns > accumulator.stamp_ns
--- name: copy_shadow_accumulator
-INSERT INTO shadow_accumulator
-SELECT * FROM source.shadow_accumulator WHERE valve_id = ?
-ON CONFLICT (valve_id) DO UPDATE SET source_id = excluded.source_id,
-  model_hash = excluded.model_hash, stamp_ns = excluded.stamp_ns,
-  bytes = excluded.bytes
-WHERE excluded.stamp_ns > shadow_accumulator.stamp_ns
 -- name: copy_open_episodes
 INSERT OR IGNORE INTO episode (episode_id, valve_id, source_id, detected_ns,
   isolated_ns, cleared_ns, fault_bits, peak_factor, strength, model_set,

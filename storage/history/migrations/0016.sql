@@ -34,7 +34,6 @@ CREATE TABLE episode (
   highest REAL,                  -- NULL: not known.
   worst_strength REAL,           -- Since it has its name.
   priority INTEGER,       -- Of the alarm, 1 (critical) to 4 (low), as of now.
-  raised_ns INTEGER,      -- When priority last rose.
   -- The data ended then, and the fault has not been seen to be gone; NULL
   -- otherwise, or once the valve was judged again or a person acknowledged it.
   unconfirmed_ns INTEGER,
@@ -271,35 +270,6 @@ CREATE TABLE health_hour (
 
 -- The engine of each valve as of its last minute, for the next session.
 CREATE TABLE accumulator (
-  valve_id TEXT PRIMARY KEY,
-  source_id INTEGER NOT NULL,
-  model_hash INTEGER NOT NULL,
-  stamp_ns INTEGER NOT NULL,   -- Of the last sample.
-  bytes BLOB NOT NULL
-) STRICT;
-
--- A stretch in which a candidate model set said something else than the active
--- one, and the candidate on each valve as of its last minute.
-CREATE TABLE shadow_difference (
-  difference_id INTEGER PRIMARY KEY,
-  valve_id TEXT NOT NULL,
-  source_id INTEGER NOT NULL,
-  from_ns INTEGER NOT NULL,
-  to_ns INTEGER NOT NULL,
-  samples INTEGER NOT NULL,
-  active_set TEXT NOT NULL,    -- NAME@VERSION
-  active_hash INTEGER NOT NULL,
-  active_state TEXT NOT NULL,  -- NORMAL, DETECTED, ISOLATED
-  active_fault TEXT,
-  candidate_set TEXT NOT NULL,
-  candidate_hash INTEGER NOT NULL,
-  candidate_state TEXT NOT NULL,
-  candidate_fault TEXT
-) STRICT;
-CREATE UNIQUE INDEX shadow_difference_once ON shadow_difference
-  (valve_id, source_id, from_ns, candidate_hash);
-CREATE INDEX shadow_difference_by_time ON shadow_difference (from_ns);
-CREATE TABLE shadow_accumulator (
   valve_id TEXT PRIMARY KEY,
   source_id INTEGER NOT NULL,
   model_hash INTEGER NOT NULL,
