@@ -32,8 +32,8 @@ struct Indication {
   std::vector<int> second_set{};  ///< Its faults; empty: it has no name.
 };
 
-/// The indices of the DAMADICS benchmark for one run, times in s from the start
-/// of the fault; −1 where an index has no meaning.
+/// What one run came to; times in s from the start of the fault, -1 where a
+/// number has no meaning (docs/evaluation.md).
 struct RunIndices {
   std::string run_id;
   int fault{0};             ///< 0: a run without fault.
@@ -41,16 +41,8 @@ struct RunIndices {
   bool detected{false};     ///< DD at the horizon, after an edge in the fault.
   double t_dt_first{-1.0};  ///< First rising edge of DD in the fault zone.
   double t_dt{-1.0};        ///< Last rising edge: permanent detection.
-  double t_it_first{-1.0};  ///< The same of PID: the fault is in the set.
-  double t_it{-1.0};
-  double t_exact{-1.0};     ///< First instant at which the set is {fault}.
+  double t_it{-1.0};        ///< The same of PID: the fault is in the set.
   double r_fd{-1.0};        ///< Share of [t_on, t_from) with DD.
-  double r_td{-1.0};        ///< Share of [t_from, t_hor] with DD.
-  double r_fi{-1.0};        ///< Share of [t_on, t_from) with a set isolated.
-  double r_ti{-1.0};        ///< Share of [t_from, t_hor] with PID.
-  double r_mi{-1.0};        ///< Mean number of wrong faults in [t_on, t_hor].
-  double fs_d{-1.0};        ///< |strength| at t_dt.
-  double fs_i{-1.0};        ///< |strength| at t_it.
   double d_acc{-1.0};       ///< 1/size of the final set if the truth is in it.
   int episodes{0};          ///< Rising edges of DD in the whole run.
   int wrong_isolations{0};  ///< Sets of one wrong fault, while one acts.
@@ -59,13 +51,23 @@ struct RunIndices {
   Wording wording;  ///< Of final_set when it was named.
 };
 
-/// Computes the indices. t_from is the first instant with a fault, t_on the
-/// later of the first settled instant and 600 s before t_from. Without a fault
-/// t_on is the first settled instant and t_from the end of the run.
-///
-/// @param horizon_s t_hor from the start of the run [s]; 0 = the last instant.
+/// Computes the indices over the zones of the run.
 RunIndices ComputeIndices(const std::vector<Indication>& indications,
                           double horizon_s = 0.0);
+
+/// The instants that indices look at, as positions among the indications.
+struct RunZones {
+  std::size_t on{0};    ///< t_on: begins the time before the fault.
+  std::size_t from{0};  ///< t_from: the first with a fault; past the end: none.
+  std::size_t last{0};  ///< t_hor.
+};
+
+/// t_on is the later of the first settled instant and 600 s before t_from;
+/// without a fault it is the first settled instant.
+///
+/// @param indications not empty.
+/// @param horizon_s t_hor from the start of the run [s]; 0 = the last instant.
+RunZones ZonesOf(const std::vector<Indication>& indications, double horizon_s);
 
 /// Whether the engine says that no known fault explains the episode, or has
 /// nothing but findings of the floor: a name that it gave before counts no
@@ -103,21 +105,5 @@ std::vector<Indication> ScoreRun(const std::shared_ptr<const ModelSet>& models,
 std::vector<Indication> ScoreRun(const std::shared_ptr<const EnginePlan>& plan,
                                  const TrainingRun& run,
                                  const VerdictSink& sink = {});
-
-/// Sums over runs.
-struct EvaluationSummary {
-  int faulty_runs{0};
-  int detected{0};
-  int contained{0};         ///< Final set contains the truth.
-  int exact{0};             ///< Final set is the truth.
-  double mean_d_acc{-1.0};  ///< Over detected runs.
-  double max_r_fd{-1.0};
-  int fault_free_runs{0};
-  double fault_free_hours{0.0};
-  int fault_free_episodes{0};
-};
-
-EvaluationSummary Summarise(const std::vector<RunIndices>& runs,
-                            const std::vector<double>& durations_s);
 
 }  // namespace fdi::trainer

@@ -267,20 +267,6 @@ Campaign LoadCampaign(const path& file) {
   return Reader(file).Read();
 }
 
-std::vector<CampaignRun> ValidationRuns(const std::filesystem::path& path,
-                                        std::uint64_t seed_offset) {
-  std::vector<CampaignRun> validation = LoadCampaign(path).validation;
-  if (validation.empty()) {
-    throw ConfigError(path.string() + ": there is no [[validation]]");
-  }
-  for (CampaignRun& run : validation) {
-    if (auto* simulated = std::get_if<SimulatedRun>(&run.source)) {
-      simulated->scenario.config.seed += seed_offset;
-    }
-  }
-  return validation;
-}
-
 std::string CampaignText(const Campaign& campaign) {
   TrainingOptions training = campaign.training;
   std::string text;

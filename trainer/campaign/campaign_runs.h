@@ -6,7 +6,6 @@
 #include <string>
 #include <vector>
 
-#include "report/program.h"
 #include "storage/database/data_directory.h"
 #include "trainer/campaign/campaign.h"
 
@@ -45,11 +44,6 @@ CollectedRuns CollectRuns(const std::vector<CampaignRun>& runs,
                           const storage::DataDirectory& directory,
                           const CollectOptions& options,
                           const CollectProgress& progress = {});
-
-/// The same with a progress bar, and loads them all.
-/// @throws as CollectRuns(), or Interrupted.
-std::vector<storage::StoredRun> LoadCampaignRuns(
-    const std::vector<CampaignRun>& runs, const report::Context& context);
 
 /// Simulates a run in memory; its id stays empty.
 storage::StoredRun SimulateRun(const SimulatedRun& run);
