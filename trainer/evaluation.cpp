@@ -39,8 +39,8 @@ void IndexNames(const std::vector<Indication>& all, std::size_t from,
                 std::size_t last, RunIndices& result) {
   for (std::size_t k = from; k <= last; ++k) {
     const std::vector<int>& set = all[k].isolated;
-    // In this order, a set of the same instant outlives the withdrawal of an
-    // earlier one.
+    // The withdrawal comes first: a set of the same instant outlives the
+    // withdrawal of an earlier one.
     if (all[k].withdrawn) {
       result.final_set.clear();
     }

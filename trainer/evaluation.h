@@ -13,10 +13,10 @@
 
 namespace fdi::trainer {
 
-/// What an operator reads beside a name.
+/// The words that an operator reads beside a name.
 struct Wording {
   Certainty certainty{Certainty::kNotYet};
-  std::vector<int> look_alikes;  ///< That the set does not know.
+  std::vector<int> look_alikes;  ///< Faults that the set does not know.
 };
 
 /// One instant of an evaluated run: what was the truth, what was indicated.
@@ -27,12 +27,12 @@ struct Indication {
   bool detected{false};           ///< DD: an episode is open.
   std::vector<int> isolated;      ///< Faults indicated.
   bool withdrawn{false};          ///< An earlier name was taken back: unknown.
-  Wording wording;                ///< Of `isolated`.
+  Wording wording;                ///< The wording of `isolated`.
   bool second{false};             ///< Something came on top of `isolated`.
   std::vector<int> second_set{};  ///< Its faults; empty: it has no name.
 };
 
-/// What one run came to; times in s from the start of the fault, -1 where a
+/// The score of one run; times in s from the start of the fault, -1 where a
 /// number has no meaning (docs/evaluation.md).
 struct RunIndices {
   std::string run_id;
@@ -48,7 +48,7 @@ struct RunIndices {
   int wrong_isolations{0};  ///< Sets of one wrong fault, while one acts.
   /// Last set isolated while the fault acted, unless it was withdrawn.
   std::vector<int> final_set;
-  Wording wording;  ///< Of final_set when it was named.
+  Wording wording;  ///< final_set's when it was named.
 };
 
 /// Computes the indices over the zones of the run.
@@ -69,16 +69,16 @@ struct RunZones {
 /// @param horizon_s t_hor from the start of the run [s]; 0 = the last instant.
 RunZones ZonesOf(const std::vector<Indication>& indications, double horizon_s);
 
-/// Whether the engine says that no known fault explains the episode, or has
+/// True if the engine says that no known fault explains the episode, or has
 /// nothing but findings of the floor: a name that it gave before counts no
-/// more. Never of older sets, which take no name back.
+/// more. Older sets never take a name back.
 bool IsWithdrawn(const ModelSet& models, const Verdict& verdict);
 
 /// The numbers of the faults in `set`, ascending. Findings of the floor are not
 /// scored, but for a loss of flow that stands beside a fault as another answer.
 std::vector<int> FaultsIn(const ModelSet& models, FaultSet set);
 
-/// What `verdict` indicates; without time and truth.
+/// The indication of `verdict`, without time and truth.
 /// @param before at the sample before; null: there is none.
 /// @param layer what gave the name.
 Indication IndicationOf(const ModelSet& models, const Verdict& verdict,

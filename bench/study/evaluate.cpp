@@ -79,8 +79,8 @@ void VectorsCsv::Add(const std::string& run, const Verdict& verdict) {
                                  std::string(StateName(verdict.state))};
   const auto add = [&cells](double value) {
     std::array<char, 40> text{};
-    // In hexadecimal, which keeps every bit: two engines that ought to agree
-    // can then be compared by the text of their files.
+    // Hexadecimal keeps every bit: two engines that ought to agree can be
+    // compared by the text of their files.
     std::snprintf(text.data(), text.size(), "%a", value);
     cells.emplace_back(text.data());
   };

@@ -64,7 +64,7 @@ constexpr std::array<IndexField, 12> kIndexFields{{
      "accuracy of the final set: 1/n if the fault is one of n, else 0"},
 }};
 
-// What RunJson() says of a run and all its indices.
+// RunJson() with all indices.
 Json IndicesJson(const EvaluatedRun& run, const PaperIndices& paper) {
   Json json = RunJson(run);
   for (const IndexField& field : kIndexFields) {
@@ -170,7 +170,7 @@ std::vector<report::Column> IndexColumns() {
   return columns;
 }
 
-// What is right stands on the diagonal; of a run without fault it is "no
+// The right outcome stands on the diagonal; for a run without fault it is "no
 // alarm".
 std::vector<report::Column> ConfusionColumns(const Json& confusion,
                                              const std::string& heading) {

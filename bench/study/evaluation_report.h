@@ -7,7 +7,7 @@
 #include "bench/study/study_detectors.h"
 #include "report/report.h"
 
-/// What an evaluation with all indices prints, but for its page.
+/// The output of an evaluation with all indices, except its page.
 namespace fdi::trainer::study {
 
 /// {"model_set", "version"}, or {"detector"}.

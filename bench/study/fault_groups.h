@@ -39,7 +39,7 @@ std::vector<EvaluatedRun> RunsOf(const FaultGroup& group,
 /// counts 1/n for each of them, so that a row sums to its runs.
 struct ConfusionMatrix {
   std::vector<FaultGroup> rows;
-  std::vector<FaultGroup> columns;          ///< That were indicated or true.
+  std::vector<FaultGroup> columns;  ///< Groups that were indicated or true.
   std::vector<std::vector<double>> counts;  ///< rows x (columns, then
                                             ///< unknown fault, then no alarm).
 };

@@ -163,7 +163,7 @@ std::string BandKey() {
 
 }  // namespace
 
-// What the engine said in the course of one run, on one time axis.
+// Collects the verdicts on one run and draws them on one time axis.
 class ReportPage::RunPicture {
  public:
   RunPicture(const ModelSet& models, double duration_s)
@@ -178,7 +178,8 @@ class ReportPage::RunPicture {
     if (OutOfOrder(verdict.intake)) {
       return;
     }
-    // That of the indications, of which rejected samples have one, too.
+    // Time counts from the first indication, as that of the indications does:
+    // rejected samples have one, too.
     first_stamp_ns_ = first_stamp_ns_.value_or(verdict.stamp_ns);
     if (verdict.intake != Intake::kAccepted) {
       return;

@@ -31,7 +31,7 @@ struct StudySelection : RunSelection {
 struct ScoredRun {
   storage::StoredRun run;
   std::string name;
-  double horizon_s{0.0};    ///< Of CampaignRun.
+  double horizon_s{0.0};    ///< CampaignRun's.
   std::size_t position{0};  ///< Among the runs that were selected.
 };
 
@@ -46,7 +46,7 @@ std::vector<storage::StoredRun> LoadCampaignRuns(
     const std::vector<CampaignRun>& runs, const report::Context& context);
 
 /// Loads them: first those of the campaign, then the stored ones, then files.
-/// What the campaign simulates or imports is stored in runs.db.
+/// Runs that the campaign simulates or imports are stored in runs.db.
 ///
 /// @param required signals that a file must have.
 /// @param flow that flows are converted to; nothing: as they are.

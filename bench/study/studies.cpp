@@ -247,7 +247,7 @@ SeedStudy RepeatWithSeeds(const Detector& detector,
       scenarios.size(), std::vector<EvaluatedRun>(count));
   const report::StopSignals signals;
   report::Progress progress("simulate");
-  Mutex mutex;  // Of the progress.
+  Mutex mutex;  // Guards the progress.
   int done = 0;
   const int total = static_cast<int>(scenarios.size() * count);
   ParallelFor(total, 0, [&](int i) {

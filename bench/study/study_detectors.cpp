@@ -188,8 +188,8 @@ Detector EngineDetector(const std::shared_ptr<const ModelSet>& models) {
 }
 
 Detector LeaveOneOutDetector(const ModelSet& models) {
-  // By fault; 0 is the whole set, which also answers for faults that it does
-  // not know.
+  // Indexed by fault; 0 is the whole set, which also answers for faults that it
+  // does not know.
   std::map<int, Detector> reduced;
   reduced[0] = EngineDetector(std::make_shared<const ModelSet>(models));
   for (const int fault : models.faults) {

@@ -19,13 +19,14 @@ namespace fdi::trainer::study {
 /// detector. Evaluate() scores them all alike.
 struct Detector {
   std::string name;
-  int version{0};                    ///< Of a model set; 0: no model set.
+  int version{0};                    ///< A model set's; 0: no model set.
   std::vector<FaultGroup> groups{};  ///< Faults that it does not tell apart.
   SignalMask required{0};            ///< Signals that it cannot do without.
   /// Follows one run; called from several threads at a time. The sink is
   /// called with every verdict of an engine, and never by other detectors.
   std::function<Answer(const ScoredRun&, const VerdictSink&)> follow{};
-  std::optional<simulator::FlowTarget> flow{};  ///< That it is converted to.
+  std::optional<simulator::FlowTarget>
+      flow{};  ///< The flow is converted to it.
 };
 
 /// Settings of Evaluate().

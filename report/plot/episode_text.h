@@ -15,7 +15,7 @@ namespace fdi::plot {
 std::string IntervalText(double value, double lowest, double highest,
                          int decimals, const std::string& unit = "");
 
-/// What there is to say about an episode, for Report::Fields(). `source_id`,
+/// The facts of an episode, for Report::Fields(). `source_id`,
 /// `trace_instants` and the columns of fault_history are members of the
 /// document.
 std::vector<report::Column> EpisodeFields(const storage::Alarm& alarm,

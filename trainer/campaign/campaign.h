@@ -32,8 +32,8 @@ struct CampaignRun {
   std::variant<SimulatedRun, ImportedRun, RecordedRun> source;
   /// Seconds from the start of a simulated or imported run to train on.
   storage::RunSelector stretch;
-  /// Of a run to score, from its start [s]: what comes later does not count;
-  /// 0: all counts.
+  /// Time from the start of a run to score [s]: later samples do not count; 0:
+  /// all count.
   double horizon_s{0.0};
 };
 

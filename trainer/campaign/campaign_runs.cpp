@@ -24,7 +24,8 @@ using storage::RunOrigin;
 // A progress bar that moves a few times per second.
 constexpr std::uint64_t kSamplesPerReport = 500;
 
-// Of the golden ratio: seeds that follow each other give sources far apart.
+// 2^64 divided by the golden ratio: seeds that follow each other give sources
+// that are far apart.
 constexpr std::uint64_t kGolden = 0x9E3779B97F4A7C15ULL;
 
 // The configuration that a run is simulated with: `start_ns` where its scenario
@@ -133,7 +134,7 @@ class Collector {
   }
 
  private:
-  // In full: once others are stored, `last` means another run.
+  // The id in full: once others are stored, `last` means another run.
   void Find(const RecordedRun& run) {
     ids_[at_] = SelectorOf(store_->Info(run.selector).id,
                            storage::ParseRunSelector(run.selector));

@@ -19,7 +19,7 @@ class Interrupted : public std::runtime_error {
 
 struct CollectOptions {
   std::string software;      ///< Stored with new runs.
-  std::int64_t start_ns{0};  ///< Of runs whose scenario does not say it.
+  std::int64_t start_ns{0};  ///< For runs whose scenario does not say it.
   int threads{0};            ///< 0: all of the machine.
 };
 

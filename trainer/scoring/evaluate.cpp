@@ -12,8 +12,8 @@
 namespace fdi::trainer {
 namespace {
 
-// What the monitor calls the episodes of one run: the observers and, with
-// physics, looks that are taken at once.
+// Names the episodes of one run as the monitor does: by the observers and,
+// with physics, by looks that are taken at once.
 class RunNames {
  public:
   explicit RunNames(const std::shared_ptr<const ModelSet>& models)

@@ -11,15 +11,15 @@
 
 namespace fdi::trainer {
 
-/// What a diagnosis indicated in the course of one run.
+/// The indications of a diagnosis in the course of one run.
 struct Answer {
   std::vector<Indication> indications;
   /// Seconds by quality, which only the monitor's engine tells.
   std::optional<std::array<double, kQualityCount>> seconds{};
 };
 
-/// What the monitor would have said about a run: its engine and, for a set
-/// with physics, second looks that are taken at once.
+/// Follows a run as the monitor would have: by its engine and, for a set with
+/// physics, by second looks that are taken at once.
 ///
 /// @param sink called with every verdict of the engine.
 /// @throws DataError as Rescore().

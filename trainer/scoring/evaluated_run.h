@@ -10,15 +10,15 @@
 
 namespace fdi::trainer {
 
-/// One run and what the diagnosis made of it.
+/// One run and the diagnosis of it.
 struct EvaluatedRun {
   RunIndices indices;
   bool has_truth{true};
-  double duration_s{0.0};     ///< Of its samples: gaps do not count.
+  double duration_s{0.0};     ///< Gaps do not count.
   std::vector<int> last_set;  ///< Last set isolated in the whole run.
-  Wording last_wording;       ///< Of it.
-  double second_t{-1.0};  ///< When something came on top, last; −1: never.
-  std::vector<int> second_set{};  ///< What it was called then, at last.
+  Wording last_wording;       ///< last_set's.
+  double second_t{-1.0};      ///< Last time that something came on top; −1.
+  std::vector<int> second_set{};  ///< Its last name.
   /// Seconds by quality; empty where a detector gives none.
   std::optional<std::array<double, kQualityCount>> seconds{};
 };
@@ -52,12 +52,12 @@ struct EvaluationFigures {
   int detected{0};
   int contained{0};         ///< Final set contains the truth.
   int exact{0};             ///< Final set is the truth.
-  int wrong_isolations{0};  ///< Of all runs.
+  int wrong_isolations{0};  ///< In all runs.
   int fault_free_runs{0};
   double fault_free_hours{0.0};
   int fault_free_episodes{0};
   int without_truth{0};
-  std::array<AnswerCount, 5> by_certainty{};  ///< By Certainty.
+  std::array<AnswerCount, 5> by_certainty{};  ///< Indexed by Certainty.
 };
 
 EvaluationFigures FiguresOf(const std::vector<EvaluatedRun>& runs);

@@ -35,7 +35,8 @@ Json HoursJson(const std::vector<EvaluatedRun>& runs) {
   return json;
 }
 
-// By certainty, the highest first: answers, and those that hold the fault.
+// Counts answers by certainty, the highest first, and those of them that hold
+// the fault.
 Json AnswersJson(const EvaluationFigures& figures) {
   Json json = Json::array();
   for (std::size_t c = figures.by_certainty.size(); c-- > 0;) {

@@ -7,7 +7,8 @@
 #include "report/report.h"
 #include "trainer/scoring/evaluated_run.h"
 
-/// What `fdi-trainer evaluate` says: a document, and the columns that show it.
+/// The result of `fdi-trainer evaluate`: a document, and the columns that show
+/// it.
 namespace fdi::trainer {
 
 /// One run: truth, delays, final set (docs/json.md, evaluated_run).

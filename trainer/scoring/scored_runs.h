@@ -19,7 +19,7 @@ namespace fdi::trainer {
 struct RunSelection {
   std::vector<std::string> runs;   ///< Stored, ID or ID@from:to.
   std::vector<std::string> files;  ///< FILE.csv or FILE.csv@from:to.
-  importer::TableOptions table;    ///< Of files.
+  importer::TableOptions table;    ///< Describes the files.
 
   /// The options --runs, --file and of tables.
   void AddTo(CLI::App& verb);
