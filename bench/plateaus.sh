@@ -27,7 +27,7 @@ simulate() {  # FILE CV SECONDS OPTION...
 
 score() {
   echo "$1"
-  run fdi-trainer evaluate --valve V --assume-normal "${scored[@]}" --csv
+  run fdi-study evaluate --valve V --assume-normal "${scored[@]}" --csv
   sed -E ':again; s/("[^",]*),([^"]*")/\1|\2/; t again; s/"//g' out |
     awk -F, 'NR > 1 { sub(/\.csv/, "", $1)
       printf "  %-12s %s\n", $1, $4 == "true" ? "detected after " $5 \

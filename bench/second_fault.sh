@@ -48,7 +48,7 @@ for loop in $loops; do
       --fault "${second%=*}:abrupt@1500:strength=${second#*=}"
     files+=(--file "$file")
   done
-  "$bin/fdi-trainer" evaluate "${judge[@]}" "${files[@]}" --csv 2>"$work/log" |
+  "$bin/fdi-study" evaluate "${judge[@]}" "${files[@]}" --csv 2>"$work/log" |
     sed -E ':again; s/("[^",]*),([^"]*")/\1|\2/; t again; s/"//g' |
     awk -F, -v loop="$loop" '
       NR == 1 { for (i = 1; i <= NF; i++) at[$i] = i; next }

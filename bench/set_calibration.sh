@@ -164,7 +164,7 @@ for name in "${names[@]}"; do
       files+=(--file "$work/none-$hours.csv")
     done
   fi
-  "$bin/fdi-trainer" evaluate --valve V "${files[@]}" --csv \
+  "$bin/fdi-study" evaluate --valve V "${files[@]}" --csv \
     2>"$work/log" | tail -n +2 | sets_with_bars | sed "s|$work/||" \
     >"$work/$name.runs"
   count "$name" <"$work/$name.runs"

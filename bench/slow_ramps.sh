@@ -44,7 +44,7 @@ simulate() {  # SECONDS OPTION...
 }
 
 evaluate() {  # a line of the file, the faults of its set joined by bars
-  run fdi-trainer evaluate --model-set "$kind" --assume-normal --csv \
+  run fdi-study evaluate --model-set "$kind" --assume-normal --csv \
     --file "$work/run.csv"
   tail -n 1 "$work/out" |
     sed -E ':again; s/("[^",]*),([^"]*")/\1|\2/; t again; s/"//g'

@@ -37,7 +37,7 @@ for period in "${periods[@]}"; do
   time "$bin/fdi-trainer" onboard --valve "V$period" \
     --file "$work/healthy-$period.csv" 2>"$work/log" || cat "$work/log"
   for file in other-day f3 f6 f18 f19; do
-    time "$bin/fdi-trainer" evaluate --valve "V$period" --assume-normal --csv \
+    time "$bin/fdi-study" evaluate --valve "V$period" --assume-normal --csv \
       --file "$work/$file-$period.csv" 2>"$work/log" || cat "$work/log"
   done
 done

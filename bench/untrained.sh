@@ -139,7 +139,7 @@ awk -F, '
   "$work/noisy.csv" "$work/clean.csv" "$work"/known-* "$work"/clean-* \
   >"$work/distances"
 
-"$bin/fdi-trainer" evaluate --model-set "$set_name" "${files[@]}" --csv \
+"$bin/fdi-study" evaluate --model-set "$set_name" "${files[@]}" --csv \
   2>"$work/log" | tail -n +2 |
   sed -E ':again; s/("[^",]*),([^"]*")/\1|\2/; t again; s/"//g' >"$work/answers"
 cat "$work/answers" >>"${FDI_RUNS:-/dev/null}"

@@ -1,4 +1,4 @@
-# Isolation time against intensity, from the CSV of fdi-trainer evaluate.
+# Isolation time against intensity, from the CSV of fdi-study evaluate.
 # Variables: data, picture.
 set terminal pngcairo size 900,640
 set output picture

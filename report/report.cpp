@@ -121,18 +121,16 @@ th,td{padding:2px 7px;border-bottom:1px solid #ddd;text-align:left;white-space:n
 th{font-weight:600}
 .number{text-align:right}
 td{vertical-align:top}td.wrap{white-space:normal;min-width:5em}
-.checks{list-style:"\2610\00a0\00a0";padding-left:1.5em}.checks li{margin:.5em 0}
-.blanks td{min-width:34em;height:2.2em;border-bottom:1px solid #767676}.blanks th{vertical-align:bottom}
 dl{display:grid;grid-template-columns:max-content 1fr;gap:0 1em;font-size:12px}
 dt{font-weight:600}dd{margin:0}
 .quiet{color:#767676}
 .good{background:#cce3f0}.warning{background:#fae7bf}.alarm{background:#f6d0bb;font-weight:600}
 svg{max-width:100%;height:auto;font-family:"DejaVu Sans",Verdana,sans-serif}
-@media screen and (max-width:45em){th,td:not(.number){white-space:normal}td.wrap{min-width:10em}.blanks td{width:100%;min-width:0}}
+@media screen and (max-width:45em){th,td:not(.number){white-space:normal}td.wrap{min-width:10em}}
 @media screen and (prefers-color-scheme:dark){body{background:#161616;color:#ddd}a{color:#56b4e9}th,td{border-color:#333}.quiet{color:#8c8c8c}.good{background:#123a52}.warning{background:#4d3a10}.alarm{background:#5c2a10}}
 @media print{:root{color-scheme:light}body{margin:0;padding:0;max-width:none;font-size:10pt;print-color-adjust:exact;-webkit-print-color-adjust:exact}
 table,dl{font-size:8pt}th,td{white-space:normal;padding:2px 5px}td.wrap{min-width:0}.scroll{overflow:visible}
-h1,h2,h3{break-after:avoid}tr,li,svg,dl{break-inside:avoid}.checks{break-before:avoid}svg{max-height:230mm}h2{margin-top:.9em}.checks li{margin:.25em 0}.blanks td{width:100%;min-width:0;height:1.6em}.blanks th{white-space:nowrap}a{color:inherit;text-decoration:none}}
+h1,h2,h3{break-after:avoid}tr,svg,dl{break-inside:avoid}svg{max-height:230mm}h2{margin-top:.9em}a{color:inherit;text-decoration:none}}
 )";
 
 // Also for attributes, hence the quotation mark.
@@ -192,16 +190,6 @@ Report& Report::Heading(std::string text) {
 Report& Report::Picture(std::string id, std::string title, std::string svg) {
   views_.emplace_back(
       PictureView{std::move(id), std::move(title), std::move(svg)});
-  return *this;
-}
-
-Report& Report::Checks(std::vector<std::string> texts) {
-  views_.emplace_back(ChecksView{std::move(texts)});
-  return *this;
-}
-
-Report& Report::Blanks(std::vector<std::string> names) {
-  views_.emplace_back(BlanksView{std::move(names)});
   return *this;
 }
 
@@ -274,16 +262,6 @@ class Report::TextPrinter {
     out_ << '\n' << Printable(heading.text) << '\n';
   }
   void operator()(const PictureView&) const {}
-  void operator()(const ChecksView& checks) const {
-    for (const std::string& text : checks.texts) {
-      out_ << "[ ] " << Printable(text) << '\n';
-    }
-  }
-  void operator()(const BlanksView& blanks) const {
-    for (const std::string& name : blanks.names) {
-      out_ << Printable(name) << ": ____________________\n";
-    }
-  }
 
  private:
   const Json& document_;
@@ -346,20 +324,6 @@ class Report::HtmlPrinter {
     out_ << "<h3 id=\"" << HtmlText(picture.id) << "\">"
          << HtmlText(picture.title) << "</h3>\n<div class=\"scroll\">"
          << picture.svg << "</div>\n";
-  }
-  void operator()(const ChecksView& checks) const {
-    out_ << "<ul class=\"checks\">\n";
-    for (const std::string& text : checks.texts) {
-      out_ << "<li>" << HtmlText(text) << "</li>\n";
-    }
-    out_ << "</ul>\n";
-  }
-  void operator()(const BlanksView& blanks) const {
-    out_ << "<table class=\"blanks\">\n";
-    for (const std::string& name : blanks.names) {
-      out_ << "<tr><th>" << HtmlText(name) << "</th><td></td></tr>\n";
-    }
-    out_ << "</table>\n";
   }
 
  private:

@@ -95,10 +95,6 @@ class Report {
   Report& Heading(std::string text);
   /// An SVG element below its title, in HTML only. `id` is what cells link to.
   Report& Picture(std::string id, std::string title, std::string svg);
-  /// Boxes to tick, each with a sentence.
-  Report& Checks(std::vector<std::string> texts);
-  /// Lines to fill in by hand, each behind its name.
-  Report& Blanks(std::vector<std::string> names);
   /// What --csv prints, if not the first table: the members `keys` of the rows
   /// at `key`.
   Report& Csv(std::string key, std::vector<std::string> keys);
@@ -138,14 +134,8 @@ class Report {
     std::string title;
     std::string svg;
   };
-  struct ChecksView {
-    std::vector<std::string> texts;
-  };
-  struct BlanksView {
-    std::vector<std::string> names;
-  };
-  using View = std::variant<TableView, FieldsView, LineView, HeadingView,
-                            PictureView, ChecksView, BlanksView>;
+  using View =
+      std::variant<TableView, FieldsView, LineView, HeadingView, PictureView>;
   class TextPrinter;
   class HtmlPrinter;
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 #include <numeric>
+#include <sstream>
 #include <utility>
 
 #include "base/error.h"
@@ -153,6 +154,14 @@ void TextTable::Print(std::ostream& out, const TextStyle& style) const {
                  style.colour)
         << '\n';
   }
+}
+
+std::string TextTable::Text() const {
+  std::ostringstream out;
+  Print(out);
+  std::string text = out.str();
+  text.pop_back();
+  return text;
 }
 
 std::size_t TextWidth(const std::string& text) {

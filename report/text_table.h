@@ -45,6 +45,8 @@ class TextTable {
   /// Plain, or styled: in colour and no wider than the style allows, with a
   /// last line that names the omitted columns.
   void Print(std::ostream& out, const TextStyle& style = {}) const;
+  /// As printed plainly, without the last line break.
+  std::string Text() const;
   bool empty() const { return rows_.empty(); }
 
  private:

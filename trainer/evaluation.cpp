@@ -13,36 +13,17 @@ namespace {
 
 constexpr double kBeforeFault = 600.0;  // s of r_fd before the fault
 
-int WrongFaults(const Indication& indication) {
-  const int count = static_cast<int>(indication.isolated.size());
-  const bool right = indication.truth.fault != 0 &&
-                     Contains(indication.isolated, indication.truth.fault);
-  return count - (right ? 1 : 0);
-}
+constexpr auto kIsDetected = [](const Indication& i) { return i.detected; };
 
-// The instants [first, last] that an index looks at.
-struct Zone {
-  std::size_t first{0};
-  std::size_t last{0};
-};
-
+// First and last rising edge of `holds` in [first, last], as positions; -1 if
+// there is none. The sample before the zone counts, too: an alarm that stood
+// when the fault came is no edge, and so no detection of it.
 template <typename Predicate>
-double Share(const std::vector<Indication>& all, Zone zone, Predicate holds) {
-  double count = 0.0;
-  for (std::size_t k = zone.first; k <= zone.last; ++k) {
-    count += holds(all[k]) ? 1.0 : 0.0;
-  }
-  return count / static_cast<double>(zone.last - zone.first + 1);
-}
-
-// First and last rising edge of `holds` in `zone`, as indices; −1 if none.
-// The sample before the zone counts, too: an alarm that stood when the fault
-// came is no edge, and so no detection of it.
-template <typename Predicate>
-std::pair<int, int> RisingEdges(const std::vector<Indication>& all, Zone zone,
+std::pair<int, int> RisingEdges(const std::vector<Indication>& all,
+                                std::size_t first, std::size_t last,
                                 Predicate holds) {
   std::pair<int, int> edges{-1, -1};
-  for (std::size_t k = zone.first; k <= zone.last; ++k) {
+  for (std::size_t k = first; k <= last; ++k) {
     if (holds(all[k]) && (k == 0 || !holds(all[k - 1]))) {
       edges.second = static_cast<int>(k);
       edges.first = edges.first < 0 ? edges.second : edges.first;
@@ -51,38 +32,15 @@ std::pair<int, int> RisingEdges(const std::vector<Indication>& all, Zone zone,
   return edges;
 }
 
-// The indices of the time in which a fault acts: `zone` is [t_from, t_hor]. The
-// final set is the last one that was named in it. It outlives the end of that
-// name, but not its withdrawal.
-void IndexFault(const std::vector<Indication>& all, Zone zone,
-                RunIndices& result) {
-  const double start_s = all[zone.first].time_s;
-  const auto is_detected = [](const Indication& i) { return i.detected; };
-  const auto is_isolated = [&](const Indication& i) {
-    return Contains(i.isolated, result.fault);
-  };
-  const auto since = [&](int k) {
-    return k < 0 ? -1.0 : all[static_cast<std::size_t>(k)].time_s - start_s;
-  };
-  const auto strength = [&](int k) {
-    return k < 0 ? -1.0
-                 : std::abs(all[static_cast<std::size_t>(k)].truth.strength);
-  };
-  const auto [first_dt, last_dt] = RisingEdges(all, zone, is_detected);
-  const auto [first_it, last_it] = RisingEdges(all, zone, is_isolated);
-  result.t_dt_first = since(first_dt);
-  result.t_dt = since(last_dt);
-  result.t_it_first = since(first_it);
-  result.t_it = since(last_it);
-  result.fs_d = strength(last_dt);
-  result.fs_i = strength(last_it);
-  result.r_td = Share(all, zone, is_detected);
-  result.r_ti = Share(all, zone, is_isolated);
-  result.detected = all[zone.last].detected && last_dt >= 0;
-  for (std::size_t k = zone.first; k <= zone.last; ++k) {
+// The names that were given in [from, last] while a fault acted. The final set
+// is the last of them. It outlives the end of that name, but not its
+// withdrawal.
+void IndexNames(const std::vector<Indication>& all, std::size_t from,
+                std::size_t last, RunIndices& result) {
+  for (std::size_t k = from; k <= last; ++k) {
     const std::vector<int>& set = all[k].isolated;
-    // In this order, a set of the same instant outlives the withdrawal of an
-    // earlier one.
+    // The withdrawal comes first: a set of the same instant outlives the
+    // withdrawal of an earlier one.
     if (all[k].withdrawn) {
       result.final_set.clear();
     }
@@ -96,9 +54,6 @@ void IndexFault(const std::vector<Indication>& all, Zone zone,
       result.final_set = set;
       result.wording = all[k].wording;
     }
-    if (result.t_exact < 0.0 && set.size() == 1 && set[0] == result.fault) {
-      result.t_exact = all[k].time_s - start_s;
-    }
     if (set.size() == 1 && set[0] != result.fault &&
         (k == 0 || all[k - 1].isolated != set)) {
       ++result.wrong_isolations;
@@ -107,6 +62,25 @@ void IndexFault(const std::vector<Indication>& all, Zone zone,
   result.d_acc = Contains(result.final_set, result.fault)
                      ? 1.0 / static_cast<double>(result.final_set.size())
                      : 0.0;
+}
+
+// The indices of [from, last], in which a fault acts.
+void IndexFault(const std::vector<Indication>& all, std::size_t from,
+                std::size_t last, RunIndices& result) {
+  result.fault = all[from].truth.fault;
+  const auto since = [&](int k) {
+    return k < 0 ? -1.0
+                 : all[static_cast<std::size_t>(k)].time_s - all[from].time_s;
+  };
+  const auto [first_dt, last_dt] = RisingEdges(all, from, last, kIsDetected);
+  const int last_it = RisingEdges(all, from, last, [&](const Indication& i) {
+                        return Contains(i.isolated, result.fault);
+                      }).second;
+  result.t_dt_first = since(first_dt);
+  result.t_dt = since(last_dt);
+  result.t_it = since(last_it);
+  result.detected = all[last].detected && last_dt >= 0;
+  IndexNames(all, from, last, result);
 }
 
 }  // namespace
@@ -178,53 +152,51 @@ Indication IndicationOf(const ModelSet& models, const Verdict& verdict,
   return now;
 }
 
+RunZones ZonesOf(const std::vector<Indication>& all, double horizon_s) {
+  const std::size_t count = all.size();
+  RunZones zones{count, count, count - 1};
+  // Backwards, so that the first instant of each kind remains.
+  for (std::size_t k = count; k-- > 0;) {
+    zones.from = all[k].truth.fault != 0 ? k : zones.from;
+    zones.on = all[k].settled ? k : zones.on;
+    zones.last = horizon_s > 0.0 && all[k].time_s >= horizon_s ? k : zones.last;
+  }
+  if (zones.from == count) {
+    zones.last = count - 1;
+    return zones;
+  }
+  zones.last = std::max(zones.from, zones.last);
+  while (zones.on < zones.from &&
+         all[zones.on].time_s < all[zones.from].time_s - kBeforeFault) {
+    ++zones.on;
+  }
+  return zones;
+}
+
 RunIndices ComputeIndices(const std::vector<Indication>& all,
                           double horizon_s) {
   RunIndices result;
   if (all.empty()) {
     return result;
   }
-  const std::size_t count = all.size();
-  std::size_t from = count;
-  std::size_t settled = count;
-  std::size_t horizon = count - 1;
-  // Backwards, so that the first instant of each kind remains.
-  for (std::size_t k = count; k-- > 0;) {
-    from = all[k].truth.fault != 0 ? k : from;
-    settled = all[k].settled ? k : settled;
-    horizon = horizon_s > 0.0 && all[k].time_s >= horizon_s ? k : horizon;
-  }
-  result.episodes = 0;
-  for (std::size_t k = 0; k < count; ++k) {
+  for (std::size_t k = 0; k < all.size(); ++k) {
     result.episodes += all[k].detected && (k == 0 || !all[k - 1].detected);
     if (std::abs(all[k].truth.strength) > std::abs(result.strength)) {
       result.strength = all[k].truth.strength;
     }
   }
-  const auto is_detected = [](const Indication& i) { return i.detected; };
-  const auto any_set = [](const Indication& i) { return !i.isolated.empty(); };
-  const double t_on =
-      from < count ? all[from].time_s - kBeforeFault : all.front().time_s;
-  std::size_t on = settled;
-  while (on < from && all[on].time_s < t_on) {
-    ++on;
+  const RunZones zones = ZonesOf(all, horizon_s);
+  if (zones.on <
+      zones.from) {  // before the fault, or the whole run without one
+    const auto at = [&](std::size_t k) {
+      return all.begin() + static_cast<std::ptrdiff_t>(k);
+    };
+    result.r_fd = static_cast<double>(std::count_if(
+                      at(zones.on), at(zones.from), kIsDetected)) /
+                  static_cast<double>(zones.from - zones.on);
   }
-  if (on < from) {  // before the fault, or the whole run without one
-    const Zone before{on, from - 1};
-    result.r_fd = Share(all, before, is_detected);
-    result.r_fi = Share(all, before, any_set);
-  }
-  if (from < count) {
-    result.fault = all[from].truth.fault;
-    IndexFault(all, {from, std::max(from, horizon)}, result);
-  }
-  const std::size_t last = from < count ? std::max(from, horizon) : count - 1;
-  if (on < count && on <= last) {
-    double wrong = 0.0;
-    for (std::size_t k = on; k <= last; ++k) {
-      wrong += WrongFaults(all[k]);
-    }
-    result.r_mi = wrong / static_cast<double>(last - on + 1);
+  if (zones.from < all.size()) {
+    IndexFault(all, zones.from, zones.last, result);
   }
   return result;
 }
@@ -273,33 +245,6 @@ std::vector<Indication> ScoreRun(const std::shared_ptr<const EnginePlan>& plan,
     }
   }
   return all;
-}
-
-EvaluationSummary Summarise(const std::vector<RunIndices>& runs,
-                            const std::vector<double>& durations_s) {
-  EvaluationSummary summary;
-  double accuracy = 0.0;
-  for (std::size_t i = 0; i < runs.size(); ++i) {
-    const RunIndices& run = runs[i];
-    if (run.fault == 0) {
-      ++summary.fault_free_runs;
-      summary.fault_free_hours += durations_s[i] / 3600.0;
-      summary.fault_free_episodes += run.episodes;
-      continue;
-    }
-    ++summary.faulty_runs;
-    summary.max_r_fd = std::max(summary.max_r_fd, run.r_fd);
-    summary.contained += run.d_acc > 0.0;
-    summary.exact += run.d_acc == 1.0;
-    if (run.detected) {
-      ++summary.detected;
-      accuracy += run.d_acc;
-    }
-  }
-  if (summary.detected > 0) {
-    summary.mean_d_acc = accuracy / summary.detected;
-  }
-  return summary;
 }
 
 }  // namespace fdi::trainer

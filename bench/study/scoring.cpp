@@ -5,18 +5,16 @@
 #include <CLI/CLI.hpp>
 
 #include "base/error.h"
+#include "bench/study/evaluation_report.h"
 #include "bench/study/model_reduction.h"
 #include "bench/study/studies.h"
-#include "bench/study/study_detectors.h"
 #include "bench/study/verbs.h"
 #include "diagnosis/model/fault_catalogue.h"
 #include "report/program.h"
 #include "storage/database/data_directory.h"
 #include "storage/models/models.h"
-#include "trainer/campaign/campaign_runs.h"
 #include "trainer/campaign/file_runs.h"
 #include "trainer/campaign/run_input.h"
-#include "trainer/scoring/evaluation_report.h"
 
 namespace fdi::trainer::study {
 namespace {
@@ -24,7 +22,7 @@ namespace {
 struct ScoringOptions {
   std::string model_set;
   bool second_look{true};
-  RunSelection selection;
+  StudySelection selection;
   bool assume_normal{false};
   int seeds{0};
   std::vector<std::string> verdicts;     // Files, one per run.
@@ -157,10 +155,10 @@ void AddTruth(CLI::App& verb, ScoringOptions& options) {
 
 void AddBaselineVerb(report::Program& program) {
   const auto options = std::make_shared<ScoringOptions>();
-  CLI::App& verb = AddVerb(
-      program, "baseline",
-      "Score a well-known detector by the indices of fdi-trainer evaluate",
-      ScoreBaseline, options);
+  CLI::App& verb =
+      AddVerb(program, "baseline",
+              "Score a well-known detector by the indices of evaluate",
+              ScoreBaseline, options);
   verb.add_option("name", options->baseline, "The detector")
       ->required()
       ->check(CLI::IsMember(BaselineNames()))
@@ -241,16 +239,7 @@ void AddScoringVerbs(report::Program& program) {
         return Seeds(*options, context);
       });
   AddModels(seeds, *options);
-  seeds
-      .add_option("--campaign", options->selection.campaign,
-                  "With the validation runs")
-      ->required()
-      ->type_name("FILE.toml");
-  seeds
-      .add_option("--seed-offset", options->selection.seed_offset,
-                  "Added to the seeds of the campaign")
-      ->check(CLI::Range(0, 1000000000))
-      ->type_name("N");
+  options->selection.AddCampaignTo(seeds).required();
   seeds.add_option("count", options->seeds, "How many seeds")
       ->required()
       ->check(CLI::Range(1, 10000))

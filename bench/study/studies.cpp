@@ -6,15 +6,14 @@
 #include "base/error.h"
 #include "base/mutex.h"
 #include "base/parallel_for.h"
-#include "bench/study/study_detectors.h"
+#include "bench/study/evaluation_report.h"
+#include "bench/study/wilson_interval.h"
 #include "diagnosis/model/fault_catalogue.h"
 #include "report/progress.h"
 #include "report/stop_signals.h"
 #include "report/text_table.h"
 #include "trainer/campaign/campaign_runs.h"
 #include "trainer/campaign/file_runs.h"
-#include "trainer/campaign/run_input.h"
-#include "trainer/scoring/evaluation_report.h"
 #include "trainer/statistics.h"
 
 namespace fdi::trainer::study {
@@ -105,7 +104,7 @@ std::string SharesTable(const SeedStudy& study) {
                 PerSeed(study, &SeedCounts::detected),
                 PerSeed(study, &SeedCounts::contained),
                 PerSeed(study, &SeedCounts::exact)});
-  return TextOf(table);
+  return table.Text();
 }
 
 Json JsonOf(const SeedCounts& counts) {
@@ -159,7 +158,8 @@ report::Report LeaveOneOut(const ModelSet& models, std::vector<ScoredRun> runs,
                            const EvaluationSettings& settings) {
   std::erase_if(runs, [](const ScoredRun& r) { return FaultOf(r.run) == 0; });
   const Detector detector = LeaveOneOutDetector(models);
-  const std::vector<EvaluatedRun> scored = Evaluate(detector, runs, settings);
+  const std::vector<EvaluatedRun> scored =
+      Evaluate(detector, runs, settings).runs;
   std::map<int, std::vector<EvaluatedRun>> by_fault;
   // Evaluate() keeps the order of the runs.
   for (std::size_t r = 0; r < runs.size(); ++r) {
@@ -231,7 +231,7 @@ SeedStudy StudySeeds(
 }
 
 SeedStudy RepeatWithSeeds(const Detector& detector,
-                          const RunSelection& selection, int seeds) {
+                          const StudySelection& selection, int seeds) {
   const std::uint64_t first = selection.seed_offset;
   std::vector<std::vector<CampaignRun>> scenarios{
       SimulatedScenarios(selection.campaign, first)};
@@ -247,7 +247,7 @@ SeedStudy RepeatWithSeeds(const Detector& detector,
       scenarios.size(), std::vector<EvaluatedRun>(count));
   const report::StopSignals signals;
   report::Progress progress("simulate");
-  Mutex mutex;  // Of the progress.
+  Mutex mutex;  // Guards the progress.
   int done = 0;
   const int total = static_cast<int>(scenarios.size() * count);
   ParallelFor(total, 0, [&](int i) {

@@ -3,9 +3,8 @@
 #include <map>
 #include <vector>
 
+#include "bench/study/study_detectors.h"
 #include "report/report.h"
-#include "trainer/campaign/campaign.h"
-#include "trainer/scoring/detectors.h"
 
 /// Evaluations that repeat: with other seeds, or without each fault in turn.
 namespace fdi::trainer::study {
@@ -62,7 +61,7 @@ SeedStudy StudySeeds(const std::vector<std::vector<EvaluatedRun>>& repetitions);
 /// each, in memory alone, with a progress bar.
 /// @throws ConfigError if one of them is not simulated; Interrupted.
 SeedStudy RepeatWithSeeds(const Detector& detector,
-                          const RunSelection& selection, int seeds);
+                          const StudySelection& selection, int seeds);
 
 /// Shares with 95 % Wilson intervals, by fault and over all.
 report::Report SeedReport(const Detector& detector, const SeedStudy& study);

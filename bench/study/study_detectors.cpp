@@ -5,12 +5,13 @@
 #include <map>
 
 #include "base/error.h"
+#include "base/parallel_for.h"
 #include "bench/study/csv_rows.h"
 #include "bench/study/model_reduction.h"
 #include "diagnosis/model/fault_catalogue.h"
 #include "report/text_table.h"
+#include "simulator/second_look/valve_physics.h"
 #include "trainer/campaign/run_input.h"
-#include "trainer/scoring/evaluation_report.h"
 
 namespace fdi::trainer::study {
 namespace {
@@ -134,11 +135,61 @@ Answer ReadVerdicts(const std::string& file, const storage::StoredRun& run) {
   return {std::move(all)};
 }
 
+EvaluatedRun Score(const Answer& answer, const ScoredRun& run,
+                   bool assume_normal) {
+  EvaluatedRun result =
+      ScoreAnswer(answer, run.run, assume_normal, run.horizon_s);
+  result.indices.run_id = run.name;
+  return result;
+}
+
 }  // namespace
 
+EvaluatedRun Evaluate(const Detector& detector, const ScoredRun& run,
+                      const EvaluationSettings& settings) {
+  return Score(detector.follow(run, {}), run, settings.assume_normal);
+}
+
+Scores Evaluate(const Detector& detector, const std::vector<ScoredRun>& runs,
+                const EvaluationSettings& settings) {
+  Scores scores{std::vector<EvaluatedRun>(runs.size()),
+                std::vector<PaperIndices>(runs.size())};
+  ParallelFor(static_cast<int>(runs.size()), settings.threads, [&](int i) {
+    const auto r = static_cast<std::size_t>(i);
+    const ScoredRun& run = runs[r];
+    const Answer answer = detector.follow(
+        run, settings.watch ? settings.watch(run) : VerdictSink{});
+    scores.runs[r] = Score(answer, run, settings.assume_normal);
+    scores.paper[r] = ComputePaperIndices(
+        answer.indications, scores.runs[r].indices, run.horizon_s);
+    if (settings.scored) {
+      settings.scored(run, scores.runs[r], answer.indications);
+    }
+  });
+  return scores;
+}
+
+int FaultOf(const storage::StoredRun& run) {
+  const auto first = std::find_if(
+      run.samples.begin(), run.samples.end(),
+      [](const storage::StoredSample& s) { return TruthOf(s).fault != 0; });
+  return first == run.samples.end() ? 0 : TruthOf(*first).fault;
+}
+
+Detector EngineDetector(const std::shared_ptr<const ModelSet>& models) {
+  return {models->name,
+          models->version,
+          models->groups,
+          RequiredSignals(*models),
+          [models](const ScoredRun& run, const VerdictSink& sink) {
+            return AnswerOf(models, run.run, sink);
+          },
+          simulator::FlowTargetOf(*models)};
+}
+
 Detector LeaveOneOutDetector(const ModelSet& models) {
-  // By fault; 0 is the whole set, which also answers for faults that it does
-  // not know.
+  // Indexed by fault; 0 is the whole set, which also answers for faults that it
+  // does not know.
   std::map<int, Detector> reduced;
   reduced[0] = EngineDetector(std::make_shared<const ModelSet>(models));
   for (const int fault : models.faults) {
@@ -172,7 +223,7 @@ std::string SignatureTable(const Baseline& baseline) {
     row.push_back(SetText(faults));
     table.AddRow(std::move(row));
   }
-  return TextOf(table);
+  return table.Text();
 }
 
 Detector FittedBaseline(Baseline baseline, FlowUnit flow_unit) {

@@ -13,7 +13,7 @@
 #include "diagnosis/model/fault_catalogue.h"
 #include "import/csv.h"
 #include "monitor/console/api.h"
-#include "report/plot/episode_page.h"
+#include "report/plot/episode_text.h"
 #include "report/plot/gnuplot.h"
 #include "report/report.h"
 #include "storage/history/common_cause.h"
@@ -414,34 +414,18 @@ File EpisodePicture(const Api& api, const httplib::Request& request) {
                            {.stop = api.stopping})};
 }
 
-// The page of `fdi-store history report`, with times in UTC.
-File EpisodeHtml(const Api& api, const httplib::Request& request) {
-  const std::string id = request.matches[1];
-  const auto reader = api.History();
-  const plot::EpisodeEvidence evidence =
-      plot::LoadEvidence(*reader, id, api.sources.models);
-  const storage::Alarm alarm =
-      reader->Alarms({evidence.episode}, api.sources.utc_now_ns()).front();
-  std::ostringstream html;
-  plot::EpisodePage(evidence, alarm, api.texts, true, {.stop = api.stopping})
-      .PrintHtml(html, plot::EpisodeTitle(evidence.episode, api.texts), {true});
-  return {"text/html; charset=utf-8", "", html.str(), true};
-}
-
 }  // namespace
 
 std::vector<Route> HistoryRoutes() {
-  return {
-      {"/api/v1/alarms", Alarms},
-      {"/api/v1/history", History},
-      {"/api/v1/statistics", Statistics},
-      {"/api/v1/shelf", Shelves},
-      {"/api/v1/causes", Causes},
-      {"/api/v1/episodes/([0-9a-fA-F]{1,16}|last)", Episode},
-      {"/api/v1/episodes/([0-9a-f]{1,16}|last)\\.csv", nullptr, EpisodeCsv},
-      {"/api/v1/episodes/([0-9a-f]{1,16}|last)\\.(svg|png)", nullptr,
-       EpisodePicture},
-      {"/api/v1/episodes/([0-9a-f]{1,16}|last)\\.html", nullptr, EpisodeHtml}};
+  return {{"/api/v1/alarms", Alarms},
+          {"/api/v1/history", History},
+          {"/api/v1/statistics", Statistics},
+          {"/api/v1/shelf", Shelves},
+          {"/api/v1/causes", Causes},
+          {"/api/v1/episodes/([0-9a-fA-F]{1,16}|last)", Episode},
+          {"/api/v1/episodes/([0-9a-f]{1,16}|last)\\.csv", nullptr, EpisodeCsv},
+          {"/api/v1/episodes/([0-9a-f]{1,16}|last)\\.(svg|png)", nullptr,
+           EpisodePicture}};
 }
 
 }  // namespace fdi::console

@@ -6,7 +6,7 @@
 #include "programs/store/verbs.h"
 #include "report/fault_texts.h"
 #include "report/plot/episode_figure.h"
-#include "report/plot/episode_page.h"
+#include "report/plot/episode_text.h"
 #include "report/text_table.h"
 #include "storage/history/history_reader.h"
 #include "storage/history/strength.h"
@@ -486,32 +486,6 @@ Report PlotEpisode(const PlotOptions& options, const Context& context) {
   return report.Line("drawn to " + path.string());
 }
 
-struct EpisodePageOptions {
-  std::string id;
-  std::string output;
-  PlantOptions plant;
-};
-
-Report WriteEpisodePage(const EpisodePageOptions& options,
-                        const Context& context) {
-  const auto history = OpenHistory(options.plant, context);
-  const plot::EpisodeEvidence evidence =
-      plot::LoadEvidence(*history, options.id, DataOf(context).models());
-  const Alarm alarm = history->Alarms({evidence.episode}, NowNs()).front();
-  const report::FaultTexts texts = report::LoadFaultTexts(context.options);
-  const bool utc = context.options.utc;
-  const Report page = plot::EpisodePage(evidence, alarm, texts, utc);
-  const std::string& id = evidence.episode.episode_id;
-  const std::filesystem::path path =
-      options.output.empty() ? id + ".html" : options.output;
-  report::WriteOutput(path, [&](std::ostream& out) {
-    page.PrintHtml(out, plot::EpisodeTitle(evidence.episode, texts), {utc});
-  });
-  Report report;
-  report.document = {{"episode_id", id}, {"file", path.string()}};
-  return path == "-" ? report : report.Line("written to " + path.string());
-}
-
 }  // namespace
 
 void AddHistoryVerbs(report::Program& program) {
@@ -552,15 +526,10 @@ void AddHistoryVerbs(report::Program& program) {
   plot.add_option("--to", plotted.figure.to_s,
                   "End of the picture in s after detection");
 
-  auto [page, paged] = AddVerb(
-      program, group, "report",
-      "Write the page of an episode to print: story, what to check, lines "
-      "for what was found, picture",
-      WriteEpisodePage);
-  AddEpisode(page, paged.id);
-  page.add_option("-o,--output", paged.output,
-                  "FILE.html, or - for stdout (ID.html)");
-  paged.plant.AddTo(page);
+  program.AddRemoved("history", "report",
+                     "print the episode on the page of the monitor; "
+                     "fdi-store history show says the same in text, and "
+                     "history plot draws its picture");
 }
 
 }  // namespace fdi::storage

@@ -10,7 +10,6 @@
 #include "import/csv.h"
 #include "import/tag_map.h"
 #include "programs/store/verbs.h"
-#include "report/plot/run_figure.h"
 #include "report/signal_list.h"
 #include "report/text_table.h"
 
@@ -318,20 +317,6 @@ Report Delete(const std::vector<std::string>& ids, const Context& context) {
   return report;
 }
 
-Report PlotRun(const FileOptions& options, const Context& context) {
-  const StoredRun run = RunStore(DataOf(context).runs()).Load(options.selector);
-  const std::filesystem::path path =
-      options.output.empty() ? run.info.id + ".png" : options.output;
-  plot::Figure figure = plot::RunFigure(run);
-  figure.subtitle = "started " + TimeText(run.info.run.start_ns, context) +
-                    ",  " + std::string(RunOriginName(run.info.run.origin)) +
-                    ",  " + std::to_string(figure.x.size()) + " samples";
-  plot::DrawFigure(figure, path);
-  Report report;
-  report.document = {{"run_id", run.info.id}, {"file", path.string()}};
-  return report.Line("drawn to " + path.string());
-}
-
 void AddImport(report::Program& program, CLI::App& group) {
   auto [verb, options] =
       AddVerb(program, group, "import",
@@ -393,13 +378,8 @@ void AddRunsVerbs(report::Program& program) {
   auto [remove, ids] = AddVerb(program, group, "delete", "Delete runs", Delete);
   remove.add_option("run", ids, "IDs")->required();
 
-  auto [plot, plotted] = AddVerb(
-      program, group, "plot",
-      "Draw the signals and the truth of a run for a report, with gnuplot",
-      PlotRun);
-  plot.add_option("run", plotted.selector, kSelector)->required();
-  plot.add_option("-o,--output", plotted.output,
-                  "FILE.png or FILE.svg (ID.png)");
+  program.AddRemoved("runs", "plot",
+                     "fdi-store runs export writes its samples as CSV");
 }
 
 }  // namespace fdi::storage

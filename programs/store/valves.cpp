@@ -9,6 +9,7 @@
 
 #include "base/csv_cells.h"
 #include "base/error.h"
+#include "base/toml_text.h"
 #include "diagnosis/records/valve_glob.h"
 #include "import/plant_table.h"
 #include "programs/store/verbs.h"
@@ -266,10 +267,6 @@ struct AddOptions {
 // The first line of a file of groups that may be written again.
 constexpr std::string_view kMadeBy =
     "# Made by fdi-store valves add --plant from ";
-
-std::string TomlText(const std::string& text) {
-  return Json(text).dump();  // A basic string of TOML is one of JSON.
-}
 
 // One group of valves for each group of the table with two loops or more;
 // nothing is written over a file that a person made.

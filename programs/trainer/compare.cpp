@@ -7,6 +7,7 @@
 #include "storage/database/data_directory.h"
 #include "storage/models/models.h"
 #include "trainer/scoring/comparison.h"
+#include "trainer/scoring/scored_runs.h"
 
 namespace fdi::trainer {
 namespace {
@@ -26,10 +27,9 @@ report::Report CompareSets(const CompareOptions& options,
   const auto a = std::make_shared<const ModelSet>(store.Load(options.a));
   const auto b = std::make_shared<const ModelSet>(store.Load(options.b));
   // Sets of two flow units have no run in common: scoring refuses that of b.
-  const auto runs = LoadScoredRuns(options.selection,
-                                   RequiredSignals(*a) | RequiredSignals(*b),
-                                   EngineDetector(a).flow, context);
-  return ComparisonReport(Compare(a, b, runs, {options.assume_normal}),
+  const auto runs =
+      LoadSelected(options.selection, *a, context, RequiredSignals(*b));
+  return ComparisonReport(Compare(a, b, runs, options.assume_normal),
                           options.all);
 }
 

@@ -29,9 +29,9 @@ int main(int argc, char** argv) {
        {"evaluate",
         {{"How fast and how right, on stored runs with known faults",
           "fdi-trainer evaluate --model-set paper --runs 1a2b,3c4d"},
-         {"With a report to look at",
-          "fdi-trainer evaluate --model-set paper@2 --campaign "
-          "campaigns/paper.toml --report report"}}},
+         {"Hours of a file in which the valve was healthy",
+          "fdi-trainer evaluate --valve FV-101 --file day.csv "
+          "--assume-normal"}}},
        {"compare",
         {{"Is version 2 better?",
           "fdi-trainer compare paper@1 paper@2 --runs 1a2b,3c4d"},

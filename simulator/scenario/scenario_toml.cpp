@@ -13,6 +13,7 @@
 #include "base/field_list.h"
 #include "base/text.h"
 #include "base/time_text.h"
+#include "base/toml_text.h"
 #include "import/csv.h"
 #include "simulator/level_loop.h"
 
@@ -129,12 +130,12 @@ class FieldWriter {
     Add(key, List(field, NumberText<double>));
   }
   void operator()(const char* key, std::string& field) {
-    Add(key, QuoteToml(field));
+    Add(key, TomlText(field));
   }
   template <typename Enum>
   requires std::is_enum_v<Enum>
   void operator()(const char* key, Enum field) {
-    Add(key, QuoteToml(kEnumNames<Enum>[static_cast<std::size_t>(field)]));
+    Add(key, TomlText(kEnumNames<Enum>[static_cast<std::size_t>(field)]));
   }
   template <typename Struct>
   requires(std::is_class_v<Struct> && !std::is_same_v<Struct, std::string> &&
@@ -317,7 +318,7 @@ TomlReader ReaderOf(const std::string& setting, std::string_view key,
   try {
     return TomlReader(head + std::string(value), source);
   } catch (const ConfigError&) {
-    return TomlReader(head + QuoteToml(value), source);
+    return TomlReader(head + TomlText(value), source);
   }
 }
 
@@ -327,7 +328,7 @@ void AppendParameters(const ValveParameters& parameters, Lines& result) {
   const auto names = ParameterSetNames();
   const bool shipped = std::ranges::count(names, parameters.name) > 0;
   const std::string base = shipped ? parameters.name : names.front();
-  result.emplace_back("parameters.base", QuoteToml(base));
+  result.emplace_back("parameters.base", TomlText(base));
   AppendDifferences("parameters.", parameters, ParameterSet(base), result);
 }
 
@@ -337,7 +338,7 @@ void AppendExcitation(const Scenario& scenario, Lines& result) {
   const bool from_file = std::holds_alternative<RecordedExcitation>(excitation);
   result.emplace_back(
       "excitation.name",
-      QuoteToml(from_file ? name + ':' + scenario.excitation_file : name));
+      TomlText(from_file ? name + ':' + scenario.excitation_file : name));
   std::visit(
       [&result](const auto& e) {
         AppendDifferences("excitation.", e, std::remove_cvref_t<decltype(e)>{},
@@ -357,7 +358,7 @@ std::string InputText(const InputProfile& input) {
 std::string ModeText(const ModeStretch& stretch) {
   return "{from_s = " + NumberText(stretch.from_s) +
          ", until_s = " + NumberText(stretch.until_s) +
-         ", mode = " + QuoteToml(ValveModeName(stretch.mode)) + '}';
+         ", mode = " + TomlText(ValveModeName(stretch.mode)) + '}';
 }
 
 }  // namespace
@@ -445,24 +446,9 @@ void ApplySetting(std::string_view setting, Scenario& scenario) {
   reader.Finish();
 }
 
-std::string QuoteToml(std::string_view text) {
-  constexpr std::string_view kDigits = "0123456789abcdef";
-  std::string quoted = "\"";
-  for (const char c : text) {
-    const auto byte = static_cast<unsigned char>(c);
-    if (byte < 0x20 || byte == 0x7F) {
-      quoted += "\\u00";
-      quoted += {kDigits[byte >> 4U], kDigits[byte & 0xFU]};
-    } else {
-      quoted += c == '"' || c == '\\' ? std::string{'\\', c} : std::string{c};
-    }
-  }
-  return quoted + '"';
-}
-
 std::string ScenarioText(const Scenario& scenario) {
   ValveSimulationConfig config = scenario.config;
-  Lines lines = {{"valve", QuoteToml(scenario.valve_id)}};
+  Lines lines = {{"valve", TomlText(scenario.valve_id)}};
   AppendParameters(config.parameters, lines);
   AppendExcitation(scenario, lines);
   if (!config.inputs.empty()) {
@@ -473,13 +459,13 @@ std::string ScenarioText(const Scenario& scenario) {
   }
   lines.emplace_back("faults",
                      List(config.faults, [](const FaultSchedule& fault) {
-                       return QuoteToml(ToText(fault));
+                       return TomlText(ToText(fault));
                      }));
   lines.emplace_back("seed", NumberText(config.seed));
   lines.emplace_back("duration_s", NumberText(config.duration_s));
   lines.emplace_back("period_s", NumberText(config.period_s));
   if (config.start_ns != 0) {
-    lines.emplace_back("start", QuoteToml(FormatTime(config.start_ns, true)));
+    lines.emplace_back("start", TomlText(FormatTime(config.start_ns, true)));
   }
   VisitFields(config, FieldWriter("", lines));
   lines.emplace_back("tolerance_scale", NumberText(config.tolerance_scale));

@@ -92,7 +92,4 @@ void ApplySetting(std::string_view setting, Scenario& scenario);
 /// that name (which the software version pins). Numbers round-trip bit for bit.
 std::string ScenarioText(const Scenario& scenario);
 
-/// Text as a quoted TOML string.
-std::string QuoteToml(std::string_view text);
-
 }  // namespace fdi::simulator

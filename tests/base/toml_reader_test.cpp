@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
+#include "base/toml_text.h"
 #include "tests/storage/message_of.h"
 
 namespace fdi {
@@ -46,6 +47,15 @@ TEST(TomlReaderTest, DotsInTextsCommentsAndNumbersAreNoKeys) {
                               "]\n",
                           "f.toml");
   EXPECT_EQ(reader.Keys().size(), 4U);
+}
+
+TEST(TomlTextTest, AnyTextIsReadBackAsItWas) {
+  for (const std::string text :
+       {"", "f6", "a \"b\" \\ 'c'", "two\nlines\tand\r\x01\x7f", "°C ü"}) {
+    TomlReader reader("a = " + TomlText(text), "f.toml");
+    EXPECT_EQ(reader.Text("a"), text);
+    EXPECT_EQ(TomlText(text).find('\n'), std::string::npos);
+  }
 }
 
 }  // namespace

@@ -11,10 +11,8 @@
 
 #include "base/error.h"
 #include "report/plot/episode_figure.h"
-#include "report/plot/episode_page.h"
+#include "report/plot/episode_text.h"
 #include "report/plot/gnuplot.h"
-#include "report/plot/run_figure.h"
-#include "report/shared_files.h"
 #include "tests/storage/history_fixture.h"
 #include "tests/storage/message_of.h"
 
@@ -25,24 +23,11 @@ using storage::HistoryFixture;
 using storage::HistoryReader;
 using storage::HistoryWriter;
 using storage::MessageOf;
-using storage::StoredRun;
-using storage::StoredSample;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::Not;
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
-
-TEST(EventSentenceTest, ANameThatIsTakenBackIsToldSo) {
-  const report::FaultTexts texts(report::SharedFile("faults.toml"));
-  storage::HistoryEntry event;
-  event.kind = "REISOLATED";
-  EXPECT_EQ(EventSentence(event, texts),
-            "The name was taken back: no known fault explains the readings.");
-  event.faults = "f7";
-  event.strength = 0.5;
-  EXPECT_THAT(EventSentence(event, texts), HasSubstr(" (f7), strength 0.50."));
-}
 
 TEST(IntervalTextTest, AWidthThatCannotBeSeenIsLeftOut) {
   EXPECT_EQ(IntervalText(0.42, 0.38, 0.46, 2), "0.42 (0.38 to 0.46)");
@@ -363,28 +348,6 @@ TEST_F(EpisodeFigureTest, TimeIsCutToWhatIsAskedFor) {
 
   EXPECT_NEAR(figure.x.front(), -10.0, 1e-9);
   EXPECT_NEAR(figure.x.back(), 50.0, 1e-9);
-}
-
-TEST(RunFigureTest, ShadesTheTruthAndLeavesRefusedSamplesOut) {
-  StoredRun run;
-  for (int k = 0; k < 10; ++k) {
-    StoredSample stored;
-    stored.sample.stamp_ns = k * 1'000'000'000LL;
-    stored.sample.Set(Signal::kX, k);
-    stored.truth = FaultTruth{k >= 4 && k < 8 ? 19 : 0, 0.1 * k};
-    stored.intake = k == 5 ? Intake::kRange : Intake::kAccepted;
-    stored.model_swapped = k == 6;
-    run.samples.push_back(stored);
-  }
-
-  const Figure figure = RunFigure(run);
-
-  EXPECT_EQ(figure.x.size(), 9U);
-  EXPECT_THAT(figure.footnote, HasSubstr("1 range"));
-  ASSERT_EQ(figure.bands.size(), 1U);
-  EXPECT_EQ(figure.bands[0].from, 4.0);
-  EXPECT_EQ(figure.bands[0].text, "f19 0.70");
-  EXPECT_THAT(TextsOf(figure.marks), ElementsAre("model set"));
 }
 
 }  // namespace

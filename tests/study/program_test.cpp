@@ -105,9 +105,9 @@ TEST_F(StudyReducedTest, SetWithoutAFaultAnswersAsIfNeverToldOfIt) {
   Write("one.toml", Quick("one") + Faults("\"f19\""));
   ASSERT_EQ(Run("train --campaign one.toml").code, 0) << Read("err.txt");
   const std::string score = " --campaign two.toml --vectors ";
-  ASSERT_EQ(Run("evaluate --model-set one" + score + "one.csv").code, 0);
+  ASSERT_EQ(Study("evaluate --model-set one" + score + "one.csv").code, 0);
   ASSERT_EQ(Study("reduce two --as less --without f1").code, 0);
-  ASSERT_EQ(Run("evaluate --model-set less" + score + "two.csv").code, 0);
+  ASSERT_EQ(Study("evaluate --model-set less" + score + "two.csv").code, 0);
   EXPECT_EQ(Read("one.csv"), Read("two.csv"));
 }
 
@@ -143,7 +143,8 @@ TEST_F(StudyReducedTest, ChannelLeftOutIsMissedInTheVectors) {
   const std::string call = "reduce two --as less ";
   ASSERT_EQ(Study(call + "--without-channels x").code, 0);
   ASSERT_EQ(
-      Run("evaluate --model-set less --campaign two.toml --vectors v.csv").code,
+      Study("evaluate --model-set less --campaign two.toml --vectors v.csv")
+          .code,
       0);
   const std::string head = Read("v.csv").substr(0, 200);
   EXPECT_THAT(head, HasSubstr("state,r_F,d_0"));

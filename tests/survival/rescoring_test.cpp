@@ -1,4 +1,4 @@
-// A recorded run, scored again by fdi-trainer, gives bit for bit what the live
+// A recorded run, scored again by fdi-study, gives bit for bit what the live
 // monitor published over DDS. Left out: a restarted monitor, which resumes its
 // slow accumulators, and valves whose isolation is held.
 
@@ -105,7 +105,7 @@ class RescoringTest : public MonitorFixture {
                                       const std::string& runs) const {
     const std::filesystem::path file = directory_.path() / "vectors.csv";
     const Finished evaluate =
-        RunProgram({FDI_TRAINER_PROGRAM, "--data", data_.string(), "evaluate",
+        RunProgram({FDI_STUDY_PROGRAM, "--data", data_.string(), "evaluate",
                     "--model-set", model_set, "--assume-normal", "--runs", runs,
                     "--vectors", file.string()});
     EXPECT_EQ(evaluate.code, 0) << evaluate.errors;

@@ -5,12 +5,12 @@
 #include <sstream>
 #include <string>
 
-#include "tests/programs/trainer/fixture.h"
+#include "tests/study/fixture.h"
 
 namespace fdi::trainer {
 namespace {
 
-class BenchmarkTest : public TrainerProgram {
+class BenchmarkTest : public study::StudyProgram {
  protected:
   void SetUp() override {
     if (std::getenv("FDI_REFERENCE_DATA") == nullptr) {
@@ -29,7 +29,7 @@ TEST_F(BenchmarkTest, ScenariosAreDetectedAndIsolatedWithoutFalseAlarm) {
   Write("b.toml", Campaign());
   ASSERT_EQ(Run("train --campaign b.toml").code, 0);
   // Seeds of its own: the figures may not hang on those of the campaign.
-  const nlohmann::json scored = RunJson(
+  const nlohmann::json scored = StudyJson(
       "evaluate --model-set benchmark --campaign b.toml --seed-offset 5000");
   ASSERT_EQ(scored["runs"].size(), 37U);
   int detected = 0;

@@ -73,7 +73,7 @@ for form in "$@"; do
   for fault in "${faults[@]}"; do
     name=${fault%%:*}
     export_as "$name.csv" "$form" >export.csv
-    "$bin/fdi-trainer" evaluate --model-set "$form" \
+    "$bin/fdi-study" evaluate --model-set "$form" \
       --file export.csv@$healthy: "${map[@]}" --no-second-look \
       --vectors vectors.csv --json >evaluated.json 2>evaluate.log ||
       fail "evaluating refuses $form"
@@ -101,7 +101,7 @@ awk -v form=spreadsheet -f "$tests/exports.awk" loop.csv >export.csv
 "$bin/fdi-store" runs sniff export.csv --zone $zone --map-output loop.toml \
   >sniff.log 2>&1 || fail "sniff refuses the loop"
 sed -i 's/^unit = "bar"$/unit = "bar g"/' loop.toml
-"$bin/fdi-trainer" evaluate --model-set loop --file export.csv --map loop.toml \
+"$bin/fdi-study" evaluate --model-set loop --file export.csv --map loop.toml \
   --no-second-look --vectors vectors.csv >evaluate.log 2>&1 ||
   fail "evaluating refuses the loop"
 awk -F, 'NR == 1 {for (i = 1; i <= NF; ++i) column[$i] = i; next}

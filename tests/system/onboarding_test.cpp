@@ -56,7 +56,7 @@ TEST_F(OnboardingTest, FaultsOnARealValveAreSeenAndNamedNarrowly) {
                     " -o faulty.csv")
                   .code,
               0);
-    const nlohmann::json run = RunJson(
+    const nlohmann::json run = StudyJson(
         "evaluate --model-set PLANT --file faulty.csv@1500:")["runs"][0];
     EXPECT_TRUE(run["detected"].get<bool>());
     EXPECT_LE(run["t_dt_first"].get<double>(), 60.0);
@@ -89,7 +89,7 @@ TEST_F(OnboardingTest, FaultsOfAnotherModelAreSeenAndNamed) {
   int contained = 0;
   int exact = 0;
   const nlohmann::json scored =
-      RunJson("evaluate --model-set REF" + files)["runs"];
+      StudyJson("evaluate --model-set REF" + files)["runs"];
   for (const auto& run : scored) {
     SCOPED_TRACE(run["run_id"].get<std::string>());
     if (run["fault"] == nullptr || run["fault"] == "normal") {

@@ -6,6 +6,7 @@
 #include "base/csv_cells.h"
 #include "base/error.h"
 #include "base/toml_reader.h"
+#include "base/toml_text.h"
 #include "simulator/scenario/scenario_toml.h"
 #include "trainer/campaign/campaign_fields.h"
 #include "trainer/campaign/file_runs.h"
@@ -13,7 +14,6 @@
 namespace fdi::trainer {
 namespace {
 
-using simulator::QuoteToml;
 using std::filesystem::path;
 
 // Sets each field that its table names. Range and type are checked by the
@@ -235,12 +235,12 @@ void WriteSource(const char* table, const SimulatedRun& run,
 }
 
 void WriteSource(const char*, const ImportedRun& run, std::string& text) {
-  text += "import = " + QuoteToml(run.file.string()) +
-          "\nvalve = " + QuoteToml(run.valve_id) + '\n';
+  text += "import = " + TomlText(run.file.string()) +
+          "\nvalve = " + TomlText(run.valve_id) + '\n';
 }
 
 void WriteSource(const char*, const RecordedRun& run, std::string& text) {
-  text += "run = " + QuoteToml(run.selector) + '\n';
+  text += "run = " + TomlText(run.selector) + '\n';
 }
 
 // Keys of the run itself come before its sub-table [run.simulate], because TOML
@@ -267,26 +267,12 @@ Campaign LoadCampaign(const path& file) {
   return Reader(file).Read();
 }
 
-std::vector<CampaignRun> ValidationRuns(const std::filesystem::path& path,
-                                        std::uint64_t seed_offset) {
-  std::vector<CampaignRun> validation = LoadCampaign(path).validation;
-  if (validation.empty()) {
-    throw ConfigError(path.string() + ": there is no [[validation]]");
-  }
-  for (CampaignRun& run : validation) {
-    if (auto* simulated = std::get_if<SimulatedRun>(&run.source)) {
-      simulated->scenario.config.seed += seed_offset;
-    }
-  }
-  return validation;
-}
-
 std::string CampaignText(const Campaign& campaign) {
   TrainingOptions training = campaign.training;
   std::string text;
   FieldWriter writer(text);
-  writer.Line("name", QuoteToml(training.name));
-  writer.Line("preset", QuoteToml(training.preset));
+  writer.Line("name", TomlText(training.name));
+  writer.Line("preset", TomlText(training.preset));
   text += "\n[decision]\n";
   VisitDecision(training.decision, writer);
   text += "\n[training]\n";

@@ -32,8 +32,8 @@ struct CampaignRun {
   std::variant<SimulatedRun, ImportedRun, RecordedRun> source;
   /// Seconds from the start of a simulated or imported run to train on.
   storage::RunSelector stretch;
-  /// Of a run to score, from its start [s]: what comes later does not count;
-  /// 0: all counts.
+  /// Time from the start of a run to score [s]: later samples do not count; 0:
+  /// all count.
   double horizon_s{0.0};
 };
 
@@ -73,7 +73,7 @@ std::string RunLabel(const CampaignRun& run);
 ///     to_s = 1500
 ///     [[run]]
 ///     run = "1a2b3c@600:"
-///     [[validation]]                  # as [[run]]; scored by evaluate alone
+///     [[validation]]                  # as [[run]]; never trained on
 ///     simulate = {duration_s = 1501}
 ///     faults = ["f1:abrupt@900"]
 ///     strengths = [0.25, 0.5]
@@ -86,11 +86,6 @@ std::string RunLabel(const CampaignRun& run);
 /// @throws NotFoundError if there is no such file.
 /// @throws ConfigError naming file, line, key and what is accepted.
 Campaign LoadCampaign(const std::filesystem::path& path);
-
-/// The [[validation]] of a campaign; `seed_offset` is added to the seeds of
-/// simulated runs. @throws as LoadCampaign(), or ConfigError if it has none.
-std::vector<CampaignRun> ValidationRuns(const std::filesystem::path& path,
-                                        std::uint64_t seed_offset);
 
 /// The text from which LoadCampaign() restores `campaign`, all runs spelled
 /// out.

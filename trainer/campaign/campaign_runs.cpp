@@ -10,10 +10,7 @@
 #include "base/error.h"
 #include "base/mutex.h"
 #include "base/parallel_for.h"
-#include "base/time_text.h"
 #include "import/csv.h"
-#include "report/progress.h"
-#include "report/stop_signals.h"
 #include "storage/runs/run_recorder.h"
 #include "storage/runs/runs.h"
 #include "trainer/campaign/run_input.h"
@@ -27,7 +24,8 @@ using storage::RunOrigin;
 // A progress bar that moves a few times per second.
 constexpr std::uint64_t kSamplesPerReport = 500;
 
-// Of the golden ratio: seeds that follow each other give sources far apart.
+// 2^64 divided by the golden ratio: seeds that follow each other give sources
+// that are far apart.
 constexpr std::uint64_t kGolden = 0x9E3779B97F4A7C15ULL;
 
 // The configuration that a run is simulated with: `start_ns` where its scenario
@@ -136,7 +134,7 @@ class Collector {
   }
 
  private:
-  // In full: once others are stored, `last` means another run.
+  // The id in full: once others are stored, `last` means another run.
   void Find(const RecordedRun& run) {
     ids_[at_] = SelectorOf(store_->Info(run.selector).id,
                            storage::ParseRunSelector(run.selector));
@@ -290,33 +288,6 @@ CollectedRuns CollectRuns(const std::vector<CampaignRun>& runs,
                           const CollectOptions& options,
                           const CollectProgress& progress) {
   return Collector(runs, directory, options, progress).Collect();
-}
-
-std::vector<storage::StoredRun> LoadCampaignRuns(
-    const std::vector<CampaignRun>& runs, const report::Context& context) {
-  const storage::DataDirectory directory{context.options.data_dir};
-  const report::StopSignals signals;
-  std::optional<report::Progress> progress;  // Only if something is simulated.
-  const CollectedRuns collected =
-      CollectRuns(runs, directory, {context.software, NowNs(), 0},
-                  [&](double share, const std::string& what) {
-                    if (signals.stop_requested()) {
-                      throw Interrupted("interrupted");
-                    }
-                    if (!progress) {
-                      progress.emplace("simulate");
-                    }
-                    progress->Update(share, what);
-                  });
-  if (progress) {
-    progress->Finish();
-  }
-  storage::RunStore store(directory.runs());
-  std::vector<storage::StoredRun> loaded;
-  for (const std::string& selector : collected.selectors) {
-    loaded.push_back(store.Load(selector));
-  }
-  return loaded;
 }
 
 storage::StoredRun SimulateRun(const SimulatedRun& run) {

@@ -6,7 +6,6 @@
 #include <string>
 #include <vector>
 
-#include "report/program.h"
 #include "storage/database/data_directory.h"
 #include "trainer/campaign/campaign.h"
 
@@ -20,7 +19,7 @@ class Interrupted : public std::runtime_error {
 
 struct CollectOptions {
   std::string software;      ///< Stored with new runs.
-  std::int64_t start_ns{0};  ///< Of runs whose scenario does not say it.
+  std::int64_t start_ns{0};  ///< For runs whose scenario does not say it.
   int threads{0};            ///< 0: all of the machine.
 };
 
@@ -45,11 +44,6 @@ CollectedRuns CollectRuns(const std::vector<CampaignRun>& runs,
                           const storage::DataDirectory& directory,
                           const CollectOptions& options,
                           const CollectProgress& progress = {});
-
-/// The same with a progress bar, and loads them all.
-/// @throws as CollectRuns(), or Interrupted.
-std::vector<storage::StoredRun> LoadCampaignRuns(
-    const std::vector<CampaignRun>& runs, const report::Context& context);
 
 /// Simulates a run in memory; its id stays empty.
 storage::StoredRun SimulateRun(const SimulatedRun& run);

@@ -60,25 +60,6 @@ FaultTruth TruthOf(const storage::StoredSample& stored) {
   return truth;
 }
 
-int FaultOf(const storage::StoredRun& run) {
-  const auto first = std::find_if(
-      run.samples.begin(), run.samples.end(),
-      [](const storage::StoredSample& s) { return TruthOf(s).fault != 0; });
-  return first == run.samples.end() ? 0 : TruthOf(*first).fault;
-}
-
-double DurationOf(const storage::StoredRun& run) {
-  // A recorded run has its samples in the order of arrival.
-  const auto [first, last] = std::minmax_element(
-      run.samples.begin(), run.samples.end(),
-      [](const storage::StoredSample& a, const storage::StoredSample& b) {
-        return a.sample.stamp_ns < b.sample.stamp_ns;
-      });
-  return static_cast<double>(last->sample.stamp_ns - first->sample.stamp_ns) *
-             1e-9 +
-         run.info.run.period_s;
-}
-
 SignalMask UsualSignals(const storage::StoredRun& run) {
   std::map<SignalMask, std::int64_t> counts;
   for (const storage::StoredSample& stored : run.samples) {

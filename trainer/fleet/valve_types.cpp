@@ -8,6 +8,7 @@
 #include "base/csv_cells.h"
 #include "base/error.h"
 #include "base/toml_reader.h"
+#include "base/toml_text.h"
 #include "simulator/scenario/scenario_toml.h"
 #include "storage/models/model_codec.h"
 
@@ -98,11 +99,11 @@ std::string TypeText(const ValveType& type, const ModelSet* models) {
          NumberText(levels.p1_kpa) + ", " + NumberText(levels.p2_kpa) + ", " +
          NumberText(levels.t1_degc) +
          "]\ncommand_delay = " + std::to_string(type.command_delay) +
-         "\nmodel_set = \"" + set + "\"\n" +
+         "\nmodel_set = " + TomlText(set) + '\n' +
          (models == nullptr
               ? ""
-              : "set_hash = \"" + storage::HashHex(models->content_hash) +
-                    "\"\n") +
+              : "set_hash = " +
+                    TomlText(storage::HashHex(models->content_hash)) + '\n') +
          ScenarioText(scenario);
 }
 

@@ -12,7 +12,7 @@
 #include "storage/runs/runs.h"
 #include "trainer/campaign/campaign_fields.h"
 #include "trainer/campaign/run_input.h"
-#include "trainer/scoring/detectors.h"
+#include "trainer/scoring/evaluate.h"
 
 // From labels to what is learnt: which episodes can be used and as which fault,
 // which runs are trained on beside them, and what the new set descends from
@@ -297,9 +297,7 @@ Teaching TeachFrom(const LabelPlan& plan,
 
 std::vector<int> NameIn(const std::shared_ptr<const ModelSet>& models,
                         const LabelledEpisode& episode) {
-  ScoredRun run;
-  run.run = episode.record;
-  return Evaluate(EngineDetector(models), run).last_set;
+  return Evaluate(models, episode.record).last_set;
 }
 
 std::string SettingsText(const TrainingOptions& options) {

@@ -11,12 +11,12 @@
 #include "base/error.h"
 #include "base/time_units.h"
 #include "diagnosis/records/valve_glob.h"
+#include "simulator/second_look/valve_physics.h"
 #include "storage/history/history_reader.h"
 #include "storage/models/models.h"
 #include "trainer/campaign/file_runs.h"
 #include "trainer/campaign/run_input.h"
 #include "trainer/evaluation.h"
-#include "trainer/scoring/detectors.h"
 
 namespace fdi::trainer {
 namespace {
@@ -147,7 +147,7 @@ class RunReader {
     plan_->episodes_left_out_s += plan_->parent().sample_period_s *
                                   static_cast<double>(all - run.samples.size());
     if (!run.samples.empty()) {
-      ConvertFlow(run, *EngineDetector(plan_->labels.parent).flow, {});
+      ConvertFlow(run, simulator::FlowTargetOf(*plan_->labels.parent), {});
       AddResiduals(plan_->labels.parent, run, plan_->healthy);
       plan_->runs.push_back(RunName(run));
     }

@@ -145,27 +145,21 @@ double LiveSeconds(const EvaluatedRun& run) {
 
 Json SideJson(const EvaluatedRun& run) {
   const RunIndices& i = run.indices;
-  Json set = Json::array();
-  for (const int fault : Outcome(run)) {
-    set.push_back(FaultName(fault));
-  }
   return {{"detected", IsDetected(run)},
-          {"t_dt_first", i.t_dt_first},
           {"t_dt", i.t_dt},
-          {"t_it_first", i.t_it_first},
           {"t_it", i.t_it},
           {"r_fd", i.r_fd},
           {"episodes", i.episodes},
           {"wrong_isolations", i.wrong_isolations},
-          {"d_acc", i.d_acc},
-          {"final_set", set},
+          {"final_set", SetJson(Outcome(run))},
           {"live_s", LiveSeconds(run)}};
 }
 
-Json ModelsJson(const std::shared_ptr<const ModelSet>& models,
-                const std::vector<EvaluatedRun>& runs) {
-  Json json = SummaryJson(EngineDetector(models), runs);
-  json["content_hash"] = storage::HashHex(models->content_hash);
+Json ModelsJson(const ModelSet& models, const std::vector<EvaluatedRun>& runs) {
+  Json json = FiguresJson(runs);
+  json["model_set"] = models.name;
+  json["version"] = models.version;
+  json["content_hash"] = storage::HashHex(models.content_hash);
   return json;
 }
 
@@ -235,7 +229,7 @@ std::string SummaryTable(const Comparison& comparison, const Json& a,
   report::TextTable table({{"summary"},
                            {NameOf(*comparison.a), Align::kRight},
                            {NameOf(*comparison.b), Align::kRight}});
-  for (const Column& field : SummaryFields()) {
+  for (const Column& field : FigureFields()) {
     const auto text = [&field](const Json& summary) {
       return field.text ? field.text(summary) : summary.at(field.key).dump();
     };
@@ -250,25 +244,25 @@ std::string SummaryTable(const Comparison& comparison, const Json& a,
   };
   table.AddRow({"judged (LIVE) [h]", live_hours(comparison.runs_of_a),
                 live_hours(comparison.runs_of_b)});
-  return TextOf(table) + '\n';
+  return table.Text() + '\n';
 }
 
 }  // namespace
 
 Comparison Compare(const std::shared_ptr<const ModelSet>& a,
                    const std::shared_ptr<const ModelSet>& b,
-                   const std::vector<ScoredRun>& runs,
-                   const EvaluationSettings& settings) {
-  return {a, b, Evaluate(EngineDetector(a), runs, settings),
-          Evaluate(EngineDetector(b), runs, settings)};
+                   const std::vector<storage::StoredRun>& runs,
+                   bool assume_normal) {
+  return {a, b, Evaluate(a, runs, assume_normal),
+          Evaluate(b, runs, assume_normal)};
 }
 
 report::Report ComparisonReport(const Comparison& comparison, bool all) {
   const std::string a = NameOf(*comparison.a);
   const std::string b = NameOf(*comparison.b);
   report::Report report;
-  report.document["a"] = ModelsJson(comparison.a, comparison.runs_of_a);
-  report.document["b"] = ModelsJson(comparison.b, comparison.runs_of_b);
+  report.document["a"] = ModelsJson(*comparison.a, comparison.runs_of_a);
+  report.document["b"] = ModelsJson(*comparison.b, comparison.runs_of_b);
   Json& runs = report.document["runs"] = Json::array();
   for (std::size_t r = 0; r < comparison.runs_of_a.size(); ++r) {
     const EvaluatedRun& of_a = comparison.runs_of_a[r];

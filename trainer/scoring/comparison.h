@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "report/report.h"
-#include "trainer/scoring/detectors.h"
+#include "trainer/scoring/evaluate.h"
 
 namespace fdi::trainer {
 
@@ -20,8 +20,8 @@ struct Comparison {
 /// if they do not suit each other.
 Comparison Compare(const std::shared_ptr<const ModelSet>& a,
                    const std::shared_ptr<const ModelSet>& b,
-                   const std::vector<ScoredRun>& runs,
-                   const EvaluationSettings& settings);
+                   const std::vector<storage::StoredRun>& runs,
+                   bool assume_normal = false);
 
 /// Runs with what the sets differ in ("detected", "delay", "isolation", "final
 /// set", "wrong faults", "false alarms"), the figures of both sets, and figures

@@ -1,32 +1,11 @@
 #include "trainer/scoring/evaluated_run.h"
 
-#include <algorithm>
-#include <set>
 #include <string>
 
 #include "base/text.h"
 #include "diagnosis/model/fault_catalogue.h"
 
 namespace fdi::trainer {
-namespace {
-
-std::size_t IndexIn(const std::set<FaultGroup>& sorted,
-                    const FaultGroup& group) {
-  return static_cast<std::size_t>(
-      std::distance(sorted.begin(), sorted.find(group)));
-}
-
-}  // namespace
-
-FaultGroup GroupOf(int fault, const std::vector<FaultGroup>& groups) {
-  for (const FaultGroup& group : groups) {
-    if (std::find(group.begin(), group.end(), fault) != group.end()) {
-      return group;
-    }
-  }
-  return {fault};
-}
-
 std::string SetText(const std::vector<int>& set) {
   return JoinText(set, "|", FaultName);
 }
@@ -34,8 +13,9 @@ std::string SetText(const std::vector<int>& set) {
 std::string GroupsText(const ModelSet& models) {
   return models.groups.empty()
              ? "none"
-             : JoinText(models.groups, ", ",
-                        [](const FaultGroup& group) { return SetText(group); });
+             : JoinText(models.groups, ", ", [](const std::vector<int>& group) {
+                 return SetText(group);
+               });
 }
 
 std::string FaultsText(const std::vector<int>& faults) {
@@ -58,27 +38,8 @@ const std::vector<int>& Outcome(const EvaluatedRun& run) {
   return run.indices.fault != 0 ? run.indices.final_set : run.last_set;
 }
 
-double GroupAccuracy(const EvaluatedRun& run,
-                     const std::vector<FaultGroup>& groups) {
-  if (run.indices.fault == 0) {
-    return -1.0;
-  }
-  // A set of several faults of one group is one answer.
-  std::set<FaultGroup> named;
-  for (const int fault : run.indices.final_set) {
-    named.insert(GroupOf(fault, groups));
-  }
-  return named.contains(GroupOf(run.indices.fault, groups))
-             ? 1.0 / static_cast<double>(named.size())
-             : 0.0;
-}
-
-EvaluationFigures FiguresOf(const std::vector<EvaluatedRun>& runs,
-                            const std::vector<FaultGroup>& groups) {
+EvaluationFigures FiguresOf(const std::vector<EvaluatedRun>& runs) {
   EvaluationFigures figures;
-  std::vector<RunIndices> indices;
-  std::vector<double> durations;
-  double accuracy = 0.0;
   for (const EvaluatedRun& run : runs) {
     figures.wrong_isolations += run.indices.wrong_isolations;
     if (!run.has_truth) {
@@ -92,71 +53,19 @@ EvaluationFigures FiguresOf(const std::vector<EvaluatedRun>& runs,
       count.right += run.indices.d_acc > 0.0 ||
                      Contains(wording->look_alikes, run.indices.fault);
     }
-    indices.push_back(run.indices);
-    durations.push_back(run.duration_s);
-    // As Summarise() does by fault: only detected runs enter the mean.
-    const double d_acc = GroupAccuracy(run, groups);
-    figures.contained_group += d_acc > 0.0;
-    figures.exact_group += d_acc == 1.0;
-    accuracy += run.indices.detected ? d_acc : 0.0;
-  }
-  figures.summary = Summarise(indices, durations);
-  if (figures.summary.detected > 0) {
-    figures.mean_d_acc_group = accuracy / figures.summary.detected;
-  }
-  return figures;
-}
-
-std::vector<EvaluatedRun> RunsOf(const FaultGroup& group,
-                                 const std::vector<EvaluatedRun>& runs) {
-  std::vector<EvaluatedRun> chosen;
-  std::copy_if(runs.begin(), runs.end(), std::back_inserter(chosen),
-               [&](const EvaluatedRun& run) {
-                 return run.has_truth &&
-                        std::find(group.begin(), group.end(),
-                                  run.indices.fault) != group.end();
-               });
-  return chosen;
-}
-
-ConfusionMatrix BuildConfusion(const std::vector<EvaluatedRun>& runs,
-                               const std::vector<FaultGroup>& groups) {
-  // Every group that was true has a row and a column, every other group that
-  // was named a column. Of the last two columns the first counts runs that were
-  // detected without a fault being named, the second those without an alarm.
-  std::set<FaultGroup> rows;
-  std::set<FaultGroup> columns;
-  for (const EvaluatedRun& run : runs) {
-    if (run.has_truth) {
-      rows.insert(GroupOf(run.indices.fault, groups));
-      for (const int fault : Outcome(run)) {
-        columns.insert(GroupOf(fault, groups));
-      }
-      if (run.indices.fault != 0) {
-        columns.insert(GroupOf(run.indices.fault, groups));
-      }
-    }
-  }
-  ConfusionMatrix matrix;
-  matrix.rows.assign(rows.begin(), rows.end());
-  matrix.columns.assign(columns.begin(), columns.end());
-  matrix.counts.assign(rows.size(), std::vector<double>(columns.size() + 2));
-  for (const EvaluatedRun& run : runs) {
-    if (!run.has_truth) {
+    if (run.indices.fault == 0) {
+      ++figures.fault_free_runs;
+      figures.fault_free_hours += run.duration_s / 3600.0;
+      figures.fault_free_episodes += run.indices.episodes;
       continue;
     }
-    std::vector<double>& counts =
-        matrix.counts[IndexIn(rows, GroupOf(run.indices.fault, groups))];
-    const std::vector<int>& outcome = Outcome(run);
-    if (outcome.empty()) {
-      counts[columns.size() + (IsDetected(run) ? 0 : 1)] += 1.0;
-    }
-    for (const int fault : outcome) {
-      counts[IndexIn(columns, GroupOf(fault, groups))] +=
-          1.0 / static_cast<double>(outcome.size());
-    }
+    ++figures.faulty_runs;
+    figures.detected += run.indices.detected;
+    figures.contained += run.indices.d_acc > 0.0;
+    // d_acc is 1/n for a set of n faults, so the comparison with 1 is exact.
+    figures.exact += run.indices.d_acc == 1.0;
   }
-  return matrix;
+  return figures;
 }
 
 }  // namespace fdi::trainer

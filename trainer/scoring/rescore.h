@@ -10,14 +10,15 @@
 
 namespace fdi::trainer {
 
-/// What an episode is called on one sample.
+/// The name of an episode on one sample.
 struct NamedVerdict {
   const Verdict* verdict;  ///< Never null; as long as the engine's.
   Layer layer{Layer::kObservers};
   bool withdrawn{false};  ///< A name that was given before counts no more.
 };
 
-/// What is known of a valve outside of its engine (ValveEngine::Suspect).
+/// Knowledge about a valve that its engine does not have
+/// (ValveEngine::Suspect).
 struct OutsideKnowledge {
   /// Given each verdict of the engine after the sink.
   std::function<NamedVerdict(const Sample&, const Verdict&)> name{};

@@ -3,11 +3,9 @@
 #include <CLI/CLI.hpp>
 
 #include "base/error.h"
+#include "simulator/second_look/valve_physics.h"
 #include "storage/database/data_directory.h"
-#include "storage/runs/runs.h"
-#include "trainer/campaign/campaign_runs.h"
 #include "trainer/campaign/file_runs.h"
-#include "trainer/campaign/run_input.h"
 
 namespace fdi::trainer {
 
@@ -20,62 +18,34 @@ void RunSelection::AddTo(CLI::App& verb) {
       ->expected(1)
       ->take_all()
       ->type_name("FILE.csv[@from:to]");
-  verb.add_option("--campaign", campaign,
-                  "Its validation runs; simulates or imports what is missing")
-      ->type_name("FILE.toml");
-  verb.add_option("--seed-offset", seed_offset,
-                  "Added to the seeds of simulated validation runs")
-      ->check(CLI::Range(0, 1000000000))
-      ->type_name("N");
   table.AddTo(verb);
 }
 
 importer::CsvOptions RunSelection::ForFiles(
     SignalMask required, const report::Context& context) const {
+  if (table.given() && files.empty()) {
+    throw ConfigError("--map, --zone and --resample describe a --file");
+  }
   return {.map = table.Read(context.options.utc),
           .required = required,
           .log = context.log};
 }
 
-std::vector<ScoredRun> LoadScoredRuns(
-    const RunSelection& selection, SignalMask required,
-    const std::optional<simulator::FlowTarget>& flow,
-    const report::Context& context) {
-  if (selection.runs.empty() && selection.files.empty() &&
-      selection.campaign.empty()) {
-    throw ConfigError(
-        "what to score: --runs ID,..., --file FILE.csv or "
-        "--campaign FILE.toml");
+std::vector<storage::StoredRun> LoadSelected(const RunSelection& selection,
+                                             const ModelSet& models,
+                                             const report::Context& context,
+                                             SignalMask more) {
+  if (selection.runs.empty() && selection.files.empty()) {
+    throw ConfigError("what to score: --runs ID,... or --file FILE.csv");
   }
-  const importer::CsvOptions csv = selection.ForFiles(required, context);
-  if (flow) {
-    importer::CheckGasFlow(csv.map, simulator::MolarMass(flow->medium));
-  }
-  std::vector<ScoredRun> runs;
-  // The order is part of the contract: files of verdicts are given in it.
-  const auto add = [&](storage::StoredRun run, std::string name = "",
-                       double horizon_s = 0.0) {
-    ConvertFlow(run,
-                flow.value_or(simulator::FlowTarget{run.info.run.flow_unit}),
-                context.log);
-    name = name.empty() ? RunName(run) : std::move(name);
-    runs.push_back({std::move(run), std::move(name), horizon_s, runs.size()});
-  };
-  // Before the campaign stores runs of its own, one of which would be `last`.
-  std::vector<storage::StoredRun> given = LoadRunsAndFiles(
+  const importer::CsvOptions csv =
+      selection.ForFiles(RequiredSignals(models) | more, context);
+  const simulator::FlowTarget flow = simulator::FlowTargetOf(models);
+  importer::CheckGasFlow(csv.map, simulator::MolarMass(flow.medium));
+  std::vector<storage::StoredRun> runs = LoadRunsAndFiles(
       selection.runs, selection.files, {context.options.data_dir}, csv);
-  if (!selection.campaign.empty()) {
-    const std::vector<CampaignRun> validation =
-        ValidationRuns(selection.campaign, selection.seed_offset);
-    std::vector<storage::StoredRun> stored =
-        LoadCampaignRuns(validation, context);
-    for (std::size_t i = 0; i < validation.size(); ++i) {
-      add(std::move(stored[i]), RunLabel(validation[i]),
-          validation[i].horizon_s);
-    }
-  }
-  for (storage::StoredRun& run : given) {
-    add(std::move(run));
+  for (storage::StoredRun& run : runs) {
+    ConvertFlow(run, flow, context.log);
   }
   return runs;
 }

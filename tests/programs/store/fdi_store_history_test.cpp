@@ -7,7 +7,6 @@
 #include "base/time_text.h"
 #include "storage/database/locks.h"
 #include "storage/runs/run_recorder.h"
-#include "tests/html_check.h"
 #include "tests/programs/store/store_program_fixture.h"
 
 namespace fdi::storage {
@@ -449,32 +448,13 @@ TEST_F(FdiStoreHistoryTest, PlotIsAPictureOrAClearError) {
   EXPECT_THAT(Slurp(directory_.path() / "a.svg"), HasSubstr("isolated f7"));
 }
 
-TEST_F(FdiStoreHistoryTest, PageOfAnEpisodeHasStoryChecksAndBlanks) {
-  EXPECT_EQ(Store("history ack last --by '<b>anna' --comment '</table>&'").code,
-            0);
-  EXPECT_EQ(Store("history label last false --by jan").code, 0);
-  const std::string id = EpisodeIdText(Id());
-  ASSERT_EQ(Store("history report last --utc").code, 0);
-  const std::string html = Slurp(directory_.path() / (id + ".html"));
-  for (const char* part :
-       {"<title>LV-1: ", "Detected: the readings no longer agree", "Named ",
-        " (f7), strength 0.50", "<td class=\"number\">20 s</td>",
-        "&lt;b&gt;anna acknowledged it", "&lt;/table&gt;&amp;",
-        "jan labelled it: no fault", "What to check", "<ul class=\"checks\">",
-        "As found", "fdi-store history label ", "@page{size:A4;"}) {
-    EXPECT_THAT(html, HasSubstr(part));
-  }
-  EXPECT_THAT(MalformedTags(html), testing::IsEmpty());
-  const bool drawn = std::system("gnuplot --version >/dev/null 2>&1") == 0;
-  EXPECT_EQ(html.find("<svg") != std::string::npos, drawn);
-  // Without gnuplot the page says so.
-  EXPECT_EQ(Store("history report last -o -", "PATH=/nowhere").code, 0);
-  EXPECT_THAT(Slurp(directory_.path() / "out.txt"),
-              HasSubstr("gnuplot is not installed"));
-
-  EXPECT_EQ(Store("history report 77").code, 5);
-  EXPECT_EQ(Store("history report").code, 2);
-  EXPECT_EQ(Store("history report last -o no/such/page.html").code, 3);
+TEST_F(FdiStoreHistoryTest, RemovedPicturesAndPagesNameWhatReplacesThem) {
+  const Outcome page = Store("history report last");
+  EXPECT_EQ(page.code, 2);
+  EXPECT_THAT(page.err, HasSubstr("history show"));
+  const Outcome picture = Store("runs plot 1a2b");
+  EXPECT_EQ(picture.code, 2);
+  EXPECT_THAT(picture.err, HasSubstr("runs export"));
 }
 
 TEST_F(FdiStoreHistoryTest, DoctorFindsASoundDirectorySound) {

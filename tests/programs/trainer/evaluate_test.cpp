@@ -1,4 +1,4 @@
-// Runs the built program: indices, decision vectors, rules in words.
+// Runs the built program: stored runs and files scored, rules in words.
 #include <cmath>
 #include <cstdio>
 #include <limits>
@@ -12,6 +12,7 @@
 #include "storage/runs/run_recorder.h"
 #include "storage/runs/runs.h"
 #include "tests/programs/trainer/fixture.h"
+#include "trainer/scoring/evaluated_run.h"
 
 namespace fdi::trainer {
 namespace {
@@ -74,12 +75,10 @@ TEST_F(AppEvaluateTest, JsonHasTheKeysOfTheContractAndFindsTheFault) {
   for (const auto& [key, value] : run.items()) {
     keys.push_back(key);
   }
-  EXPECT_THAT(
-      keys, UnorderedElementsAre(
-                "run_id", "fault", "strength", "detected", "t_dt_first", "t_dt",
-                "t_it_first", "t_it", "r_fd", "r_td", "r_fi", "r_ti", "r_mi",
-                "fs_d", "fs_i", "d_acc", "final_set", "certainty", "t_exact",
-                "episodes", "wrong_isolations", "second_t", "second_set"));
+  EXPECT_THAT(keys, UnorderedElementsAre(
+                        "run_id", "fault", "strength", "detected", "t_dt",
+                        "t_it", "final_set", "certainty", "episodes",
+                        "wrong_isolations", "second_t", "second_set"));
   EXPECT_EQ(run["run_id"], id);
   EXPECT_EQ(run["fault"], "f19");
   EXPECT_EQ(run["strength"], 0.5);
@@ -95,87 +94,6 @@ TEST_F(AppEvaluateTest, JsonHasTheKeysOfTheContractAndFindsTheFault) {
   EXPECT_EQ(summary["fault_free_episodes"], 0);
   EXPECT_EQ(summary["answers"],
             json::parse(R"([{"certainty":"sure","answers":1,"right":1}])"));
-  EXPECT_EQ(summary["confusion"]["f19"]["f19"], 1.0);
-  EXPECT_EQ(summary["confusion"]["normal"]["no_alarm"], 1.0);
-}
-
-// What the live engine said, as `--vectors` writes it, from its own loop.
-std::string LineOf(const std::string& run, const Verdict& v) {
-  char text[600];
-  std::snprintf(
-      text, sizeof text,
-      "%s,%lld,%llu,%llu,%s,%d,%s,%s,%a,%a,%a,%a,%a,%a,%a,%a,%a,%a,%s,%a,%a",
-      run.c_str(), static_cast<long long>(v.stamp_ns),
-      static_cast<unsigned long long>(v.source_id),
-      static_cast<unsigned long long>(v.seq),
-      std::string(IntakeName(v.intake)).c_str(), v.initialised ? 1 : 0,
-      std::string(QualityName(v.quality)).c_str(),
-      std::string(StateName(v.state)).c_str(), v.residuals[0], v.residuals[1],
-      v.normal_factor, v.fault_factors[0], v.fault_factors[1],
-      v.fault_factors[2], v.fault_factors[3], v.fault_factors[4],
-      v.fault_factors[5], v.fault_factors[6], v.isolated != 0 ? "f19" : "",
-      v.observer_factors[0], v.observer_factors[1]);
-  return text;
-}
-
-// A live monitor meets repeats, gaps, bad readings, a swap of its model set and
-// an episode ended from outside; its recorder keeps what became of each sample.
-TEST_F(AppEvaluateTest, RescoringARecordedRunRepeatsTheLiveVectorsBitForBit) {
-  const auto models = std::make_shared<const ModelSet>(
-      storage::ModelStore(Path("data") / "models.db").Load("quick"));
-  const storage::StoredRun source = storage::RunStore(Runs()).Load(FaultyRun());
-  ValveEngine live(models);
-  storage::RunRecorder recorder(Runs());
-  storage::NewRun row = source.info.run;
-  row.origin = storage::RunOrigin::kRecorded;
-  const auto key = recorder.Begin(row);
-  const std::string id = recorder.Id(key);
-  std::vector<std::string> expected;
-  const auto receive = [&](Sample sample, bool swapped) {
-    if (swapped) {
-      live.Adopt(models);
-    }
-    const Verdict& verdict = live.Step(sample);
-    storage::StoredSample stored;
-    stored.sample = sample;
-    stored.intake = verdict.intake;
-    stored.initialised = verdict.initialised;
-    stored.model_swapped = swapped;
-    recorder.Append(key, stored);
-    expected.push_back(LineOf(id, verdict));
-  };
-  for (std::size_t k = 0; k < source.samples.size(); ++k) {
-    Sample sample = source.samples[k].sample;
-    if (k >= 300 && k < 305) {
-      continue;  // A gap.
-    }
-    if (k == 200) {
-      sample.Set(Signal::kX, std::numeric_limits<double>::quiet_NaN());
-    }
-    if (k == 700) {
-      live.EndEpisode(EndReason::kStreamEnded);
-    }
-    receive(sample, k == 400 || k == 800);
-    if (k == 100 || k == 650) {
-      receive(sample, false);                        // A repeat,
-      receive(source.samples[k - 3].sample, false);  // a late one.
-    }
-  }
-  recorder.Close();
-
-  const Outcome outcome =
-      Run("evaluate --model-set quick --runs " + id + " --vectors v.csv");
-
-  ASSERT_EQ(outcome.code, 0) << outcome.err;
-  std::vector<std::string> lines = Lines("v.csv");
-  ASSERT_EQ(lines.size(), expected.size() + 1);
-  EXPECT_EQ(lines[0],
-            "run,stamp_ns,source_id,seq,intake,initialised,quality,state,r_X,"
-            "r_F,d_0,d_f19,d_travel_deviation,d_shut_flow,d_excess_flow,"
-            "d_x_stuck,d_f_stuck,d_low_flow,isolated,o_normal,o_f19 0.50");
-  for (std::size_t k = 0; k < expected.size(); ++k) {
-    ASSERT_EQ(lines[k + 1], expected[k]) << "sample " << k;
-  }
 }
 
 TEST_F(AppEvaluateTest, RunWithoutTruthIsScoredButNotCounted) {
@@ -222,10 +140,6 @@ TEST_F(AppEvaluateTest, BadInputIsNamedWithItsExitCode) {
   EXPECT_EQ(Run("evaluate --model-set quick@9 --runs " + id).code, 5);
   EXPECT_THAT(Run("show other").err, HasSubstr("quick@1"));
   EXPECT_EQ(Run("show other").code, 5);
-  EXPECT_EQ(
-      Run("evaluate --model-set quick --vectors no/such/v.csv --runs " + id)
-          .code,
-      3);
 
   storage::StoredRun run = storage::RunStore(Runs()).Load(id);
   run.info.run.flow_unit = FlowUnit::kTPerHour;
@@ -248,9 +162,13 @@ TEST_F(AppEvaluateTest, RemovedVerbsAndOptionsNameWhatReplacesThem) {
   const std::vector<std::pair<std::string, std::string>> removed{
       {"evaluate --model-set quick --history plant --work-orders o.csv",
        "--history is gone: score each file with --file"},
-      {"evaluate --model-set quick --campaign c.toml --leave-one-out",
-       "fdi-study leave-one-out"},
-      {"evaluate --campaign c.toml --seeds=20", "fdi-study seeds"},
+      {"evaluate --model-set quick --campaign c.toml",
+       "fdi-study evaluate --campaign"},
+      {"evaluate --model-set quick --file f.csv --report r",
+       "fdi-study evaluate --report"},
+      {"compare quick@1 quick@1 --campaign c.toml", "fdi-study evaluate"},
+      {"evaluate --model-set quick --leave-one-out", "fdi-study leave-one-out"},
+      {"evaluate --model-set quick --seeds=20", "fdi-study seeds"},
       {"evaluate --verdicts v.csv --file f.csv", "fdi-study verdicts"},
       {"evaluate --baseline arx-cusum", "fdi-study baseline"},
       {"evaluate --model-set quick --without f1", "fdi-study reduce"},
@@ -277,6 +195,34 @@ TEST_F(AppEvaluateTest, ShowTellsWhereTheSetCameFromAndItsRulesInWords) {
   EXPECT_EQ(rule["data_share"], 1.0);
   EXPECT_EQ(rule["slopes"].size(),
             set["observers"][0]["channels"][1]["regressors"].size());
+}
+
+TEST(FiguresTest, RunsWithAFaultAndHealthyOnesAreSummedApart) {
+  EvaluatedRun right;
+  right.indices.fault = 6;
+  right.indices.detected = true;
+  right.indices.final_set = {6};
+  right.indices.d_acc = 1.0;
+  EvaluatedRun pair = right;
+  pair.indices.final_set = {3, 6};
+  pair.indices.d_acc = 0.5;
+  EvaluatedRun missed;
+  missed.indices.fault = 3;
+  missed.indices.d_acc = 0.0;
+  EvaluatedRun healthy;
+  healthy.indices.episodes = 2;
+  healthy.duration_s = 7200.0;
+  EvaluatedRun unknown = healthy;
+  unknown.has_truth = false;
+  const EvaluationFigures figures =
+      FiguresOf({right, pair, missed, healthy, unknown});
+  EXPECT_EQ(figures.faulty_runs, 3);
+  EXPECT_EQ(figures.detected, 2);
+  EXPECT_EQ(figures.contained, 2);
+  EXPECT_EQ(figures.exact, 1);
+  EXPECT_EQ(figures.fault_free_episodes, 2);
+  EXPECT_DOUBLE_EQ(figures.fault_free_hours, 2.0);
+  EXPECT_EQ(figures.without_truth, 1);
 }
 
 }  // namespace

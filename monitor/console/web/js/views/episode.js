@@ -191,9 +191,7 @@ class EpisodePage extends View {
             h('a', {'class': 'button', 'download': `${this.id}.csv`,
               'href': url(path('episodes', `${this.id}.csv`))},
             'Save as CSV'),
-            h('a', {'class': 'button', 'target': '_blank', 'rel': 'noopener',
-              'href': url(path('episodes', `${this.id}.html`))},
-            'Page to print')),
+            button('Print', () => window.print())),
         factList(facts(found)),
         found.growth.map(growthPart),
         this.#data.words ?

@@ -1,10 +1,10 @@
+#include "bench/study/wilson_interval.h"
+
 #include <stdexcept>
 
 #include <gtest/gtest.h>
 
-#include "trainer/statistics.h"
-
-namespace fdi::trainer {
+namespace fdi::trainer::study {
 namespace {
 
 // p = 81/263, the example of Newcombe (1998), Stat. Med. 17, p. 861.
@@ -28,4 +28,4 @@ TEST(WilsonIntervalTest, NoTrialsSayNothing) {
 }
 
 }  // namespace
-}  // namespace fdi::trainer
+}  // namespace fdi::trainer::study

@@ -1,4 +1,4 @@
-// Runs the built program: the report, files that are not stored.
+// Runs the built programs: all indices, groups, the page.
 #include <filesystem>
 #include <fstream>
 #include <stdexcept>
@@ -10,9 +10,9 @@
 #include "report/fault_texts.h"
 #include "storage/models/models.h"
 #include "storage/runs/runs.h"
-#include "tests/programs/trainer/fixture.h"
+#include "tests/study/fixture.h"
 
-namespace fdi::trainer {
+namespace fdi::trainer::study {
 namespace {
 
 using nlohmann::json;
@@ -22,7 +22,7 @@ using testing::Not;
 
 constexpr std::size_t kBytesPerRun = 100'000;
 
-class AppReportTest : public TrainerProgram {
+class StudyReportTest : public StudyProgram {
  protected:
   void SetUp() override {
     Write("c.toml", Quick() + TwoConditions());
@@ -84,72 +84,14 @@ class AppReportTest : public TrainerProgram {
   }
 };
 
-TEST_F(AppReportTest, FileIsScoredAsTheSameRunWouldBeOnceStored) {
-  WriteFile("f.csv", FaultySamples());
-  storage::NewRun row;
-  row.valve_id = "V";
-  const std::string id =
-      storage::RunStore(Runs(), storage::Access::kOccasionalWriter)
-          .Import(importer::ReadCsvFile(Path("f.csv")).runs, row)
-          .front();
-  const std::size_t stored = storage::RunStore(Runs()).List().size();
-
-  json result = RunJson("evaluate --model-set quick --runs " + id +
-                        " --file f.csv --file f.csv@:700");
-
-  json& runs = result["runs"];
-  ASSERT_EQ(runs.size(), 3U);
-  EXPECT_EQ(runs[1]["run_id"], "f.csv");
-  EXPECT_EQ(runs[2]["run_id"], "f.csv@:700");
-  EXPECT_EQ(runs[1]["final_set"], json::array({"f19"}));
-  runs[1]["run_id"] = runs[0]["run_id"];
-  EXPECT_EQ(runs[1], runs[0]);
-  EXPECT_EQ(runs[2]["t_dt"], runs[0]["t_dt"]);
-  EXPECT_EQ(storage::RunStore(Runs()).List().size(), stored);
-}
-
-TEST_F(AppReportTest, MapTellsWhereTheSignalsOfAFileStand) {
-  WriteFile("f.csv", FaultySamples());
-  std::string text = Read("f.csv");
-  text.replace(text.find("F_m3_h"), 6, "FLOW");
-  Write("foreign.csv", text);
-  Write("tags.toml", "[signal.F]\ncolumn = \"FLOW\"\nunit = \"m3/h\"\n");
-  const std::string call = "evaluate --model-set quick --file foreign.csv";
-
-  const Outcome refused = Run(call);
-  EXPECT_EQ(refused.code, 3);
-  EXPECT_THAT(refused.err,
-              AllOf(HasSubstr("foreign.csv"), HasSubstr("F_m3_h")));
-
-  json mapped = RunJson(call + " --map tags.toml");
-  json plain = RunJson("evaluate --model-set quick --file f.csv");
-  mapped["runs"][0].erase("run_id");
-  plain["runs"][0].erase("run_id");
-  EXPECT_EQ(mapped["runs"], plain["runs"]);
-}
-
-TEST_F(AppReportTest, BadFilesAreNamedWithTheirExitCode) {
-  WriteFile("f.csv", FaultySamples());
-  const auto outcome = [&](const std::string& arguments) {
-    return Run("evaluate --model-set quick " + arguments);
-  };
-  EXPECT_EQ(outcome("").code, 2);
-  EXPECT_EQ(outcome("--map m.toml --runs abcdef").code, 2);
-  EXPECT_EQ(outcome("--file no.csv").code, 5);
-  EXPECT_THAT(outcome("--file no.csv").err, HasSubstr("no.csv"));
-  EXPECT_EQ(outcome("--file f.csv@x:1").code, 2);
-  EXPECT_THAT(outcome("--file f.csv@x:1").err, HasSubstr("FILE@from:to"));
-  EXPECT_EQ(outcome("--file f.csv@5000:").code, 5);
-}
-
-TEST_F(AppReportTest, GroupsOfTheSetAreJudgedBesideFaults) {
+TEST_F(StudyReportTest, GroupsOfTheSetAreJudgedBesideFaults) {
   WriteFile("f.csv", FaultySamples());
   const std::string call = "evaluate --model-set quick --file f.csv";
-  EXPECT_EQ(RunJson(call)["summary"]["confusion_by_group"],
-            RunJson(call)["summary"]["confusion"]);
+  EXPECT_EQ(StudyJson(call)["summary"]["confusion_by_group"],
+            StudyJson(call)["summary"]["confusion"]);
   AddTwin();
 
-  const json summary = RunJson(call)["summary"];
+  const json summary = StudyJson(call)["summary"];
 
   EXPECT_EQ(summary["exact"], 0);
   EXPECT_EQ(summary["contained"], 1);
@@ -159,14 +101,14 @@ TEST_F(AppReportTest, GroupsOfTheSetAreJudgedBesideFaults) {
   EXPECT_EQ(summary["mean_d_acc_group"], 1.0);
   EXPECT_EQ(summary["confusion"]["f19"]["f1"], 0.5);
   EXPECT_EQ(summary["confusion_by_group"]["f1|f19"]["f1|f19"], 1.0);
-  EXPECT_THAT(Run(call).out, HasSubstr("truth \\ outcome by group  f1|f19"));
+  EXPECT_THAT(Study(call).out, HasSubstr("truth \\ outcome by group  f1|f19"));
 }
 
-TEST_F(AppReportTest, ReportStandsAloneAndShowsEveryRun) {
+TEST_F(StudyReportTest, ReportStandsAloneAndShowsEveryRun) {
   WriteFile("a&b.csv", FaultySamples());
   const Outcome outcome =
-      Run("evaluate --model-set quick --file 'a&b.csv' --runs " +
-          NormalRun().info.id + " --report out");
+      Study("evaluate --model-set quick --file 'a&b.csv' --runs " +
+            NormalRun().info.id + " --report out");
 
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   const std::string page = Read("out/index.html");
@@ -198,7 +140,7 @@ TEST_F(AppReportTest, ReportStandsAloneAndShowsEveryRun) {
 
 // All traces end at 899 of 900 s, whose x is 889.12. Those of a run whose first
 // samples are rejected ended earlier, beside the mark of the fault.
-TEST_F(AppReportTest, TracesBeginWhereTheRunDoes) {
+TEST_F(StudyReportTest, TracesBeginWhereTheRunDoes) {
   std::vector<LabelledSample> samples = FaultySamples();
   WriteFile("a.csv", samples);
   for (std::size_t k = 0; k < 200; ++k) {
@@ -206,8 +148,8 @@ TEST_F(AppReportTest, TracesBeginWhereTheRunDoes) {
   }
   WriteFile("b.csv", samples);
   const auto ends = [&](const std::string& name) {
-    EXPECT_EQ(Run("evaluate --model-set quick --file " + name +
-                  ".csv --report " + name)
+    EXPECT_EQ(Study("evaluate --model-set quick --file " + name +
+                    ".csv --report " + name)
                   .code,
               0);
     return Count(Read(name + "/index.html"), "889.12,");
@@ -216,35 +158,36 @@ TEST_F(AppReportTest, TracesBeginWhereTheRunDoes) {
   EXPECT_GE(ends("b"), 4U);
 }
 
-TEST_F(AppReportTest, DayLongRunStaysWithinItsBytes) {
+TEST_F(StudyReportTest, DayLongRunStaysWithinItsBytes) {
   WriteFile("long.csv", FaultySamples(96));  // 86400 samples
   ASSERT_EQ(
-      Run("evaluate --model-set quick --file long.csv --report long").code, 0);
+      Study("evaluate --model-set quick --file long.csv --report long").code,
+      0);
   WriteFile("f.csv", FaultySamples());
-  ASSERT_EQ(Run("evaluate --model-set quick --file f.csv --report short").code,
-            0);
+  ASSERT_EQ(
+      Study("evaluate --model-set quick --file f.csv --report short").code, 0);
   EXPECT_LT(Read("long/index.html").size(), kBytesPerRun);
   EXPECT_GT(Read("short/index.html").size(), 10'000U);
 }
 
-TEST_F(AppReportTest, FolderThatCannotBeMadeIsNamed) {
+TEST_F(StudyReportTest, FolderThatCannotBeMadeIsNamed) {
   WriteFile("f.csv", FaultySamples());
   const std::string call = "evaluate --model-set quick --file f.csv --report ";
-  const Outcome missing = Run(call + "no/such");
+  const Outcome missing = Study(call + "no/such");
   EXPECT_EQ(missing.code, 3);
   EXPECT_THAT(missing.err, HasSubstr(Path("no").string()));
   EXPECT_EQ(missing.out, "");
-  const Outcome file = Run(call + "f.csv");
+  const Outcome file = Study(call + "f.csv");
   EXPECT_EQ(file.code, 3);
   EXPECT_THAT(file.err, HasSubstr("f.csv"));
   if (geteuid() != 0) {  // Root may write anywhere.
     std::filesystem::create_directory(Path("closed"));
     std::filesystem::permissions(Path("closed"),
                                  std::filesystem::perms::owner_read);
-    EXPECT_EQ(Run(call + "closed").code, 3);
-    EXPECT_EQ(Run(call + "closed/inner").code, 3);
+    EXPECT_EQ(Study(call + "closed").code, 3);
+    EXPECT_EQ(Study(call + "closed/inner").code, 3);
   }
 }
 
 }  // namespace
-}  // namespace fdi::trainer
+}  // namespace fdi::trainer::study

@@ -1,4 +1,4 @@
-#include "trainer/scoring/report_page.h"
+#include "bench/study/report_page.h"
 
 #include <algorithm>
 #include <array>
@@ -7,17 +7,17 @@
 #include <set>
 #include <utility>
 
+#include "bench/study/evaluation_report.h"
 #include "diagnosis/model/fault_catalogue.h"
 #include "report/plot/figure.h"
 #include "report/plot/gnuplot.h"
 #include "report/report.h"
 #include "report/text_table.h"
 #include "storage/models/model_codec.h"
-#include "trainer/campaign/run_input.h"
 #include "trainer/rule_text.h"
 #include "trainer/scoring/evaluation_report.h"
 
-namespace fdi::trainer {
+namespace fdi::trainer::study {
 namespace {
 
 using report::FormatNumber;
@@ -78,19 +78,21 @@ Json FigureRows(const std::vector<FaultGroup>& groups,
     }
   }
   Json rows = Json::object();
-  const auto add = [&](const std::string& name, const EvaluationFigures& f) {
-    const EvaluationSummary& s = f.summary;
-    rows[name] = {{"runs", s.faulty_runs},
-                  {"detected", s.detected},
-                  {"contained", by_group ? f.contained_group : s.contained},
-                  {"exact", by_group ? f.exact_group : s.exact},
-                  {"mean_d_acc", by_group ? f.mean_d_acc_group : s.mean_d_acc},
+  const auto add = [&](const std::string& name,
+                       const std::vector<EvaluatedRun>& its) {
+    const EvaluationFigures f = FiguresOf(its);
+    const StudyFigures s = StudyFiguresOf(its, groups);
+    rows[name] = {{"runs", f.faulty_runs},
+                  {"detected", f.detected},
+                  {"contained", by_group ? s.contained_group : f.contained},
+                  {"exact", by_group ? s.exact_group : f.exact},
+                  {"mean_d_acc", by_group ? s.mean_d_acc_group : s.mean_d_acc},
                   {"max_r_fd", s.max_r_fd}};
   };
   for (const FaultGroup& group : truths) {
-    add(SetText(group), FiguresOf(RunsOf(group, runs), groups));
+    add(SetText(group), RunsOf(group, runs));
   }
-  add(kAll, FiguresOf(runs, groups));
+  add(kAll, runs);
   return rows;
 }
 
@@ -135,6 +137,19 @@ std::string RunTitle(const EvaluatedRun& run, const report::FaultTexts& texts) {
                              : ", final set " + WithName(set, texts));
 }
 
+// From the first to the last sample and one period more [s].
+double DurationOf(const storage::StoredRun& run) {
+  // A recorded run has its samples in the order of arrival.
+  const auto [first, last] = std::minmax_element(
+      run.samples.begin(), run.samples.end(),
+      [](const storage::StoredSample& a, const storage::StoredSample& b) {
+        return a.sample.stamp_ns < b.sample.stamp_ns;
+      });
+  return static_cast<double>(last->sample.stamp_ns - first->sample.stamp_ns) *
+             1e-9 +
+         run.info.run.period_s;
+}
+
 std::string BandKey() {
   std::string text = "Colours of the isolated set:";
   for (const BandColour& band : {kRight, kPartly, kWrong, kOpen}) {
@@ -148,7 +163,7 @@ std::string BandKey() {
 
 }  // namespace
 
-// What the engine said in the course of one run, on one time axis.
+// Collects the verdicts on one run and draws them on one time axis.
 class ReportPage::RunPicture {
  public:
   RunPicture(const ModelSet& models, double duration_s)
@@ -163,7 +178,8 @@ class ReportPage::RunPicture {
     if (OutOfOrder(verdict.intake)) {
       return;
     }
-    // That of the indications, of which rejected samples have one, too.
+    // Time counts from the first indication, as that of the indications does:
+    // rejected samples have one, too.
     first_stamp_ns_ = first_stamp_ns_.value_or(verdict.stamp_ns);
     if (verdict.intake != Intake::kAccepted) {
       return;
@@ -438,12 +454,12 @@ void ReportPage::Draw(const ScoredRun& run, const EvaluatedRun& result,
 }
 
 void ReportPage::Print(std::ostream& out, const Detector& detector,
-                       const std::vector<EvaluatedRun>& runs,
-                       const std::string& software,
+                       const Scores& scores, const std::string& software,
                        const std::string& command_line) const {
   const std::string set = models_.name + "@" + std::to_string(models_.version);
+  const std::vector<EvaluatedRun>& runs = scores.runs;
   report::Report page;
-  page.document = EvaluationReport(detector, runs).document;
+  page.document = EvaluationReport(detector, scores).document;
   Json& document = page.document;
   document["by_fault"] = FigureRows(models_.groups, runs, false);
   document["by_group"] = FigureRows(models_.groups, runs, true);
@@ -451,7 +467,7 @@ void ReportPage::Print(std::ostream& out, const Detector& detector,
   for (Json& run : document["runs"]) {
     run["picture"] = RunAnchor(number++);
   }
-  std::vector<report::Column> indices = WithNames(RunColumns(), texts_);
+  std::vector<report::Column> indices = WithNames(IndexColumns(), texts_);
   indices.front().picture = [](const Json& run) {
     return run["picture"].get<std::string>();
   };
@@ -489,4 +505,4 @@ void ReportPage::Print(std::ostream& out, const Detector& detector,
   page.PrintHtml(out, "Evaluation of " + set);
 }
 
-}  // namespace fdi::trainer
+}  // namespace fdi::trainer::study

@@ -5,11 +5,11 @@
 #include <string>
 #include <vector>
 
+#include "bench/study/study_detectors.h"
 #include "diagnosis/model/model_set.h"
 #include "report/fault_texts.h"
-#include "trainer/scoring/detectors.h"
 
-namespace fdi::trainer {
+namespace fdi::trainer::study {
 
 /// The page of `evaluate --report`: one HTML file that needs no script and no
 /// other file. Figures over all runs, by fault and by group; indices of every
@@ -38,8 +38,8 @@ class ReportPage {
   void Draw(const ScoredRun& run, const EvaluatedRun& result,
             const std::vector<Indication>& indications);
 
-  void Print(std::ostream& out, const Detector& detector,
-             const std::vector<EvaluatedRun>& runs, const std::string& software,
+  void Print(std::ostream& out, const Detector& detector, const Scores& scores,
+             const std::string& software,
              const std::string& command_line) const;
 
  private:
@@ -52,4 +52,4 @@ class ReportPage {
   std::vector<std::string> pictures_;              // The same.
 };
 
-}  // namespace fdi::trainer
+}  // namespace fdi::trainer::study

@@ -1,6 +1,4 @@
-#include "trainer/scoring/detectors.h"
-
-#include <vector>
+#include "trainer/scoring/evaluate.h"
 
 #include "base/parallel_for.h"
 #include "diagnosis/model/fault_catalogue.h"
@@ -14,8 +12,8 @@
 namespace fdi::trainer {
 namespace {
 
-// What the monitor calls the episodes of one run: the observers and, with
-// physics, looks that are taken at once.
+// Names the episodes of one run as the monitor does: by the observers and,
+// with physics, by looks that are taken at once.
 class RunNames {
  public:
   explicit RunNames(const std::shared_ptr<const ModelSet>& models)
@@ -69,35 +67,6 @@ class RunNames {
   std::optional<monitor::EpisodeName> name_;
 };
 
-Answer FollowEngine(const std::shared_ptr<const ModelSet>& models,
-                    const ScoredRun& scored, const VerdictSink& sink) {
-  QualityCount samples;
-  RunNames names(models);
-  const OutsideKnowledge outside{
-      [&names](const Sample& sample, const Verdict& verdict) {
-        return names.Step(sample, verdict);
-      },
-      [&names] { return names.suspects(); },
-      [&names] { return names.beside(); }, [&names] { names.BeginAnew(); }};
-  const auto watch = [&](const Sample& sample, const Verdict& verdict) {
-    if (CountsAsTime(verdict)) {
-      samples.Add(verdict.quality);
-    }
-    if (sink) {
-      sink(sample, verdict);
-    }
-  };
-  Answer answer;
-  answer.indications = Rescore(models, scored.run, watch, outside);
-  answer.seconds.emplace();
-  for (std::size_t q = 0; q < kQualityCount; ++q) {
-    (*answer.seconds)[q] =
-        models->sample_period_s *
-        static_cast<double>(samples[static_cast<Quality>(q)]);
-  }
-  return answer;
-}
-
 // The last second fault of the run, and its last name.
 void ScoreSecond(const std::vector<Indication>& all, EvaluatedRun& result) {
   bool before = false;
@@ -115,27 +84,43 @@ void ScoreSecond(const std::vector<Indication>& all, EvaluatedRun& result) {
 
 }  // namespace
 
-Detector EngineDetector(const std::shared_ptr<const ModelSet>& models) {
-  return {models->name,
-          models->version,
-          models->groups,
-          RequiredSignals(*models),
-          [models](const ScoredRun& run, const VerdictSink& sink) {
-            return FollowEngine(models, run, sink);
-          },
-          simulator::FlowTargetOf(*models)};
+Answer AnswerOf(const std::shared_ptr<const ModelSet>& models,
+                const storage::StoredRun& run, const VerdictSink& sink) {
+  QualityCount samples;
+  RunNames names(models);
+  const OutsideKnowledge outside{
+      [&names](const Sample& sample, const Verdict& verdict) {
+        return names.Step(sample, verdict);
+      },
+      [&names] { return names.suspects(); },
+      [&names] { return names.beside(); }, [&names] { names.BeginAnew(); }};
+  const auto watch = [&](const Sample& sample, const Verdict& verdict) {
+    if (CountsAsTime(verdict)) {
+      samples.Add(verdict.quality);
+    }
+    if (sink) {
+      sink(sample, verdict);
+    }
+  };
+  Answer answer;
+  answer.indications = Rescore(models, run, watch, outside);
+  answer.seconds.emplace();
+  for (std::size_t q = 0; q < kQualityCount; ++q) {
+    (*answer.seconds)[q] =
+        models->sample_period_s *
+        static_cast<double>(samples[static_cast<Quality>(q)]);
+  }
+  return answer;
 }
 
-EvaluatedRun Evaluate(const Detector& detector, const ScoredRun& run,
-                      const EvaluationSettings& settings) {
-  const Answer answer = detector.follow(
-      run, settings.watch ? settings.watch(run) : VerdictSink{});
+EvaluatedRun ScoreAnswer(const Answer& answer, const storage::StoredRun& run,
+                         bool assume_normal, double horizon_s) {
   EvaluatedRun result;
-  result.indices = ComputeIndices(answer.indications, run.horizon_s);
-  result.indices.run_id = run.name;
-  result.has_truth = settings.assume_normal || HasTruth(run.run);
-  result.duration_s = run.run.info.run.period_s *
-                      static_cast<double>(answer.indications.size());
+  result.indices = ComputeIndices(answer.indications, horizon_s);
+  result.indices.run_id = RunName(run);
+  result.has_truth = assume_normal || HasTruth(run);
+  result.duration_s =
+      run.info.run.period_s * static_cast<double>(answer.indications.size());
   result.seconds = answer.seconds;
   for (const Indication& indication : answer.indications) {
     if (!indication.isolated.empty() || indication.withdrawn) {
@@ -147,19 +132,21 @@ EvaluatedRun Evaluate(const Detector& detector, const ScoredRun& run,
     }
   }
   ScoreSecond(answer.indications, result);
-  if (settings.scored) {
-    settings.scored(run, result, answer.indications);
-  }
   return result;
 }
 
-std::vector<EvaluatedRun> Evaluate(const Detector& detector,
-                                   const std::vector<ScoredRun>& runs,
-                                   const EvaluationSettings& settings) {
+EvaluatedRun Evaluate(const std::shared_ptr<const ModelSet>& models,
+                      const storage::StoredRun& run, bool assume_normal) {
+  return ScoreAnswer(AnswerOf(models, run), run, assume_normal);
+}
+
+std::vector<EvaluatedRun> Evaluate(
+    const std::shared_ptr<const ModelSet>& models,
+    const std::vector<storage::StoredRun>& runs, bool assume_normal) {
   std::vector<EvaluatedRun> results(runs.size());
-  ParallelFor(static_cast<int>(runs.size()), settings.threads, [&](int i) {
+  ParallelFor(static_cast<int>(runs.size()), 0, [&](int i) {
     const auto r = static_cast<std::size_t>(i);
-    results[r] = Evaluate(detector, runs[r], settings);
+    results[r] = Evaluate(models, runs[r], assume_normal);
   });
   return results;
 }
