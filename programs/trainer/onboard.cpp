@@ -344,8 +344,9 @@ report::Report ReportOf(const Onboarding& onboarding,
                 (onboarding.transferred
                      ? "those of " + NameOf(*of_type) + ", the type's set"
                      : "simulated, since " + NameOf(*of_type) +
-                           ", the type's set, has other channels or was made "
-                           "for other commands, pressures or temperatures"));
+                           ", the type's set, is of another size, has other "
+                           "channels or was made for other commands, pressures "
+                           "or temperatures"));
   }
   if (onboarding.size != 1.0) {
     const simulator::Instrumentation& i =
@@ -507,9 +508,6 @@ report::Report OnboardValve(const OnboardOptions& options,
                             const report::Context& context) {
   if (options.valve.empty()) {
     throw ConfigError("onboard: --valve ID or --plant FILE is needed");
-  }
-  if (options.plant.dry_run || !options.plant.shard.empty()) {
-    throw ConfigError("--dry-run and --shard are of --plant");
   }
   if (!options.extend) {
     RequireStorable(NameOfSet(options), "--name");
@@ -675,8 +673,11 @@ void AddOnboardVerb(report::Program& program) {
   // fitted once, and no row gets a table of faults.
   for (const char* option :
        {"--valve", "--runs", "--type", "--signals", "--save-type", "--name",
-        "--gains", "--no-fit", "--no-coverage"}) {
+        "--gains", "--no-fit", "--no-coverage", "--threads"}) {
     verb.get_option("--plant")->excludes(verb.get_option(option));
+  }
+  for (const char* option : {"--dry-run", "--jobs", "--rows"}) {
+    verb.get_option(option)->needs("--plant");
   }
   // The set that is extended states these.
   for (const char* option :
@@ -684,6 +685,9 @@ void AddOnboardVerb(report::Program& program) {
         "--no-coverage", "--false-alarms-per-hour"}) {
     verb.get_option("--extend")->excludes(verb.get_option(option));
   }
+  program.AddRemoved("onboard", "--shard",
+                     "--rows GLOB takes a part of the table, and processes may "
+                     "work on one data directory at a time");
   program.AddExamples(
       {{"onboard",
         {{"A valve of the plant that has only ever been healthy",
