@@ -1,9 +1,8 @@
 #!/usr/bin/env bash
 # Onboards a plant from one table: TYPES valve types with PER_TYPE valves each,
 # and DATA_ONLY loops, SECONDS of each in one wide file. Measures the dry run of
-# 1000 rows, time and memory of the whole, a run that is killed and started
-# again, a second run, and two shards, whose model sets must be those of one
-# run.
+# 1000 rows, time and memory of the whole, a second run, and a run that is killed
+# and started again, whose model sets must be those of one run.
 #
 #     bench/plant_table.sh build/release/bin [TYPES [PER_TYPE [DATA_ONLY [SECONDS]]]]
 set -euo pipefail
@@ -131,12 +130,3 @@ measured 'after a kill' "$bin/fdi-trainer" --data killed onboard \
 tail -1 out.txt
 sets whole >whole.txt
 sets killed | diff whole.txt - && echo 'killed and started again: the same sets'
-
-for part in 1 2; do
-  measured "shard $part/2" "$bin/fdi-trainer" --data "part-$part" onboard \
-    --plant plant.toml --shard "$part/2"
-done
-for part in 1 2; do
-  "$bin/fdi-store" --data joined models import "part-$part"
-done
-sets joined | diff whole.txt - && echo 'two shards: the same sets'

@@ -2,7 +2,7 @@
 # A valve that is onboarded at five operating points: 20 min of our own
 # simulator at each of CV 35, 42, 50, 58 and 66 %, moved by 1.5 %. Scored are
 # healthy runs of 40 min between and beyond them and four faults at 74 %, before
-# and after `onboard --extend` with 20 healthy minutes at 74 %.
+# and after `relearn --models` with 20 healthy minutes at 74 %.
 #
 #     bench/plateaus.sh build/release/bin [SEED]
 set -euo pipefail
@@ -51,5 +51,5 @@ done
 simulate more.csv 74 1200
 run fdi-trainer onboard --valve V "${taught[@]}"
 score "as onboarded"
-run fdi-trainer onboard --valve V --extend --file more.csv
+run fdi-trainer relearn V --models --activate --file more.csv
 score "extended"

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # The line with GNU parallel of docs/plant.md on a small table, as it stands
-# there; the parts have to come together to what one run makes.
+# there; the parts have to make together what one run makes.
 #
 #     tests/plant_parallel.sh build/release/bin
 set -euo pipefail
@@ -32,12 +32,9 @@ line=$(grep -E '^ +parallel fdi-trainer ' "$root/docs/plant.md")
 # The page has a TOML table.
 eval "${line/plant.toml/plant.csv}" >parallel.txt
 fdi-trainer --data whole onboard --plant plant.csv >/dev/null
-for part in 1 2 3 4; do
-  fdi-store --data joined models import "part-$part" >/dev/null
-done
 watched() {
-  fdi-store --data "$1" valves list --json | grep -vE '_utc|_ns' | sort
+  fdi-store "$@" valves list --json | grep -vE '_utc|_ns' | sort
 }
-watched whole >whole.txt
+watched --data whole >whole.txt
 grep -q FIC5 whole.txt
-watched joined | diff whole.txt -
+watched | diff whole.txt -

@@ -217,17 +217,17 @@ struct ModelImportOptions {
   bool activate{false};
 };
 
-// The data directory of one --shard of a plant: valves, sets, types, loops.
-Report ImportShard(const std::string& folder, ModelStore& store) {
-  const DataDirectory shard{folder};
-  if (!std::filesystem::exists(shard.models())) {
+// What another data directory has of a plant: valves, sets, types, loops.
+Report ImportPlant(const std::string& folder, ModelStore& store) {
+  const DataDirectory part{folder};
+  if (!std::filesystem::exists(part.models())) {
     throw NotFoundError(folder +
                         " has no models.db; expected the --data "
-                        "directory of fdi-trainer onboard --shard, or a file "
+                        "directory of fdi-trainer onboard --plant, or a file "
                         "of fdi-store models export");
   }
-  ModelStore other(shard.models());
-  if (std::filesystem::equivalent(shard.models(), store.database().path())) {
+  ModelStore other(part.models());
+  if (std::filesystem::equivalent(part.models(), store.database().path())) {
     throw ConfigError(folder + " is the data directory itself");
   }
   Report report;
@@ -243,7 +243,7 @@ Report ImportModel(const ModelImportOptions& options, const Context& context) {
   }
   ModelStore store = WritableModels(context);
   if (std::filesystem::is_directory(options.file)) {
-    return ImportShard(options.file, store);
+    return ImportPlant(options.file, store);
   }
   const ModelSet models =
       store.ImportFile(options.file, options.activate ? Activation::kAlways
@@ -335,12 +335,11 @@ void AddModelsVerbs(report::Program& program) {
   auto [importing, imported] =
       AddVerb(program, group, "import",
               "Store a file as the next version of its model set, or all that "
-              "one --shard of a plant has made",
+              "another data directory has of a plant",
               ImportModel);
   importing
       .add_option("file", imported.file,
-                  "File written by export, or the data directory of a "
-                  "shard")
+                  "File written by export, or a data directory")
       ->required();
   importing.add_flag("--activate", imported.activate,
                      "Make it the active version of its name");

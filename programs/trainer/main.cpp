@@ -13,7 +13,7 @@ int main(int argc, char** argv) {
   fdi::trainer::AddCompareVerb(program);
   fdi::trainer::AddShowVerb(program);
   fdi::trainer::AddOnboardVerb(program);
-  fdi::trainer::AddLimitsVerb(program);
+  fdi::trainer::AddRelearnVerb(program);
   fdi::trainer::AddCoverageVerb(program);
   program.AddRemoved("", "inject",
                      "it is fdi-study inject, which the source tree builds "

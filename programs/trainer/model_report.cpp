@@ -8,6 +8,7 @@
 #include "diagnosis/model/fault_catalogue.h"
 #include "storage/models/model_codec.h"
 #include "storage/models/models.h"
+#include "trainer/campaign/campaign_runs.h"
 #include "trainer/rule_text.h"
 #include "trainer/scoring/evaluated_run.h"
 #include "trainer/statistics.h"
@@ -181,6 +182,15 @@ void AddModelTables(const ModelSet& models, report::Report& report) {
   report.Line("\n" + AlarmRateText(models) +
               "\nnot told apart: " + GroupsText(models) +
               "\nundetectable: " + FaultsText(models.undetectable));
+}
+
+Progress Reporting(report::Progress& bar, const report::StopSignals& signals) {
+  return [&](double share, std::string_view stage) {
+    if (signals.stop_requested()) {
+      throw Interrupted("interrupted: nothing was stored");
+    }
+    bar.Update(share, std::string(stage));
+  };
 }
 
 std::string AlarmRateText(const ModelSet& models) {

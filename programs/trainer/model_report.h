@@ -4,13 +4,19 @@
 #include <vector>
 
 #include "diagnosis/model/model_set.h"
+#include "report/progress.h"
 #include "report/report.h"
+#include "report/stop_signals.h"
+#include "trainer/training.h"
 
 namespace fdi::trainer {
 
 /// @throws ConfigError naming the option unless a model set or a type can be
 ///   stored under `name`: before the work, not after it.
 void RequireStorable(const std::string& name, const std::string& option);
+
+/// Moves the bar, and ends the work by Interrupted where the user asked for it.
+Progress Reporting(report::Progress& bar, const report::StopSignals& signals);
 
 /// What is known about false alarms: the rate that the limits are set for, the
 /// hours that were seen, and what these alone bound.

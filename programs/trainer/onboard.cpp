@@ -29,7 +29,6 @@
 #include "trainer/campaign/file_runs.h"
 #include "trainer/campaign/run_input.h"
 #include "trainer/fleet/valve_types.h"
-#include "trainer/learning/extension.h"
 #include "trainer/learning/labelled_episodes.h"
 #include "trainer/onboarding/onboarding.h"
 #include "trainer/onboarding/record_checks.h"
@@ -68,8 +67,6 @@ struct OnboardOptions : TypeOptions {
   importer::TableOptions table;
   std::string save_type;
   bool gains{false};
-  bool extend{false};
-  bool accept{false};
   PlantVerbOptions plant;
 };
 
@@ -161,43 +158,6 @@ Json OnboardingJson(const Onboarding& onboarding,
     json["coverage"] = CoverageJson(*onboarding.coverage);
   }
   return json;
-}
-
-// What the set that is extended saw of the faults, and what the new one sees.
-Json ExtendsJson(const ModelSet& before, const Onboarding& onboarding) {
-  Json faults = Json::array();
-  for (const CoverageChange& change : *onboarding.changes) {
-    const auto strength = [&](const std::optional<double>& smallest) {
-      return smallest ? Json(change.negative ? -*smallest : *smallest) : Json();
-    };
-    faults.push_back({{"fault", FaultName(change.fault)},
-                      {"before", strength(change.before)},
-                      {"after", strength(change.after)}});
-  }
-  return {{"model_set", before.name},
-          {"version", before.version},
-          {"content_hash", storage::HashHex(before.content_hash)},
-          {"hours", before.threshold_hours},
-          {"faults", std::move(faults)}};
-}
-
-// Hours that a person vouches for are learnt, but not what they would hide
-// without that being said.
-void RequireAccepted(const Onboarding& onboarding) {
-  std::vector<std::string> lost;
-  for (const CoverageChange& change : *onboarding.changes) {
-    if (change.lost()) {
-      lost.push_back(FaultName(change.fault) + (change.negative ? " (-)" : ""));
-    }
-  }
-  if (!lost.empty()) {
-    throw DataError(
-        "with these hours, faults that the present set detects would not be "
-        "detected at any strength: " +
-        JoinText(lost) +
-        ". Nothing was stored; --accept stores it all the same, if the valve "
-        "was healthy");
-  }
 }
 
 // That show the errors of a valve of any size: 3 from 1 t/h on, more below.
@@ -344,8 +304,9 @@ report::Report ReportOf(const Onboarding& onboarding,
                 (onboarding.transferred
                      ? "those of " + NameOf(*of_type) + ", the type's set"
                      : "simulated, since " + NameOf(*of_type) +
-                           ", the type's set, has other channels or was made "
-                           "for other commands, pressures or temperatures"));
+                           ", the type's set, is of another size, has other "
+                           "channels or was made for other commands, pressures "
+                           "or temperatures"));
   }
   if (onboarding.size != 1.0) {
     const simulator::Instrumentation& i =
@@ -387,11 +348,8 @@ report::Report ReportOf(const Onboarding& onboarding,
 
 // Runs in several flow units are converted to that of the first, by the type's
 // medium.
-//
-// @param unit of the flow; none: that of the first run.
 std::vector<TrainingRun> LoadRuns(const OnboardOptions& options,
                                   const ValveType& type,
-                                  std::optional<FlowUnit> unit,
                                   const report::Context& context) {
   if (options.runs.empty() && options.files.empty()) {
     throw ConfigError("healthy data are needed: --runs ID,... or --file CSV");
@@ -409,10 +367,9 @@ std::vector<TrainingRun> LoadRuns(const OnboardOptions& options,
       options.runs, options.files, {context.options.data_dir}, csv);
   std::vector<TrainingRun> runs;
   for (storage::StoredRun& run : stored) {
-    ConvertFlow(run,
-                simulator::FlowTarget{
-                    unit.value_or(stored.front().info.run.flow_unit), medium},
-                context.log);
+    ConvertFlow(
+        run, simulator::FlowTarget{stored.front().info.run.flow_unit, medium},
+        context.log);
     runs.push_back(ToTrainingRun(run, true));
     run.samples = {};
     if (!options.signals.empty()) {
@@ -426,16 +383,6 @@ std::vector<TrainingRun> LoadRuns(const OnboardOptions& options,
 
 // Ctrl-C is answered within a second, whatever step the work is at.
 constexpr std::chrono::milliseconds kOnboardPatience{800};
-
-// Moves the bar, and ends the work where the user asked for it.
-Progress Reporting(report::Progress& bar, const report::StopSignals& signals) {
-  return [&](double share, std::string_view stage) {
-    if (signals.stop_requested()) {
-      throw Interrupted("interrupted: nothing was stored");
-    }
-    bar.Update(share, std::string(stage));
-  };
-}
 
 Onboarding OnboardOrSayWhyNot(const std::vector<TrainingRun>& runs,
                               const OnboardingOptions& settings,
@@ -461,45 +408,11 @@ std::string NameOfSet(const OnboardOptions& options) {
 OnboardingJob NewJob(const OnboardOptions& options, storage::ModelStore& store,
                      const report::Context& context) {
   const FoundType found = FindType(options.type, &store);
-  OnboardingJob job{LoadRuns(options, found.type, std::nullopt, context),
-                    options.onboarding};
+  OnboardingJob job{LoadRuns(options, found.type, context), options.onboarding};
   job.settings.name = NameOfSet(options);
   job.settings.type = found.type;
   job.settings.fit = job.settings.fit && !found.stored;
   job.settings.of_type = SetOf(found, store);
-  return job;
-}
-
-// The former record and the new hours, all as the valve measures it; the fit
-// starts where the former one ended.
-OnboardingJob ExtensionJob(const OnboardOptions& options,
-                           storage::ModelStore& store,
-                           const report::Context& context) {
-  OnboardOptions more = options;
-  const FormerRecord former = ReadFormerRecord(
-      options.valve, store, {context.options.data_dir}, more.files);
-  OnboardOptions before = options;
-  before.runs = former.runs;
-  before.files = former.files;
-  for (OnboardOptions* part : {&before, &more}) {
-    if (part->files.empty()) {
-      part->table = {};
-    }
-  }
-  const FlowUnit unit = former.models->flow_unit;
-  OnboardingJob job{LoadRuns(before, former.type, unit, context),
-                    options.onboarding};
-  job.settings.former_runs = job.runs.size();
-  for (TrainingRun& run : LoadRuns(more, former.type, unit, context)) {
-    job.runs.push_back(std::move(run));
-  }
-  for (TrainingRun& run : job.runs) {
-    run = WithSignals(std::move(run), former.signals);
-  }
-  job.settings.name = former.models->name;
-  job.settings.type = former.type;
-  job.settings.extends = former.models;
-  job.settings.false_alarms_per_hour = former.models->false_alarms_per_hour;
   return job;
 }
 
@@ -508,12 +421,7 @@ report::Report OnboardValve(const OnboardOptions& options,
   if (options.valve.empty()) {
     throw ConfigError("onboard: --valve ID or --plant FILE is needed");
   }
-  if (options.plant.dry_run || !options.plant.shard.empty()) {
-    throw ConfigError("--dry-run and --shard are of --plant");
-  }
-  if (!options.extend) {
-    RequireStorable(NameOfSet(options), "--name");
-  }
+  RequireStorable(NameOfSet(options), "--name");
   if (!options.save_type.empty()) {
     RequireStorable(options.save_type, "--save-type");
   }
@@ -521,8 +429,7 @@ report::Report OnboardValve(const OnboardOptions& options,
   storage::EnsureExists(directory);
   storage::ModelStore store(directory.models(),
                             storage::Access::kOccasionalWriter);
-  auto [runs, settings] = options.extend ? ExtensionJob(options, store, context)
-                                         : NewJob(options, store, context);
+  auto [runs, settings] = NewJob(options, store, context);
   settings.software = context.software;
   settings.created_ns = NowNs();
   report::StopSignals signals;
@@ -539,9 +446,6 @@ report::Report OnboardValve(const OnboardOptions& options,
             .gains;
   }
   bar.Finish();
-  if (settings.extends && !options.accept) {
-    RequireAccepted(onboarding);
-  }
   signals.EndWithin(std::chrono::milliseconds(0));
   onboarding.models =
       *store.Store(ResultOf(options.valve, onboarding, options.save_type));
@@ -557,14 +461,6 @@ report::Report OnboardValve(const OnboardOptions& options,
       "valve " + options.valve + ": " + FormatNumber(onboarding.hours, 2) +
           " h of healthy data, onboarded in " +
           std::to_string(std::lround(seconds.count())) + " s");
-  if (settings.extends) {
-    report.document["extends"] = ExtendsJson(*settings.extends, onboarding);
-    report.Line("extends " + NameOf(*settings.extends) +
-                "; faults whose smallest detected strength differs:");
-    report.Table("extends/faults", {{"fault", "fault"},
-                                    {"detected from", "before"},
-                                    {"now from", "after"}});
-  }
   return report;
 }
 
@@ -641,15 +537,6 @@ void AddOptions(CLI::App& verb, OnboardOptions& options) {
                 "Take the parameters of the type as they are");
   verb.add_flag("!--no-coverage", options.onboarding.assess,
                 "Leave out the table of faults that can be detected");
-  verb.add_flag("--extend", options.extend,
-                "Train the models of the valve again, from their former record "
-                "and from these healthy hours")
-      ->configurable(false);
-  verb.add_flag("--accept", options.accept,
-                "Of --extend: store the models even if a fault is not detected "
-                "any more")
-      ->configurable(false)
-      ->needs("--extend");
   verb.add_flag("--gains", options.gains,
                 "Compute what each missing transmitter would add; takes the "
                 "time of an onboarding for each");
@@ -675,23 +562,21 @@ void AddOnboardVerb(report::Program& program) {
   // fitted once, and no row gets a table of faults.
   for (const char* option :
        {"--valve", "--runs", "--type", "--signals", "--save-type", "--name",
-        "--gains", "--no-fit", "--no-coverage"}) {
+        "--gains", "--no-fit", "--no-coverage", "--threads"}) {
     verb.get_option("--plant")->excludes(verb.get_option(option));
   }
-  // The set that is extended states these.
-  for (const char* option :
-       {"--plant", "--type", "--signals", "--save-type", "--name", "--no-fit",
-        "--no-coverage", "--false-alarms-per-hour"}) {
-    verb.get_option("--extend")->excludes(verb.get_option(option));
+  for (const char* option : {"--dry-run", "--jobs", "--rows"}) {
+    verb.get_option(option)->needs("--plant");
   }
+  program.AddRemoved("onboard", "--shard",
+                     "--rows GLOB takes a part of the table, and processes may "
+                     "work on one data directory at a time");
   program.AddExamples(
       {{"onboard",
         {{"A valve of the plant that has only ever been healthy",
           "fdi-trainer onboard --valve FV-101 --runs 1a2b,3c4d"},
          {"From a CSV file, with what it would gain by more transmitters",
           "fdi-trainer onboard --valve FV-101 --file fv101.csv --gains"},
-         {"With a day on which the valve was healthy and an alarm came",
-          "fdi-trainer onboard --valve FV-101 --extend --file day.csv"},
          {"All loops of a plant: what the table matches, then the work",
           "fdi-trainer onboard --plant plant.toml --dry-run"},
          {"The work; after an interruption the same command goes on",

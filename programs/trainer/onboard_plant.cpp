@@ -2,17 +2,16 @@
 #include "programs/trainer/onboard_plant.h"
 
 #include <algorithm>
-#include <charconv>
 #include <map>
 #include <memory>
 #include <set>
-#include <tuple>
 #include <utility>
 
 #include <CLI/CLI.hpp>
 
 #include "base/error.h"
 #include "base/time_text.h"
+#include "diagnosis/records/valve_glob.h"
 #include "import/plant_table.h"
 #include "report/progress.h"
 #include "report/stop_signals.h"
@@ -30,27 +29,6 @@ using storage::LoopState;
 
 // What a dry run reads of each file: the form, the words, the ranges.
 constexpr std::size_t kDryRunLines = 600;
-
-// "2/8": part 2 of 8.
-std::pair<int, int> ParseShard(const std::string& text) {
-  if (text.empty()) {
-    return {1, 1};
-  }
-  int part = 0;
-  int parts = 0;
-  const char* end = text.data() + text.size();
-  const auto [slash, first] = std::from_chars(text.data(), end, part);
-  if (first == std::errc() && slash != end && *slash == '/') {
-    const auto [last, second] = std::from_chars(slash + 1, end, parts);
-    if (second == std::errc() && last == end && part >= 1 && part <= parts &&
-        parts <= 10'000) {
-      return {part, parts};
-    }
-  }
-  throw ConfigError("--shard '" + text +
-                    "': accepted is I/N with I in 1..N and N at most 10000, "
-                    "such as 3/8");
-}
 
 std::vector<std::filesystem::path> FilesOf(
     const importer::PlantTable& table, const std::vector<std::string>& given,
@@ -200,18 +178,15 @@ report::Report ReportOf(const importer::PlantTable& table,
   report::Report report;
   Json rows = Json::array();
   for (std::size_t i = 0; i < jobs.size(); ++i) {
-    if (outcomes[i].in_shard) {
-      rows.push_back(RowJson(jobs[i], outcomes[i], options.dry_run));
-    }
+    rows.push_back(RowJson(jobs[i], outcomes[i], options.dry_run));
   }
-  report.document = {
-      {"plant", table.source},
-      {"shard", options.shard.empty() ? Json() : Json(options.shard)},
-      {"dry_run", options.dry_run},
-      {"counts", CountsJson(rows)},
-      {"rows", std::move(rows)},
-      {"unused_tags",
-       options.dry_run ? UnusedTags(jobs, files) : Json::array()}};
+  report.document = {{"plant", table.source},
+                     {"dry_run", options.dry_run},
+                     {"counts", CountsJson(rows)},
+                     {"rows", std::move(rows)},
+                     {"unused_tags", options.dry_run && options.rows == "*"
+                                         ? UnusedTags(jobs, files)
+                                         : Json::array()}};
   std::vector<report::Column> columns = {
       {"loop", "loop"},
       {"group", "group", report::Format::kPlain, 0, 3},
@@ -224,7 +199,7 @@ report::Report ReportOf(const importer::PlantTable& table,
     columns.push_back({"model set", "model_set", report::Format::kPlain, 0, 2});
   }
   columns.push_back({"finding", "finding"});
-  report.Table("rows", std::move(columns), "no row is of this shard");
+  report.Table("rows", std::move(columns));
   report.Line("").Line(CountsText(report.document["counts"], options.dry_run));
   if (!report.document["unused_tags"].empty()) {
     report.Line("").Table("unused_tags", {{"file", "file"}, FirstTags()});
@@ -246,10 +221,15 @@ void PlantVerbOptions::AddTo(CLI::App& verb) {
   verb.add_flag("--dry-run", dry_run,
                 "With --plant: list matched, unmatched and ambiguous tags and "
                 "what is wrong with a row; store nothing");
-  verb.add_option("--shard", shard,
-                  "With --plant: part I of N, for the jobs of a scheduler; "
-                  "fdi-store models import brings the parts together")
-      ->type_name("I/N");
+  verb.add_option("--jobs", jobs,
+                  "With --plant: rows at a time (default: one per core)")
+      ->check(CLI::Range(1, 1024))
+      ->type_name("N");
+  verb.add_option(
+          "--rows", rows,
+          "With --plant: rows with matching names only, for the jobs of "
+          "a scheduler")
+      ->type_name("GLOB");
 }
 
 report::Report OnboardFromTable(const PlantVerbOptions& options,
@@ -257,27 +237,35 @@ report::Report OnboardFromTable(const PlantVerbOptions& options,
                                 const importer::TableOptions& form,
                                 const OnboardingOptions& onboarding,
                                 const report::Context& context) {
-  const importer::PlantTable table = importer::ReadPlantTable(options.plant);
+  importer::PlantTable table = importer::ReadPlantTable(options.plant);
+  std::erase_if(table.rows, [&](const importer::PlantRow& row) {
+    return !GlobMatches(options.rows, row.name);
+  });
+  if (table.rows.empty()) {
+    throw ConfigError("--rows " + options.rows + ": no row of " + table.source +
+                      " has a name like that");
+  }
   const auto folder = options.plant.parent_path();
   PlantSettings settings;
   settings.folder = folder;
-  std::tie(settings.shard, settings.shards) = ParseShard(options.shard);
+  settings.jobs = options.jobs;
   settings.onboarding = onboarding;
   settings.onboarding.software = context.software;
   settings.onboarding.created_ns = NowNs();
   settings.utc = context.options.utc;
-  PlantFiles shelf(FormOf(form, table, folder, context.options.utc),
-                   options.dry_run ? kDryRunLines : 0);
+  PlantFiles plant_files(FormOf(form, table, folder, context.options.utc),
+                         options.dry_run ? kDryRunLines : 0);
   const std::vector<PlantJob> jobs =
-      MatchRows(table, FilesOf(table, files, folder), folder, shelf);
+      MatchRows(table, FilesOf(table, files, folder), folder, plant_files);
   const storage::DataDirectory directory{context.options.data_dir};
   if (options.dry_run) {
     const std::unique_ptr<storage::ModelStore> store =
         std::filesystem::exists(directory.models())
             ? std::make_unique<storage::ModelStore>(directory.models())
             : nullptr;
-    return ReportOf(table, jobs, CheckPlant(jobs, shelf, store.get(), settings),
-                    shelf, options);
+    return ReportOf(table, jobs,
+                    CheckPlant(jobs, plant_files, store.get(), settings),
+                    plant_files, options);
   }
   storage::EnsureExists(directory);
   storage::ModelStore store(directory.models(),
@@ -287,12 +275,12 @@ report::Report OnboardFromTable(const PlantVerbOptions& options,
   report::Progress bar("onboard");
   try {
     const auto outcomes =
-        OnboardPlant(jobs, shelf, store, settings,
+        OnboardPlant(jobs, plant_files, store, settings,
                      [&bar](double share, const std::string& row) {
                        bar.Update(share, row);
                      });
     bar.Finish();
-    return ReportOf(table, jobs, outcomes, shelf, options);
+    return ReportOf(table, jobs, outcomes, plant_files, options);
   } catch (const Interrupted&) {
     throw Interrupted(
         "interrupted: finished rows are stored; the same command goes on with "

@@ -18,7 +18,8 @@ namespace fdi::trainer {
 /// Options of `onboard --plant`.
 struct PlantVerbOptions {
   std::filesystem::path plant;
-  std::string shard;
+  int jobs{0};            ///< Rows at a time; 0: one per core.
+  std::string rows{"*"};  ///< Glob of names.
   bool dry_run{false};
 
   void AddTo(CLI::App& verb);

@@ -11,8 +11,8 @@ void AddTrainVerb(report::Program& program);
 void AddEvaluateVerb(report::Program& program);
 void AddCompareVerb(report::Program& program);
 void AddShowVerb(report::Program& program);
-void AddLimitsVerb(report::Program& program);
 void AddOnboardVerb(report::Program& program);
+void AddRelearnVerb(report::Program& program);
 void AddCoverageVerb(report::Program& program);
 
 }  // namespace fdi::trainer

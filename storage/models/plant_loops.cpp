@@ -52,7 +52,7 @@ std::optional<ModelSet> ModelStore::Store(const ValveResult& result) {
       result.loop && AssignedModelSet(result.loop->name).has_value();
   Transaction transaction(database_);
   if (result.models) {
-    saved = Insert(*result.models, Activation::kAlways, {});
+    saved = Insert(*result.models, Activation::kAlways, result.lineage);
     if (result.type) {
       StoreType(result.type(*saved));
     }

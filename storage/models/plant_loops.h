@@ -52,6 +52,7 @@ struct ValveResult {
   /// Makes the type to store from the set as it was saved.
   std::function<ValveType(const ModelSet&)> type;
   std::optional<PlantLoop> loop;
+  Lineage lineage{};  ///< Of `models`.
 };
 
 }  // namespace fdi::storage

@@ -1,4 +1,4 @@
-// A row's result is stored whole or not at all, and shards come together.
+// A row's result is stored whole or not at all, and parts come together.
 #include "storage/models/plant_loops.h"
 
 #include <gmock/gmock.h>
@@ -69,7 +69,7 @@ TEST_F(PlantLoopsTest, ALoopWithASetStaysWatchedForFaults) {
   EXPECT_EQ(store_.AssignedModelSet("FV-1"), (ModelReference{"FV-1", 1}));
 }
 
-TEST_F(PlantLoopsTest, ShardsComeTogetherOnce) {
+TEST_F(PlantLoopsTest, PartsComeTogetherOnce) {
   ModelStore part(directory_.path() / "part.db", Access::kOccasionalWriter);
   part.Store(Result("FV-1", 1));
   part.Store(Result("FV-2", 2));

@@ -54,7 +54,7 @@ expect 'fault of the episode' \
 episode=$(history 'select episode_id from fault_history')
 "$bin/fdi-store" history label "$episode" f1 --by kim >/dev/null
 
-"$bin/fdi-trainer" train --from-labels --strength "$episode=0.5" --json \
+"$bin/fdi-trainer" relearn "*" --strength "$episode=0.5" --json \
   >trained.json 2>train.log || fail "training fails"
 expect 'lineage' "$(json trained.json '$.lineage.episodes' \
   "select value ->> 'episode_id', value ->> 'labelled_by', value ->> 'fault'
@@ -77,7 +77,6 @@ expect 'judgement' "$(json compared.json '$.measures' \
   "select value ->> 'judgement' from j
    where value ->> 'measure' = 'final set'")" 'valve@2 is better (p = 0.0313)'
 
-"$bin/fdi-store" models activate valve@2 >/dev/null
 start
 publish 78
 stop

@@ -1,121 +1,67 @@
 #include "trainer/fleet/plant_files.h"
 
-#include <algorithm>
 #include <exception>
 #include <utility>
 
 #include "base/error.h"
 #include "trainer/campaign/file_runs.h"
 
-// `mutex_` guards the map, and `loading` of each file what was read of it, so
-// that files are read at the same time. Entries are never erased, and
-// references to them stay valid. A thread takes `loading` under `mutex_`, never
-// the other way round: Open() and TagsOf() let go of the file before they make
-// room.
 namespace fdi::trainer {
 namespace {
 
-// Of tables in memory [byte]: one large file, or many small ones.
-constexpr std::size_t kMaxShelved = std::size_t{512} << 20U;
+// Enough for one large export, or for many small ones [byte].
+constexpr std::size_t kMaxKept = std::size_t{512} << 20U;
 
 }  // namespace
 
-PlantFiles::Shelved& PlantFiles::At(const std::filesystem::path& path) {
-  const MutexLock lock(mutex_);
-  Shelved& shelved = files_[path];
-  shelved.used = ++clock_;
-  return shelved;
-}
-
 // A file that could not be read is not tried again for the next row.
-void PlantFiles::Load(const std::filesystem::path& path, Shelved& shelved) {
-  if (!shelved.error.empty()) {
-    throw DataError(shelved.error);
+std::shared_ptr<const importer::ColumnIndex> PlantFiles::Read(
+    const std::filesystem::path& path, File& file) {
+  if (!file.error.empty()) {
+    throw DataError(file.error);
   }
-  try {
-    shelved.index =
-        std::make_shared<importer::ColumnIndex>(path, form_, max_lines_);
-  } catch (const std::exception& error) {
-    shelved.error = error.what();
-    throw DataError(shelved.error);
+  if (file.index) {
+    return file.index;
   }
-  if (!shelved.tags) {
-    shelved.tags = std::make_unique<importer::TagNames>(shelved.index->tags());
-  }
-}
-
-std::shared_ptr<const importer::ColumnIndex> PlantFiles::Open(
-    const std::filesystem::path& path) {
-  Shelved& shelved = At(path);
   std::shared_ptr<const importer::ColumnIndex> index;
-  bool loaded = false;
-  {
-    const MutexLock lock(shelved.loading);
-    if (!shelved.index) {
-      Load(path, shelved);
-      loaded = true;
-    }
-    index = shelved.index;
+  try {
+    index = std::make_shared<importer::ColumnIndex>(path, form_, max_lines_);
+  } catch (const std::exception& error) {
+    file.error = error.what();
+    throw DataError(file.error);
   }
-  if (loaded) {
-    MakeRoom();
+  if (!file.tags) {
+    file.tags = std::make_unique<importer::TagNames>(index->tags());
+  }
+  if (kept_bytes_ + index->bytes() <= kMaxKept) {
+    kept_bytes_ += index->bytes();
+    file.index = index;
   }
   return index;
 }
 
-const importer::TagNames& PlantFiles::TagsOf(
+std::shared_ptr<const importer::ColumnIndex> PlantFiles::Open(
     const std::filesystem::path& path) {
-  Shelved& shelved = At(path);
-  const importer::TagNames* tags = nullptr;  // Once there, they stay.
-  bool loaded = false;
-  {
-    const MutexLock lock(shelved.loading);
-    if (!shelved.tags) {
-      Load(path, shelved);
-      loaded = true;
-    }
-    tags = shelved.tags.get();
-  }
-  if (loaded) {
-    MakeRoom();
-  }
-  return *tags;
+  const MutexLock lock(mutex_);
+  return Read(path, files_[path]);
 }
 
-// Lets go of the tables that were not used for longest. A table in use lives on
-// with its user; one that is being loaded is passed over.
-void PlantFiles::MakeRoom() {
+const importer::TagNames& PlantFiles::TagsOf(
+    const std::filesystem::path& path) {
   const MutexLock lock(mutex_);
-  std::vector<Shelved*> kept;
-  std::size_t bytes = 0;
-  for (auto& [path, shelved] : files_) {
-    if (shelved.loading.try_lock()) {
-      const MutexLock loading(shelved.loading, std::adopt_lock);
-      if (shelved.index) {
-        bytes += shelved.index->bytes();
-        kept.push_back(&shelved);
-      }
-    }
+  File& file = files_[path];
+  if (!file.tags) {
+    Read(path, file);
   }
-  std::ranges::sort(kept, {}, &Shelved::used);
-  for (std::size_t i = 0; i + 1 < kept.size() && bytes > kMaxShelved; ++i) {
-    if (kept[i]->loading.try_lock()) {
-      const MutexLock loading(kept[i]->loading, std::adopt_lock);
-      if (kept[i]->index) {
-        bytes -= kept[i]->index->bytes();
-        kept[i]->index.reset();
-      }
-    }
-  }
+  return *file.tags;
 }
 
 std::map<std::string, std::vector<std::string>> PlantFiles::AllTags() const {
   const MutexLock lock(mutex_);
   std::map<std::string, std::vector<std::string>> tags;
-  for (const auto& [path, shelved] : files_) {
-    const MutexLock loading(shelved.loading);
-    if (shelved.tags) {
-      tags[path.string()] = shelved.tags->all();
+  for (const auto& [path, file] : files_) {
+    if (file.tags) {
+      tags[path.string()] = file.tags->all();
     }
   }
   return tags;
@@ -140,12 +86,13 @@ std::vector<std::filesystem::path> FilesOf(
 
 // A file in which op is not found is of other loops, unless it is the only one.
 void MatchRow(PlantJob& job, const std::vector<std::filesystem::path>& files,
-              PlantFiles& shelf) {
+              PlantFiles& plant_files) {
   std::string refused;
   for (const std::filesystem::path& path : files) {
     importer::TagMatch match;
     try {
-      match = importer::MatchTags(job.row, shelf.TagsOf(path), path.string());
+      match =
+          importer::MatchTags(job.row, plant_files.TagsOf(path), path.string());
     } catch (const DataError& error) {
       refused = error.what();
       continue;
@@ -176,7 +123,7 @@ void MatchRow(PlantJob& job, const std::vector<std::filesystem::path>& files,
 std::vector<PlantJob> MatchRows(const importer::PlantTable& table,
                                 const std::vector<std::filesystem::path>& files,
                                 const std::filesystem::path& folder,
-                                PlantFiles& shelf) {
+                                PlantFiles& plant_files) {
   std::vector<PlantJob> jobs;
   for (const importer::PlantRow& row : table.rows) {
     PlantJob& job = jobs.emplace_back();
@@ -186,7 +133,7 @@ std::vector<PlantJob> MatchRows(const importer::PlantTable& table,
       continue;
     }
     try {
-      MatchRow(job, FilesOf(row, files, folder), shelf);
+      MatchRow(job, FilesOf(row, files, folder), plant_files);
     } catch (const ConfigError& error) {
       job.error = error.what();
     }

@@ -12,8 +12,8 @@
 
 namespace fdi::trainer {
 
-/// The files of a plant, each read once for all loops as long as they fit into
-/// the memory set aside for them. Thread safe.
+/// The files of a plant. Tables stay in memory for the rows to come until they
+/// take 512 MB; a file beyond that is read again for each row. Thread safe.
 class PlantFiles {
  public:
   /// @param form as the user states it. @param max_lines of each file; 0: all.
@@ -25,27 +25,24 @@ class PlantFiles {
       const std::filesystem::path& path);
   /// Its tags. @throws likewise.
   const importer::TagNames& TagsOf(const std::filesystem::path& path);
-  /// The tags of all files that TagsOf() was asked for, by file.
+  /// The tags of all files that were read, by file.
   std::map<std::string, std::vector<std::string>> AllTags() const;
 
  private:
-  struct Shelved {
-    mutable Mutex loading;
-    std::shared_ptr<const importer::ColumnIndex> index GUARDED_BY(loading);
-    std::unique_ptr<importer::TagNames> tags GUARDED_BY(loading);
-    std::string error GUARDED_BY(loading);  // DataError's; empty: none.
-    std::uint64_t used{0};
+  struct File {
+    std::shared_ptr<const importer::ColumnIndex> index;  // Null: not kept.
+    std::unique_ptr<importer::TagNames> tags;
+    std::string error;  // Why it cannot be read; empty: it can.
   };
-  Shelved& At(const std::filesystem::path& path);
-  void Load(const std::filesystem::path& path, Shelved& shelved)
-      REQUIRES(shelved.loading);
-  void MakeRoom();
+  std::shared_ptr<const importer::ColumnIndex> Read(
+      const std::filesystem::path& path, File& file) REQUIRES(mutex_);
 
   importer::ColumnMap form_;
   std::size_t max_lines_;
   mutable Mutex mutex_;
-  std::map<std::filesystem::path, Shelved> files_ GUARDED_BY(mutex_);
-  std::uint64_t clock_ GUARDED_BY(mutex_){0};
+  // Entries are never erased, and references to their tags stay valid.
+  std::map<std::filesystem::path, File> files_ GUARDED_BY(mutex_);
+  std::size_t kept_bytes_ GUARDED_BY(mutex_){0};
 };
 
 /// Where the record of a row is: a file and its columns.
@@ -69,6 +66,6 @@ struct PlantJob {
 std::vector<PlantJob> MatchRows(const importer::PlantTable& table,
                                 const std::vector<std::filesystem::path>& files,
                                 const std::filesystem::path& folder,
-                                PlantFiles& shelf);
+                                PlantFiles& plant_files);
 
 }  // namespace fdi::trainer

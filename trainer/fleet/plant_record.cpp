@@ -210,7 +210,7 @@ std::string Verdict(const loop::Audit& audit) {
 
 // The plant's own words of the mode are replaced in the text, so that whatever
 // reads it need only know AUTO and MANUAL.
-std::vector<RowText> TextsOf(const PlantJob& job, PlantFiles& shelf) {
+std::vector<RowText> TextsOf(const PlantJob& job, PlantFiles& files) {
   std::map<std::string, std::string> words;
   for (const std::string& word : job.row.auto_words) {
     words.emplace(word, "AUTO");
@@ -220,7 +220,7 @@ std::vector<RowText> TextsOf(const PlantJob& job, PlantFiles& shelf) {
   }
   std::vector<RowText> texts;
   for (const RowSource& source : job.sources) {
-    const auto index = shelf.Open(source.path);
+    const auto index = files.Open(source.path);
     std::vector<std::string> columns;
     for (const std::string& column : source.match.columns) {
       if (!column.empty()) {
@@ -240,11 +240,11 @@ bool WantsModels(const PlantJob& job) {
 }
 
 std::uint64_t InputHash(const PlantJob& job, const std::vector<RowText>& texts,
-                        const std::string& kind) {
+                        const std::string& basis) {
   // 1: the number of this form of input, and of the method behind it. With a
   // higher one every row of every plant is done again. Each part ends with a
   // line end, so that text which moves from one cell to the next is a change.
-  std::string input = "1\n" + kind + '\n' + job.row.service + '\n' +
+  std::string input = "1\n" + basis + '\n' + job.row.service + '\n' +
                       job.row.from + '\n' + job.row.to + '\n' +
                       (job.row.sense == Sense::kOpening ? "opening" : "") +
                       '\n' + Listed(job.row.auto_words) + '\n' +

@@ -14,16 +14,16 @@ struct RowText {
   std::string text;
   importer::ColumnMap form;
 };
-std::vector<RowText> TextsOf(const PlantJob& job, PlantFiles& shelf);
+std::vector<RowText> TextsOf(const PlantJob& job, PlantFiles& files);
 
 /// Whether the row asks for named faults and has what they take: a type and x.
 bool WantsModels(const PlantJob& job);
 
-/// Identity of a row's input: what the row says about reading and judging its
-/// record, and the record itself. Grade and group are not part of it.
-/// @param kind of the valve, as text; empty: data only.
+/// Fingerprint of a row's input: what the row says about reading and judging
+/// its record, and the record itself. Grade and group are not part of it.
+/// @param basis of its models beside the record, as text; empty: data only.
 std::uint64_t InputHash(const PlantJob& job, const std::vector<RowText>& texts,
-                        const std::string& kind);
+                        const std::string& basis);
 
 /// The healthy record of a valve.
 /// @param utc messages show times in UTC.

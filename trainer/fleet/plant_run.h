@@ -14,8 +14,7 @@ namespace fdi::trainer {
 
 struct PlantSettings {
   std::filesystem::path folder;  ///< That files and types of rows start from.
-  int shard{1};                  ///< 1..shards
-  int shards{1};
+  int jobs{0};                   ///< Rows at a time; 0: one per core.
   bool utc{false};               ///< Messages show times in UTC.
   OnboardingOptions onboarding;  ///< Of every row, but for name and type.
   std::function<bool()> stop{};  ///< Asked often; any thread.
@@ -24,31 +23,22 @@ struct PlantSettings {
 /// What became of a row.
 struct PlantOutcome {
   storage::PlantLoop loop;
-  bool in_shard{true};      ///< False: it is another shard's, and was not read.
   bool unchanged{false};    ///< As it was stored before.
   std::string model_set{};  ///< NAME@VERSION; empty: none was made now.
-  std::string made{};  ///< "first of its type", "from its type", "on its own"
   double seconds{0.0};
 };
 
 /// Told how much is done, 0..1, and what was done last. One thread at a time.
 using PlantProgress = std::function<void(double, const std::string&)>;
 
-/// Onboards the loops of a plant with all cores. The result of each row is
-/// stored in one transaction, so that a run that was stopped at any time is
-/// taken up by the next. Rows whose input has not changed since they were
-/// stored are left as they are.
+/// Onboards the rows of a plant's table one by one, each as
+/// `onboard --valve` does; a row without a type or without x gets a verdict of
+/// the audit. The result of each row is stored in one transaction, so that the
+/// next run goes on where one was stopped. A row whose fingerprint,
+/// InputHash(), is the one that it was stored with is left as it is.
 ///
-/// A row with a type and x gets a model set. Of the rows with the same type,
-/// signals and units the first in the table that can be onboarded is, in full,
-/// and its fitted physics become a stored type; the others take its fault
-/// observers over (TransferDifferenceSet) where they are like it, and are
-/// onboarded in full where not. Every other row gets a verdict of the audit.
-///
-/// Shards divide the rows by type, or one by one where there are fewer types
-/// than shards. A shard makes the first set of a type itself where it needs it,
-/// so that the sets are those of one run, bit for bit.
-///
+/// @returns an outcome for each job. A row that cannot be used has the state
+///   kRefused and says why; the others go on.
 /// @throws Interrupted once settings.stop() is true; what was stored stays.
 /// @throws SqliteError, DataError if the store fails.
 std::vector<PlantOutcome> OnboardPlant(const std::vector<PlantJob>& jobs,

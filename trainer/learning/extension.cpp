@@ -9,7 +9,7 @@
 #include "base/error.h"
 #include "simulator/second_look/valve_physics.h"
 #include "storage/runs/runs.h"
-#include "trainer/learning/limits_plan.h"
+#include "trainer/learning/label_plan.h"
 
 namespace fdi::trainer {
 namespace {
@@ -72,31 +72,38 @@ bool IsRun(const std::string& run, const storage::DataDirectory& directory) {
 
 }  // namespace
 
-FormerRecord ReadFormerRecord(const std::string& valve,
-                              storage::ModelStore& store,
+FormerRecord ReadFormerRecord(const std::string& valve, const LabelPlan& labels,
                               const storage::DataDirectory& directory,
                               std::vector<std::string>& files) {
+  storage::ModelStore store(directory.models());
+  const ModelSet& models = *labels.parent;
   FormerRecord record;
-  record.models = OnboardedSet(valve, store);
   const auto entry = store.FindValve(valve);
-  record.type = TypeOf(*record.models, entry ? entry->type : valve);
+  record.type = TypeOf(models, entry ? entry->type : valve);
   record.signals = entry ? entry->signals : kBasicSignals;
-  for (const std::string& run : FirstSet(*record.models, store).training_runs) {
+  const auto is_evidence = [&](const std::string& run) {
+    return std::ranges::find(labels.lineage.episodes, run,
+                             &storage::TrainingEpisode::run) !=
+           labels.lineage.episodes.end();
+  };
+  for (const std::string& run : FirstSet(models, store).training_runs) {
+    if (is_evidence(run)) {
+      continue;
+    }
     if (IsRun(run, directory)) {
       record.runs.push_back(run);
     } else if (const auto file = FindFile(run, files)) {
       record.files.push_back(*file);
     } else {
       throw NotFoundError(
-          "the record " + run + " that model set " + NameOf(*record.models) +
+          "the record " + run + " that model set " + NameOf(models) +
           " was made from is gone: give its file with --file, or onboard the "
           "valve anew with all that is there");
     }
   }
-  const storage::Lineage lineage =
-      store.LineageOf({record.models->name, record.models->version});
-  for (const storage::TrainingEpisode& episode : lineage.episodes) {
-    if (episode.label == "false" && IsRun(episode.run, directory)) {
+  for (const storage::TrainingEpisode& episode : labels.lineage.episodes) {
+    if (episode.fault == 0 &&
+        std::ranges::find(labels.runs, episode.run) != labels.runs.end()) {
       record.runs.push_back(episode.run);
     }
   }

@@ -1,12 +1,11 @@
 #pragma once
 
-#include <memory>
 #include <string>
 #include <vector>
 
 #include "diagnosis/model/model_set.h"
 #include "storage/database/data_directory.h"
-#include "storage/models/models.h"
+#include "trainer/learning/label_plan.h"
 #include "trainer/onboarding/fault_synthesis.h"
 
 namespace fdi::trainer {
@@ -14,26 +13,23 @@ namespace fdi::trainer {
 /// What the set of a valve was onboarded from: with healthy hours beside it, it
 /// is made anew.
 struct FormerRecord {
-  std::shared_ptr<const ModelSet> models;  ///< Assigned to the valve now.
-  ValveType type;                 ///< As it was fitted: where the fit starts.
-  SignalMask signals{0};          ///< That the valve measures.
-  std::vector<std::string> runs;  ///< Of runs.db, ID[@from:to]; with those that
-                                  ///< hold episodes labelled false.
+  ValveType type;         ///< As it was fitted: where the fit starts.
+  SignalMask signals{0};  ///< That the valve measures.
+  /// Of runs.db, ID[@from:to]; with those that hold episodes labelled false.
+  std::vector<std::string> runs;
   std::vector<std::string> files;  ///< FILE[@from:to]
 };
 
-/// A file that is not where it was is taken out of `files`, those that the user
-/// names, by its name without folders.
+/// Runs that limits were set by are not among them: of these, the time around
+/// episodes is not known to be healthy. Neither is what labels taught of
+/// faults.
 ///
-/// Runs that `fdi-trainer limits` read are not among them: of these, the time
-/// around episodes is not known to be healthy.
-///
-/// @throws NotFoundError if the valve has no set, or a run or file of it is
-///   gone, naming it.
-/// @throws DataError if the set was not made by onboarding, has no physics, or
-///   is of an earlier epoch of the valve.
-FormerRecord ReadFormerRecord(const std::string& valve,
-                              storage::ModelStore& store,
+/// @param labels with the set of the valve as the parent.
+/// @param files those that the user names. One of them that the set was made
+///   from, by its name without folders, is taken out.
+/// @throws NotFoundError if a run or file of the set is gone, naming it.
+/// @throws DataError if the set has no physics.
+FormerRecord ReadFormerRecord(const std::string& valve, const LabelPlan& labels,
                               const storage::DataDirectory& directory,
                               std::vector<std::string>& files);
 

@@ -1,6 +1,7 @@
 #include "trainer/learning/label_plan.h"
 
 #include <algorithm>
+#include <limits>
 #include <set>
 
 #include <nlohmann/json.hpp>
@@ -8,6 +9,8 @@
 #include "base/error.h"
 #include "base/text.h"
 #include "diagnosis/model/fault_catalogue.h"
+#include "diagnosis/records/valve_glob.h"
+#include "storage/history/history_reader.h"
 #include "storage/models/models.h"
 #include "storage/runs/runs.h"
 #include "trainer/campaign/campaign_fields.h"
@@ -24,6 +27,8 @@ namespace {
 using storage::TrainingEpisode;
 using Json = nlohmann::ordered_json;
 
+constexpr std::int64_t kEndOfTime = std::numeric_limits<std::int64_t>::max();
+
 // The settings that the set was trained with: those of its preset, overridden
 // by what the set holds and, since versions that store them, by its lineage. Of
 // a set of onboarding only the options of the data set are used.
@@ -36,7 +41,7 @@ TrainingOptions SettingsOf(const ModelSet& models,
     throw DataError("model set " + NameOf(models) + " is of preset '" +
                     models.preset +
                     "': only sets of fdi-trainer train (paper, extended) and "
-                    "of fdi-trainer onboard can learn from labels");
+                    "of fdi-trainer onboard can be relearnt");
   }
   options.name = models.name;
   options.decision = models.decision;
@@ -55,18 +60,76 @@ TrainingOptions SettingsOf(const ModelSet& models,
   return options;
 }
 
-// The labelled episodes of the request; each given strength is of one of them.
-std::vector<storage::Episode> FindLabelled(storage::HistoryReader& history,
-                                           const LabelRequest& request) {
-  std::vector<storage::Episode> episodes = history.List(request.filter);
-  std::erase_if(episodes,
-                [](const storage::Episode& e) { return !e.label.has_value(); });
-  if (episodes.empty()) {
-    throw NotFoundError("no labelled episode of valve " +
-                        request.filter.valve_glob +
-                        " in that time: see fdi-store history label");
+std::string NameOfSet(const storage::Episode& episode) {
+  return storage::ParseModelReference(episode.model_set).name;
+}
+
+// The set that is assigned to the valve, or else the active version of the one
+// that diagnosed the labelled episodes.
+ModelSet ParentOf(const std::string& valve,
+                  const std::vector<storage::Episode>& episodes,
+                  storage::ModelStore& store) {
+  if (const auto assigned = store.AssignedModelSet(valve)) {
+    return store.Load(*assigned);
   }
-  for (const auto& [id, strength] : request.strengths) {
+  std::set<std::string> names;
+  for (const storage::Episode& episode : episodes) {
+    if (episode.label) {
+      names.insert(NameOfSet(episode));
+    }
+  }
+  if (names.empty()) {
+    throw NotFoundError("valve " + valve +
+                        " has neither a model set nor a labelled episode: see "
+                        "fdi-trainer onboard and fdi-store history label");
+  }
+  if (names.size() > 1) {
+    throw ConfigError("the labelled episodes are of several model sets (" +
+                      JoinText(names) +
+                      "): choose the one to build on with fdi-store valves "
+                      "assign");
+  }
+  return store.Load(*names.begin());
+}
+
+void RequireSameEpoch(const std::string& valve, const ModelSet& models,
+                      storage::ModelStore& store) {
+  const auto entry = store.FindValve(valve);
+  if (entry && entry->baseline() == storage::BaselineState::kProvisional) {
+    throw DataError("valve " + valve + " was changed since model set " +
+                    NameOf(models) + " was made: onboard it anew");
+  }
+}
+
+std::vector<storage::Episode> EpisodesOf(
+    const std::string& glob, std::optional<storage::HistoryReader>& history) {
+  storage::EpisodeFilter filter;
+  filter.valve_glob = glob;
+  return history ? history->List(filter) : std::vector<storage::Episode>();
+}
+
+// The episodes whose labels count. What has tuned limits since the observers
+// were made is only asked for from then on.
+std::vector<storage::Episode> LabelledOf(const RelearnRequest& request,
+                                         const LabelPlan& plan) {
+  std::vector<storage::Episode> labelled;
+  for (const storage::Episode& episode : plan.episodes) {
+    const bool healthy = episode.label == "false" && IsOnboarded(*plan.parent);
+    if (episode.label &&
+        episode.detected_ns >=
+            (healthy ? plan.since_ns
+                     : request.from_ns.value_or(episode.detected_ns)) &&
+        episode.detected_ns < request.to_ns.value_or(kEndOfTime)) {
+      labelled.push_back(episode);
+    }
+  }
+  return labelled;
+}
+
+// Each given strength is of one episode.
+void CheckStrengths(const GivenStrengths& strengths,
+                    const std::vector<storage::Episode>& episodes) {
+  for (const auto& [id, strength] : strengths) {
     const auto matches =
         std::count_if(episodes.begin(), episodes.end(),
                       [&id = id](const storage::Episode& episode) {
@@ -78,65 +141,6 @@ std::vector<storage::Episode> FindLabelled(storage::HistoryReader& history,
                                         : std::to_string(matches) +
                                               " labelled episodes begin") +
                           " like that");
-    }
-  }
-  return episodes;
-}
-
-std::string NameOfSet(const storage::Episode& episode) {
-  return storage::ParseModelReference(episode.model_set).name;
-}
-
-// The one set that diagnosed the episodes. Versions of a set of onboarding
-// differ by their limits and by what labels have taught, so that what is in
-// force now is built on.
-ModelSet ParentOf(const std::vector<storage::Episode>& episodes,
-                  storage::ModelStore& store) {
-  std::set<std::string> sets;
-  std::set<std::string> names;
-  for (const storage::Episode& episode : episodes) {
-    sets.insert(episode.model_set);
-    names.insert(NameOfSet(episode));
-  }
-  if (names.size() == 1) {
-    ModelSet active = store.Load(*names.begin());
-    if (IsOnboarded(active)) {
-      return active;
-    }
-  }
-  if (sets.size() > 1) {
-    throw ConfigError("the labelled episodes are of several model sets (" +
-                      JoinText(sets) +
-                      "): choose the one to build on with --parent "
-                      "NAME[@VERSION]");
-  }
-  return store.Load(*sets.begin());
-}
-
-// What a set of onboarding can learn from, and how.
-void CheckOnboarded(const LabelRequest& request, const ModelSet& parent,
-                    storage::ModelStore& store,
-                    std::vector<storage::Episode>& episodes) {
-  if (!request.runs.empty()) {
-    throw ConfigError(
-        "--runs is for sets of fdi-trainer train: a set of "
-        "onboarding learns healthy hours by fdi-trainer onboard "
-        "--extend");
-  }
-  std::erase_if(episodes, [](const storage::Episode& episode) {
-    return episode.label == "false";
-  });
-  if (episodes.empty()) {
-    throw NotFoundError(
-        "no label names a fault: episodes labelled false are "
-        "learnt by fdi-trainer limits --valve ID");
-  }
-  for (const storage::Episode& episode : episodes) {
-    const auto entry = store.FindValve(episode.valve_id);
-    if (entry && entry->baseline() == storage::BaselineState::kProvisional) {
-      throw DataError("valve " + episode.valve_id +
-                      " was changed since model set " + NameOf(parent) +
-                      " was made: onboard it anew");
     }
   }
 }
@@ -156,8 +160,17 @@ const LabelledEpisode* SameEpisode(const std::vector<LabelledEpisode>& read,
   return now == read.end() ? nullptr : &*now;
 }
 
-void PlanRuns(const LabelRequest& request, const std::filesystem::path& file,
-              LabelPlan& plan) {
+bool IsStored(const std::string& run, storage::RunStore& store) {
+  try {
+    store.Info(run);
+    return true;
+  } catch (const NotFoundError&) {
+    return false;
+  }
+}
+
+void PlanRuns(const std::vector<std::string>& more,
+              const std::filesystem::path& file, LabelPlan& plan) {
   std::set<std::string> replaced;
   for (const TrainingEpisode& before : plan.lineage.episodes) {
     // What another label taught is forgotten even if the new one teaches
@@ -170,35 +183,46 @@ void PlanRuns(const LabelRequest& request, const std::filesystem::path& file,
     }
     plan.has_news = plan.has_news || withdrawn;
   }
-  storage::RunStore store(file);
+  std::optional<storage::RunStore> store;
+  if (std::filesystem::exists(file)) {
+    store.emplace(file);
+  }
   for (const std::string& run : plan.parent->training_runs) {
     if (replaced.contains(run)) {
       continue;
     }
     // The record of onboarding is not read again, and may be a file.
-    const bool is_evidence = std::ranges::any_of(
-        plan.lineage.episodes,
-        [&](const TrainingEpisode& before) { return before.run == run; });
-    if (IsOnboarded(*plan.parent) && !is_evidence) {
+    const auto evidence =
+        std::ranges::find(plan.lineage.episodes, run, &TrainingEpisode::run);
+    const bool onboarded = IsOnboarded(*plan.parent);
+    if ((onboarded && evidence == plan.lineage.episodes.end()) ||
+        (store && IsStored(run, *store))) {
       plan.runs.push_back(run);
-      continue;
-    }
-    try {
-      store.Info(run);
-      plan.runs.push_back(run);
-    } catch (const NotFoundError&) {
+    } else if (!onboarded || evidence->fault != 0) {
       plan.missing.push_back(run);
     }
   }
-  for (const std::string& selector : request.runs) {
+  for (const std::string& selector : more) {
     // In full, as the parent names its runs. `last` would mean another run once
     // the evidence of the labels is stored.
-    const std::string run = SelectorOf(store.Info(selector).id,
-                                       storage::ParseRunSelector(selector));
+    const std::string run =
+        SelectorOf(storage::RunStore(file).Info(selector).id,
+                   storage::ParseRunSelector(selector));
     if (!Contains(plan.runs, run)) {
       plan.runs.push_back(run);
     }
   }
+}
+
+// Whether the label asks for other models: one that calls an alarm of an
+// onboarded valve false asks for other limits, unless it taught a fault before.
+bool AsksForModels(const LabelledEpisode& episode, const LabelPlan& plan) {
+  return !IsOnboarded(*plan.parent) || episode.meaning.fault != 0 ||
+         std::ranges::any_of(
+             plan.lineage.episodes, [&](const TrainingEpisode& before) {
+               return before.episode_id == episode.meaning.episode_id &&
+                      before.fault != 0;
+             });
 }
 
 // Whether the parent has not learnt the same from the same samples.
@@ -211,6 +235,14 @@ bool IsNew(const LabelledEpisode& episode, const storage::Lineage& lineage) {
                                before.strength == now.strength &&
                                before.samples == now.samples;
                       });
+}
+
+// Sets of limits or of taught observers say so in their settings. The text is
+// empty of sets whose origin is unknown; then nothing is found in it.
+bool KeepsObservers(const storage::Lineage& lineage) {
+  const auto settings = Json::parse(lineage.settings, nullptr, false);
+  return !settings.contains(kModelsKey) &&
+         (settings.contains(kLimitsKey) || settings.contains(kTaughtKey));
 }
 
 // What tells the evidence of one label from that of another:
@@ -251,11 +283,11 @@ std::vector<Lesson> LessonsOf(const LabelPlan& plan,
                               const storage::DataDirectory& directory) {
   std::vector<Lesson> lessons;
   for (const LabelledEpisode& episode : plan.learnt) {
-    TrainingRun run;
+    if (episode.meaning.fault == 0) {
+      continue;
+    }
+    TrainingRun run = RunOf(episode, *plan.parent);
     run.id = "episode " + episode.meaning.episode_id;
-    run.period_s = plan.parent->sample_period_s;
-    run.flow_unit = plan.parent->flow_unit;
-    run.samples = episode.samples;
     lessons.push_back(
         {episode.meaning.fault, episode.meaning.strength, PiecesOf(run, plan)});
   }
@@ -277,12 +309,26 @@ bool IsOnboarded(const ModelSet& models) {
   return models.preset == "onboard";
 }
 
-Teaching TeachFrom(const LabelPlan& plan,
+ModelSet FirstSet(const ModelSet& models, storage::ModelStore& store) {
+  // Each set that was made from another one names it; the chain ends where the
+  // observers were made.
+  ModelSet first = models;
+  storage::Lineage lineage = store.LineageOf({first.name, first.version});
+  while (lineage.parent && KeepsObservers(lineage)) {
+    const storage::ModelReference parent{lineage.parent->name,
+                                         lineage.parent->version};
+    first = store.Load(parent);
+    lineage = store.LineageOf(parent);
+  }
+  return first;
+}
+
+Teaching TeachFrom(const LabelPlan& plan, const ModelSet& models,
                    const storage::DataDirectory& directory) {
   Teaching teaching;
   for (const Lesson& lesson : LessonsOf(plan, directory)) {
     try {
-      teaching.taught.push_back(Teach(*plan.parent, lesson));
+      teaching.taught.push_back(Teach(models, lesson));
     } catch (const DataError& error) {
       std::set<std::string> episodes;
       for (const Stretch& stretch : lesson.stretches) {
@@ -291,7 +337,7 @@ Teaching TeachFrom(const LabelPlan& plan,
       throw DataError(JoinText(episodes) + ": " + error.what());
     }
   }
-  teaching.models = WithTaught(*plan.parent, teaching.taught);
+  teaching.models = WithTaught(models, teaching.taught);
   return teaching;
 }
 
@@ -309,37 +355,52 @@ std::string SettingsText(const TrainingOptions& options) {
   return json.dump();
 }
 
-LabelPlan MakeLabelPlan(const LabelRequest& request,
+LabelPlan MakeLabelPlan(const RelearnRequest& request,
                         const storage::DataDirectory& directory) {
-  storage::HistoryReader history(directory.history());
-  auto episodes = FindLabelled(history, request);
+  std::optional<storage::HistoryReader> history;
+  if (std::filesystem::exists(directory.history())) {
+    history.emplace(directory.history());
+  }
   LabelPlan plan;
   storage::ModelStore store(directory.models());
+  plan.episodes = EpisodesOf(request.valve, history);
   plan.parent = std::make_shared<const ModelSet>(
-      request.parent.empty() ? ParentOf(episodes, store)
-                             : store.Load(request.parent));
-  if (IsOnboarded(*plan.parent)) {
-    CheckOnboarded(request, *plan.parent, store, episodes);
+      ParentOf(request.valve, plan.episodes, store));
+  const bool onboarded = IsOnboarded(*plan.parent);
+  if (onboarded) {
+    RequireSameEpoch(request.valve, *plan.parent, store);
+    plan.episodes = EpisodesOf(GlobOf(request.valve), history);
   }
+  plan.since_ns =
+      request.from_ns.value_or(FirstSet(*plan.parent, store).created_ns);
   plan.lineage = store.LineageOf({plan.parent->name, plan.parent->version});
   plan.training = SettingsOf(*plan.parent, plan.lineage);
-  LabelReader reader(history, directory.runs(), plan.parent,
-                     plan.training.dataset, request.strengths);
-  plan.has_news = !request.runs.empty();
-  for (const storage::Episode& episode : episodes) {
-    LabelledEpisode read = reader.Read(episode);
-    if (IsOnboarded(*plan.parent) && NameOfSet(episode) != plan.parent->name) {
+  const auto labelled = LabelledOf(request, plan);
+  if (labelled.empty() && !onboarded) {
+    throw NotFoundError("no labelled episode of valve " + request.valve +
+                        " in that time: see fdi-store history label");
+  }
+  CheckStrengths(request.strengths, labelled);
+  plan.has_news = !onboarded && !request.runs.empty();
+  for (const storage::Episode& episode : labelled) {
+    LabelledEpisode read = LabelReader(*history, directory.runs(), plan.parent,
+                                       plan.training.dataset, request.strengths)
+                               .Read(episode);
+    if (onboarded && episode.label != "false" &&
+        NameOfSet(episode) != plan.parent->name) {
       read.refusal = "it was diagnosed by " + episode.model_set +
                      ", and a set of onboarding learns from its own valve";
     }
     if (read.refusal.empty()) {
-      plan.has_news = plan.has_news || IsNew(read, plan.lineage);
+      plan.has_news = plan.has_news ||
+                      (AsksForModels(read, plan) && IsNew(read, plan.lineage));
       plan.learnt.push_back(std::move(read));
     } else {
       plan.refused.push_back(std::move(read));
     }
   }
-  PlanRuns(request, directory.runs(), plan);
+  PlanRuns(onboarded ? std::vector<std::string>() : request.runs,
+           directory.runs(), plan);
   return plan;
 }
 
@@ -349,27 +410,25 @@ std::string RefusalText(const LabelledEpisode& episode) {
          episode.refusal;
 }
 
-void RequireTrainable(const LabelPlan& plan, bool drop_missing,
-                      bool skip_refused) {
+// An alarm that was false and cannot be read leaves the limits as they are; a
+// fault that cannot be read would be missing from the models.
+void RequireUsable(const LabelPlan& plan) {
   const std::string parent = NameOf(*plan.parent);
-  if (!plan.missing.empty() && !drop_missing) {
+  if (!plan.missing.empty()) {
     throw DataError(
         std::to_string(plan.missing.size()) + " of the " +
         std::to_string(plan.parent->training_runs.size()) + " runs that " +
-        parent +
-        " was trained on are not in runs.db: " + JoinText(plan.missing) +
-        "; --drop-missing does without "
-        "them");
+        parent + " was trained on are not in runs.db: " +
+        JoinText(plan.missing) + "; --skip-refused does without them");
   }
-  if (!plan.refused.empty() && !skip_refused) {
-    throw DataError(JoinText(plan.refused, "; ", RefusalText) +
+  std::vector<LabelledEpisode> refused = plan.refused;
+  std::erase_if(refused, [&](const LabelledEpisode& episode) {
+    return IsOnboarded(*plan.parent) && episode.meaning.label == "false";
+  });
+  if (!refused.empty()) {
+    throw DataError(JoinText(refused, "; ", RefusalText) +
                     "; --skip-refused does without " +
-                    (plan.refused.size() == 1 ? "it" : "them"));
-  }
-  if (!plan.has_news) {
-    throw DataError("nothing to learn: " + parent +
-                    " has learnt from all of the labelled episodes that can "
-                    "be used");
+                    (refused.size() == 1 ? "it" : "them"));
   }
 }
 

@@ -1,17 +1,27 @@
 #pragma once
 
+#include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "diagnosis/model/model_set.h"
 #include "storage/database/data_directory.h"
+#include "storage/history/episode.h"
 #include "storage/models/models.h"
+#include "storage/runs/runs.h"
 #include "trainer/learning/labelled_episodes.h"
 #include "trainer/learning/taught_observers.h"
 #include "trainer/training.h"
 
 namespace fdi::trainer {
+
+/// Keys of what the lineage of a relearnt set says of an onboarded valve: its
+/// models were made anew, its limits were set, labels taught it faults.
+inline constexpr const char* kModelsKey = "models";
+inline constexpr const char* kLimitsKey = "limits";
+inline constexpr const char* kTaughtKey = "taught";
 
 /// The set was made by `fdi-trainer onboard`, or from such a one.
 bool IsOnboarded(const ModelSet& models);
@@ -20,47 +30,62 @@ bool IsOnboarded(const ModelSet& models);
 /// are stored with the set, so that its next version is made in the same way.
 std::string SettingsText(const TrainingOptions& options);
 
-/// Which labels to learn from, and on what to build.
-struct LabelRequest {
-  std::string parent;  ///< NAME[@VERSION]; empty: the set of the episodes.
-  storage::EpisodeFilter filter;
-  GivenStrengths strengths;
-  std::vector<std::string> runs;  ///< To train on beside the parent's.
+/// The set of onboarding that `models` has its observers from: itself, unless
+/// its limits were set later or labels have taught it more.
+ModelSet FirstSet(const ModelSet& models, storage::ModelStore& store);
+
+/// What is known of a valve since its set was made, as the user names it.
+struct RelearnRequest {
+  std::string valve;  ///< Its id. Of a set that several valves share: a glob.
+  std::optional<std::int64_t> from_ns{};  ///< Of recorded samples and episodes.
+  std::optional<std::int64_t> to_ns{};
+  /// ID[@from:to] of runs.db: healthy hours. For a set of `train`: runs to
+  /// train on beside its own.
+  std::vector<std::string> runs{};
+  std::vector<storage::StoredRun> files{};  ///< Healthy hours.
+  GivenStrengths strengths{};
 };
 
-/// What `train --from-labels` is to train on. Making a plan stores nothing.
+/// What labels teach, and on what to build. Making a plan stores nothing.
 ///
-/// A set of onboarding is not trained anew: it gets observers of the faults
-/// that labels name (TeachFrom). Episodes labelled false are left to
-/// `fdi-trainer limits`.
+/// A set of `train` is trained anew, on its own runs and on the episodes. A set
+/// of onboarding learns each label by itself: episodes labelled false are
+/// healthy hours, and faults become observers (TeachFrom).
 struct LabelPlan {
   std::shared_ptr<const ModelSet> parent;
   storage::Lineage lineage;  ///< Of the parent.
   TrainingOptions training;  ///< As the parent was trained.
+  /// Of the valve, labelled or not, by detection.
+  std::vector<storage::Episode> episodes;
+  /// Recorded samples before do not count.
+  std::int64_t since_ns{0};
   /// Those of the parent, less the evidence of episodes that are read anew,
   /// and those of the request.
   std::vector<std::string> runs;
   std::vector<std::string> missing;  ///< Runs of the parent not in runs.db.
   std::vector<LabelledEpisode> learnt;
   std::vector<LabelledEpisode> refused;
-  /// The request names runs, or a label says what the parent does not know.
+  /// The request names runs to train on, or a label says what the parent does
+  /// not know. Of a set of onboarding: a label that names a fault.
   bool has_news{false};
 };
 
-/// Of an onboarded valve, the parent is the active version of its set,
-/// whichever of them diagnosed the episodes.
+/// The parent is the set that is assigned to the valve, or else the active
+/// version of the one that diagnosed its labelled episodes. By default episodes
+/// of an onboarded valve that are labelled false count since its observers were
+/// made, all others whenever they were.
 ///
-/// @throws ConfigError if the episodes are of several sets and no parent is
-///   given, or if runs are named for a set of onboarding; NotFoundError if
-///   there is no labelled episode, no such run or set; DataError if the valve
-///   was changed since it was onboarded.
-LabelPlan MakeLabelPlan(const LabelRequest& request,
+/// @throws ConfigError if the episodes are of several sets and none is
+/// assigned;
+///   NotFoundError if there is neither a set nor a labelled episode, no
+///   such run or set; DataError if the valve was changed since it was
+///   onboarded.
+LabelPlan MakeLabelPlan(const RelearnRequest& request,
                         const storage::DataDirectory& directory);
 
-/// @throws DataError naming runs or episodes, why, and the option that does
-///   without them; or if there is no news.
-void RequireTrainable(const LabelPlan& plan, bool drop_missing,
-                      bool skip_refused);
+/// @throws DataError naming runs, or episodes of which the models are to learn,
+///   and why they cannot be used.
+void RequireUsable(const LabelPlan& plan);
 
 /// "episode 00c0ffee12345678 of valve LV-1, label true: too short: ..."
 std::string RefusalText(const LabelledEpisode& episode);
@@ -77,14 +102,14 @@ int StoreEvidence(LabelPlan& plan, const storage::DataDirectory& directory,
 /// through its parent.
 storage::Lineage LineageOf(const LabelPlan& plan);
 
-/// The parent of `plan`, a set of onboarding, with the observers that its
-/// labels teach, and those that the labels before it have taught.
+/// `models`, the parent of `plan` or what was made of it, with the observers
+/// that its labels teach, and those that the labels before it have taught.
 struct Teaching {
   ModelSet models;  ///< Not stored yet.
   std::vector<TaughtObserver> taught;
 };
 /// @throws DataError naming the episodes, as Teach() and WithTaught().
-Teaching TeachFrom(const LabelPlan& plan,
+Teaching TeachFrom(const LabelPlan& plan, const ModelSet& models,
                    const storage::DataDirectory& directory);
 
 /// What `models` calls the episode, with what went before it: the last set of

@@ -163,8 +163,8 @@ double EstimateStrength(const std::shared_ptr<const ModelSet>& models,
   return strength;
 }
 
-// The part of a run that covers a time, in whole seconds from its start and
-// one period longer, as users write it.
+}  // namespace
+
 std::string SelectorOf(const storage::RunInfo& info, std::int64_t from_ns,
                        std::int64_t to_ns) {
   const auto seconds = [&](std::int64_t stamp_ns) {
@@ -179,10 +179,18 @@ std::string SelectorOf(const storage::RunInfo& info, std::int64_t from_ns,
   return RunName(part);
 }
 
-}  // namespace
-
 std::string NameOf(const ModelSet& models) {
   return storage::ToString({models.name, models.version});
+}
+
+TrainingRun RunOf(const LabelledEpisode& episode, const ModelSet& parent) {
+  TrainingRun run;
+  run.id = episode.meaning.run.empty() ? "episode " + episode.meaning.episode_id
+                                       : episode.meaning.run;
+  run.period_s = parent.sample_period_s;
+  run.flow_unit = parent.flow_unit;
+  run.samples = episode.samples;
+  return run;
 }
 
 LabelReader::LabelReader(storage::HistoryReader& history,

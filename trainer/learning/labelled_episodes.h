@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <map>
 #include <memory>
@@ -21,6 +22,11 @@ std::string NameOf(const ModelSet& models);
 /// them; they win over estimates.
 using GivenStrengths = std::map<std::string, double>;
 
+/// The part of a run that covers a time, in whole seconds from its start and
+/// one period longer, as users write it.
+std::string SelectorOf(const storage::RunInfo& info, std::int64_t from_ns,
+                       std::int64_t to_ns);
+
 /// A labelled episode and what it teaches.
 struct LabelledEpisode {
   storage::TrainingEpisode meaning;  ///< Its run is named once it is stored.
@@ -30,6 +36,9 @@ struct LabelledEpisode {
   std::vector<LabelledSample> samples;
   storage::StoredRun record;  ///< With what went before the episode.
 };
+
+/// The samples of an episode that teaches `parent` something, as a run.
+TrainingRun RunOf(const LabelledEpisode& episode, const ModelSet& parent);
 
 /// Reads what labels teach a successor of `parent`:
 ///

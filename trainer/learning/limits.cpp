@@ -19,7 +19,6 @@
 namespace fdi::trainer {
 namespace {
 
-constexpr std::size_t kMinResiduals = 100;
 constexpr double kCommandsCovered = 0.8;
 constexpr double kSeenMean = 1.5;     // times what was seen; as in calibration
 constexpr double kSeenLogRms = 0.25;  // more than what was seen; likewise
@@ -367,7 +366,7 @@ void RequireHealthy(const ModelSet& first, const ModelSet& parent,
       Digits(kMaxReachRatio, 2) +
       " times. That is hardly a healthy valve: leave this time out (--runs "
       "ID@from:to). If the valve was healthy, label its episode false, or make "
-      "its models anew with these hours (fdi-trainer onboard --extend)");
+      "its models anew with these hours (--models)");
 }
 
 // On a valve that follows its normal model exactly, fault i alone makes the
@@ -377,9 +376,9 @@ void RequireHealthy(const ModelSet& first, const ModelSet& parent,
 //
 // Whether it passes a limit is asked of both sets in one run of the bank,
 // because they have the same observers.
-std::vector<Visibility> CompareVisibility(const ModelSet& before,
-                                          const ModelSet& after,
-                                          const std::vector<Sample>& samples) {
+std::vector<CoverageChange> CompareVisibility(
+    const ModelSet& before, const ModelSet& after,
+    const std::vector<Sample>& samples) {
   const std::size_t observers = before.observers.size();
   std::array<std::vector<LimitUse>, 2> uses{
       std::vector<LimitUse>(observers, LimitUse(before)),
@@ -415,14 +414,14 @@ std::vector<Visibility> CompareVisibility(const ModelSet& before,
     const Observer& observer = before.observers[i];
     directions[{observer.fault, observer.strength < 0.0}].push_back(i);
   }
-  std::vector<Visibility> faults;
+  std::vector<CoverageChange> faults;
   for (auto& [key, chain] : directions) {
     const auto strength = [&](std::size_t i) {
       return std::abs(before.observers[i].strength);
     };
     std::ranges::sort(chain, std::greater<>(), strength);
-    Visibility& fault =
-        faults.emplace_back(Visibility{key.first, key.second, {}, {}});
+    CoverageChange& fault =
+        faults.emplace_back(CoverageChange{key.first, key.second, {}, {}});
     for (std::size_t set = 0; set < seen.size(); ++set) {
       std::optional<double>& smallest = set == 0 ? fault.before : fault.after;
       for (const std::size_t i : chain) {
@@ -434,24 +433,6 @@ std::vector<Visibility> CompareVisibility(const ModelSet& before,
     }
   }
   return faults;
-}
-
-void RequireVisible(const std::vector<Visibility>& faults) {
-  std::string gone;
-  for (const Visibility& fault : faults) {
-    if (fault.before && !fault.after) {
-      gone += (gone.empty() ? "" : ", ") + FaultName(fault.fault) +
-              (fault.negative ? " (-)" : "");
-    }
-  }
-  if (!gone.empty()) {
-    throw DataError(
-        "with limits as wide as these data ask for, faults that the set knows "
-        "would not be seen at any strength: " +
-        gone +
-        ". If the valve is as it should be, make its models anew with these "
-        "hours: fdi-trainer onboard --extend");
-  }
 }
 
 }  // namespace fdi::trainer

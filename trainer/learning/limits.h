@@ -8,6 +8,7 @@
 
 #include "diagnosis/model/model_set.h"
 #include "trainer/learning/healthy_residuals.h"
+#include "trainer/onboarding/coverage.h"
 
 namespace fdi::trainer {
 
@@ -43,6 +44,9 @@ struct Peak {
 /// Parallel to LimitsOf(models).
 std::vector<Peak> PeaksOf(const ModelSet& models, const HealthyResiduals& data);
 
+/// Fewer residuals of a channel say nothing of its limits.
+inline constexpr std::size_t kMinResiduals = 100;
+
 /// How the limits of a set came about anew.
 struct NewLimits {
   ModelSet models;     ///< The parent with other limits; not stored yet.
@@ -62,7 +66,7 @@ struct NewLimits {
 ///
 /// The floor becomes as wide as the data ask for (WidenFloor()).
 ///
-/// @throws DataError if a channel has fewer than 100 residuals.
+/// @throws DataError if a channel has fewer than kMinResiduals.
 NewLimits SetLimits(const ModelSet& parent, const HealthyResiduals& data);
 
 /// How far beyond the limits of onboarding data may reach that no person called
@@ -76,23 +80,12 @@ inline constexpr double kMaxReachRatio = 2.0;
 void RequireHealthy(const ModelSet& first, const ModelSet& parent,
                     const std::vector<Peak>& peaks);
 
-/// The smallest strengths of a fault in one direction whose effect alone passes
-/// a limit, as do all greater ones; nothing if none does.
-struct Visibility {
-  int fault{0};
-  bool negative{false};
-  std::optional<double> before{};
-  std::optional<double> after{};
-};
-
-/// By what the observers of the faults predict over `samples` beside the normal
-/// one. The strengths are those of the observers.
-std::vector<Visibility> CompareVisibility(const ModelSet& before,
-                                          const ModelSet& after,
-                                          const std::vector<Sample>& samples);
-
-/// @throws DataError naming faults that were seen at some strength before and
-///   are at none after.
-void RequireVisible(const std::vector<Visibility>& faults);
+/// The smallest strengths of each fault and direction whose effect alone passes
+/// a limit, as do all greater ones, by what the observers of the faults predict
+/// over `samples` beside the normal one. The strengths are those of the
+/// observers.
+std::vector<CoverageChange> CompareVisibility(
+    const ModelSet& before, const ModelSet& after,
+    const std::vector<Sample>& samples);
 
 }  // namespace fdi::trainer

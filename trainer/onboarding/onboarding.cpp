@@ -684,22 +684,15 @@ std::vector<CoverageChange> CompareWithFormer(
 
 // Faults act in proportion to the size of a valve, so that a set serves valves
 // of its own size only.
-void RequireOfType(const std::vector<TrainingRun>& runs,
+bool HasSizeOfType(const std::vector<TrainingRun>& runs,
                    const Onboarding& onboarding) {
   constexpr double kAlike = 1.25;
-  if (!onboarding.transferred) {
-    throw NotOfType(
-        "the set of the type has other channels or was made for other "
-        "commands, pressures or temperatures");
-  }
   if ((onboarding.signals & MaskOf(Signal::kF)) == 0) {
-    return;
+    return true;
   }
   const double size = simulator::SizeOf(Records(runs, onboarding.type.levels),
                                         onboarding.type.parameters);
-  if (size > kAlike || size < 1.0 / kAlike) {
-    throw NotOfType("the valve has another size than its type");
-  }
+  return size <= kAlike && size >= 1.0 / kAlike;
 }
 
 // The ranges of the type become those of the record.
@@ -769,10 +762,8 @@ Onboarding Onboard(const std::vector<TrainingRun>& all,
   const Progress part = Part(progress, kFitShare, kTrainShare);
   result.transferred = options.of_type &&
                        options.of_type->position_as_command == at_position &&
-                       IsTransferable(*options.of_type, runs, training);
-  if (options.only_of_type) {
-    RequireOfType(runs, result);
-  }
+                       IsTransferable(*options.of_type, runs, training) &&
+                       HasSizeOfType(runs, result);
   FaultyStretches simulated;
   result.models =
       result.transferred

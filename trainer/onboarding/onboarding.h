@@ -32,12 +32,6 @@ TrainingOptions OnboardingPreset(SignalMask signals);
 std::vector<std::string> DropUnreadChannels(
     const std::vector<TrainingRun>& runs, std::vector<ChannelPlan>& channels);
 
-/// The valve is not enough like the one that the type's set was made from.
-class NotOfType : public DataError {
- public:
-  using DataError::DataError;
-};
-
 struct OnboardingOptions {
   std::string name;  ///< Of the model set.
   ValveType type;    ///< Where the fit starts, or what is taken as it is.
@@ -48,8 +42,6 @@ struct OnboardingOptions {
   /// Set of another valve of the type, which serves this one where it can
   /// (TransferDifferenceSet); none: every fault is simulated.
   std::optional<ModelSet> of_type{};
-  /// Throw NotOfType where `of_type` cannot serve, instead of simulating.
-  bool only_of_type{false};
   /// The set that the first `former_runs` runs made, the others being added:
   /// both sets are scored on the former ones.
   std::shared_ptr<const ModelSet> extends{};

@@ -1,4 +1,4 @@
-// What `onboard --extend` makes the models of a valve from, and what it
+// What `relearn --models` makes the models of a valve from, and what it
 // refuses; the training itself is that of onboard.
 #include <filesystem>
 #include <memory>
@@ -61,8 +61,10 @@ class ExtendTest : public TrainerProgram {
   }
 
   FormerRecord Former(std::vector<std::string>& files) const {
-    storage::ModelStore store(directory().models());
-    return ReadFormerRecord("V1", store, directory(), files);
+    RelearnRequest request;
+    request.valve = "V1";
+    return ReadFormerRecord("V1", MakeLabelPlan(request, directory()),
+                            directory(), files);
   }
 };
 
@@ -76,7 +78,6 @@ TEST_F(ExtendTest, FindsRunsAndFilesWhereTheyWereOrAsTheyAreGiven) {
   EXPECT_THAT(record.runs, ElementsAre(run + "@0:5"));
   EXPECT_THAT(record.files, ElementsAre(there, "now/moved.csv@5:"));
   EXPECT_THAT(files, ElementsAre("new.csv"));
-  EXPECT_EQ(record.models->version, 1);
   EXPECT_EQ(record.type.parameters.trim.kv_m3_h, 72.0);
   EXPECT_EQ(record.type.command_delay, 1);
   EXPECT_EQ(record.type.levels.p1_kpa, 900.0);
@@ -86,7 +87,7 @@ TEST_F(ExtendTest, FindsRunsAndFilesWhereTheyWereOrAsTheyAreGiven) {
 TEST_F(ExtendTest, WhatIsGoneIsNamedAndNothingIsStored) {
   StoreSet({"/gone/day.csv"});
   Write("new.csv", "t_s,CV_pct,X_pct\n0,50,50\n");
-  const Outcome outcome = Run("onboard --valve V1 --extend --file new.csv");
+  const Outcome outcome = Run("relearn V1 --models --file new.csv");
   EXPECT_EQ(outcome.code, 5);
   EXPECT_THAT(outcome.err, HasSubstr("the record /gone/day.csv"));
   EXPECT_THAT(outcome.err, HasSubstr("--file"));
@@ -94,20 +95,20 @@ TEST_F(ExtendTest, WhatIsGoneIsNamedAndNothingIsStored) {
 }
 
 TEST_F(ExtendTest, OtherSetsAndNoNewHoursAreRefused) {
-  EXPECT_EQ(Run("onboard --valve V9 --extend --file new.csv").code, 5);
+  EXPECT_EQ(Run("relearn V9 --models --file new.csv").code, 5);
   const std::string run = StoreRun();
   StoreSet({run});
-  const Outcome nothing = Run("onboard --valve V1 --extend");
+  const Outcome nothing = Run("relearn V1 --models");
   EXPECT_EQ(nothing.code, 2);
   EXPECT_THAT(nothing.err, HasSubstr("--runs ID,... or --file CSV"));
-  EXPECT_EQ(Run("onboard --valve V1 --accept --runs " + run).code, 2);
-  EXPECT_EQ(Run("onboard --valve V1 --extend --no-fit --runs " + run).code, 2);
+  EXPECT_THAT(Run("onboard --valve V1 --extend --runs " + run).err,
+              HasSubstr("fdi-trainer relearn VALVE --models"));
   StoreSet({run}, "paper");
   storage::ModelStore(directory().models(), storage::Access::kOccasionalWriter)
       .Activate({"V1", 2});
-  const Outcome trained = Run("onboard --valve V1 --extend --runs " + run);
-  EXPECT_EQ(trained.code, 3);
-  EXPECT_THAT(trained.err, HasSubstr("was not made by fdi-trainer onboard"));
+  const Outcome trained = Run("relearn V1 --models --runs " + run);
+  EXPECT_EQ(trained.code, 5);
+  EXPECT_THAT(trained.err, HasSubstr("no labelled episode"));
 }
 
 TEST(CoverageChangeTest, FaultsThatAreNotDetectedAnyMoreAreLost) {

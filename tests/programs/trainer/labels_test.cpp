@@ -86,7 +86,7 @@ TEST_F(AppLabelsTest, NamedFaultIsLearntAndToldWhereItCameFrom) {
   const std::string id = Episode(RunWith("f1"), "f1");
   ASSERT_THAT(DetectionOf("quick", "f1")["final_set"], IsEmpty());
 
-  const json set = RunJson("train --from-labels --strength " + id + "=0.5");
+  const json set = RunJson("relearn '*' --strength " + id + "=0.5");
 
   EXPECT_EQ(set["model_set"], "quick");
   EXPECT_EQ(set["version"], 2);
@@ -114,7 +114,7 @@ TEST_F(AppLabelsTest, FalseAlarmIsNormalOperationFromThenOn) {
   Episode(run, "false");
   ASSERT_TRUE(DetectionOf("quick", "f1")["detected"]);
 
-  const json set = RunJson("train --from-labels");
+  const json set = RunJson("relearn '*'");
 
   ASSERT_THAT(set["lineage"]["episodes"], SizeIs(1));
   EXPECT_EQ(set["lineage"]["episodes"][0]["fault"], "normal");
@@ -127,16 +127,16 @@ TEST_F(AppLabelsTest, FalseAlarmIsNormalOperationFromThenOn) {
 TEST_F(AppLabelsTest, TraceServesWhereNoRunWasRecorded) {
   const storage::StoredRun run = RunWith("f19");
   const std::string id = Episode(run, "true");
-  EXPECT_THAT(RunJson("train --from-labels --dry-run")["episodes"][0]["data"]
+  EXPECT_THAT(RunJson("relearn '*' --dry-run")["episodes"][0]["data"]
                   .get<std::string>(),
               HasSubstr(run.info.id + "@"));
   Runs(storage::Access::kOccasionalWriter).Delete(run.info.id);
 
-  const json plan = RunJson("train --from-labels --dry-run");
+  const json plan = RunJson("relearn '*' --dry-run");
 
   EXPECT_EQ(plan["episodes"][0]["data"], "trace");
   EXPECT_NEAR(plan["episodes"][0]["strength"].get<double>(), 0.5, 0.05);
-  const json set = RunJson("train --from-labels");
+  const json set = RunJson("relearn '*'");
   const json& learnt = set["lineage"]["episodes"][0];
   EXPECT_EQ(learnt["samples"], plan["episodes"][0]["samples"]);
   const storage::StoredRun kept = Runs().Load(learnt["run"].get<std::string>());
@@ -149,7 +149,7 @@ TEST_F(AppLabelsTest, TraceServesWhereNoRunWasRecorded) {
 TEST_F(AppLabelsTest, UnknownStrengthIsRefusedWithAllThatHelps) {
   const std::string id = Episode(RunWith("f1"), "f1");
 
-  const Outcome outcome = Run("train --from-labels");
+  const Outcome outcome = Run("relearn '*'");
 
   EXPECT_EQ(outcome.code, 3);
   EXPECT_THAT(
@@ -157,17 +157,17 @@ TEST_F(AppLabelsTest, UnknownStrengthIsRefusedWithAllThatHelps) {
       AllOf(HasSubstr(id), HasSubstr("label f1"), HasSubstr("does not know f1"),
             HasSubstr("--strength " + id + "=S"), HasSubstr("--skip-refused")));
   EXPECT_EQ(Run("show quick@2").code, 5);
-  EXPECT_EQ(RunJson("train --from-labels --dry-run")["episodes"][0]["refused"]
+  EXPECT_EQ(RunJson("relearn '*' --dry-run")["episodes"][0]["refused"]
                 .get<std::string>()
                 .find("the strength is unknown"),
             0U);
-  EXPECT_EQ(Run("train --from-labels --strength " + id + "=1.5").code, 2);
-  EXPECT_EQ(Run("train --from-labels --strength 0123=0.5").code, 5);
+  EXPECT_EQ(Run("relearn '*' --strength " + id + "=1.5").code, 2);
+  EXPECT_EQ(Run("relearn '*' --strength 0123=0.5").code, 5);
 }
 
 TEST_F(AppLabelsTest, TrueNeedsExactlyOneIsolatedFault) {
   Episode(RunWith("f1"), "true");
-  const Outcome outcome = Run("train --from-labels");
+  const Outcome outcome = Run("relearn '*'");
   EXPECT_EQ(outcome.code, 3);
   EXPECT_THAT(outcome.err, HasSubstr("label it with the name of the fault"));
 }
@@ -178,7 +178,7 @@ TEST_F(AppLabelsTest, ShortEpisodeIsRefusedWithItsLengthAndWhatIsNeeded) {
   Runs(storage::Access::kOccasionalWriter).Delete(run.info.id);
   Episode(run, "true");
 
-  const Outcome outcome = Run("train --from-labels");
+  const Outcome outcome = Run("relearn '*'");
 
   EXPECT_EQ(outcome.code, 3);
   EXPECT_THAT(outcome.err,
@@ -187,14 +187,14 @@ TEST_F(AppLabelsTest, ShortEpisodeIsRefusedWithItsLengthAndWhatIsNeeded) {
 
 TEST_F(AppLabelsTest, FaultThatWasNotNamedLiveGetsTheStrengthThatFits) {
   Episode(RunWith("f19"), "f19", true);
-  const json episode = RunJson("train --from-labels --dry-run")["episodes"][0];
+  const json episode = RunJson("relearn '*' --dry-run")["episodes"][0];
   EXPECT_TRUE(episode["refused"].is_null()) << episode;
   EXPECT_NEAR(episode["strength"].get<double>(), 0.5, 0.05);
 }
 
 TEST_F(AppLabelsTest, StrengthOfAFaultThatFitsBadlyIsNotEstimated) {
   Episode(RunWith("f1"), "f19");
-  const Outcome outcome = Run("train --from-labels");
+  const Outcome outcome = Run("relearn '*'");
   EXPECT_EQ(outcome.code, 3);
   EXPECT_THAT(outcome.err, HasSubstr("gives f19 a factor of"));
 }
@@ -202,7 +202,7 @@ TEST_F(AppLabelsTest, StrengthOfAFaultThatFitsBadlyIsNotEstimated) {
 // The set knows f19 up to 0.5.
 TEST_F(AppLabelsTest, StrengthBeyondTheTrainedOnesIsNotEstimated) {
   Episode(RunWith("f19", "0.75"), "f19", true);
-  const Outcome outcome = Run("train --from-labels");
+  const Outcome outcome = Run("relearn '*'");
   EXPECT_EQ(outcome.code, 3);
   EXPECT_THAT(outcome.err, HasSubstr("beyond what it was trained at (0.5)"));
 }
@@ -221,7 +221,7 @@ TEST_F(AppLabelsTest, TimeAfterTheFaultDoesNotCountAsFault) {
   const std::string id = Episode(run, "true");
   ASSERT_TRUE(storage::HistoryReader(History()).Show(id).cleared_ns);
 
-  const json set = RunJson("train --from-labels");
+  const json set = RunJson("relearn '*'");
 
   const storage::StoredRun kept =
       Runs().Load(set["lineage"]["episodes"][0]["run"].get<std::string>());
@@ -238,7 +238,7 @@ TEST_F(AppLabelsTest, SignalsThatNotAllRunsHaveAreLeftOut) {
     stored.sample.Set(Signal::kSp, 50.0);
   }
   Episode(run, "true");
-  EXPECT_EQ(RunJson("train --from-labels")["version"], 2);
+  EXPECT_EQ(RunJson("relearn '*'")["version"], 2);
 }
 
 TEST_F(AppLabelsTest, RunsOfTheParentThatAreGoneAreNamed) {
@@ -249,26 +249,24 @@ TEST_F(AppLabelsTest, RunsOfTheParentThatAreGoneAreNamed) {
   }
   Runs(storage::Access::kOccasionalWriter).Delete(gone);
 
-  const Outcome outcome = Run("train --from-labels");
+  const Outcome outcome = Run("relearn '*'");
   EXPECT_EQ(outcome.code, 3);
   EXPECT_THAT(outcome.err, AllOf(HasSubstr("1 of the 2 runs"), HasSubstr(gone),
-                                 HasSubstr("--drop-missing")));
+                                 HasSubstr("--skip-refused")));
 
-  RunJson("train --from-labels --drop-missing");
+  RunJson("relearn '*' --skip-refused");
   EXPECT_THAT(RunJson("show quick@2")["training_runs"].dump(),
               Not(HasSubstr(gone)));
 }
 
 TEST_F(AppLabelsTest, RelabelledEpisodeReplacesWhatItTaught) {
   const std::string id = Episode(RunWith("f1"), "f1");
-  const json second = RunJson("train --from-labels --strength " + id + "=0.5");
-  const Outcome again =
-      Run("train --from-labels --parent quick@2 --strength " + id + "=0.5");
-  EXPECT_EQ(again.code, 3);
-  EXPECT_THAT(again.err, HasSubstr("nothing to learn"));
+  const json second = RunJson("relearn '*' --strength " + id + "=0.5");
+  EXPECT_TRUE(
+      RunJson("relearn '*' --strength " + id + "=0.5")["version"].is_null());
   Label(id, "false");
 
-  const json third = RunJson("train --from-labels --parent quick@2");
+  const json third = RunJson("relearn '*'");
 
   ASSERT_THAT(third["lineage"]["episodes"], SizeIs(1));
   EXPECT_EQ(third["lineage"]["episodes"][0]["fault"], "normal");
@@ -282,11 +280,10 @@ TEST_F(AppLabelsTest, RelabelledEpisodeReplacesWhatItTaught) {
 // What a label taught goes with it, though nothing takes its place.
 TEST_F(AppLabelsTest, RelabelledEpisodeThatIsRefusedForgetsWhatItTaught) {
   const std::string id = Episode(RunWith("f1"), "f1");
-  const json second = RunJson("train --from-labels --strength " + id + "=0.5");
+  const json second = RunJson("relearn '*' --strength " + id + "=0.5");
   Label(id, "true");  // And no fault was isolated.
 
-  const json third =
-      RunJson("train --from-labels --parent quick@2 --skip-refused");
+  const json third = RunJson("relearn '*' --skip-refused");
 
   EXPECT_THAT(third["lineage"]["episodes"], IsEmpty());
   EXPECT_THAT(RunJson("show quick@3")["training_runs"],
@@ -296,7 +293,8 @@ TEST_F(AppLabelsTest, RelabelledEpisodeThatIsRefusedForgetsWhatItTaught) {
 TEST_F(AppLabelsTest, StrengthIsOfOneEpisode) {
   Episode(RunWith("f1"), "f1");
   Episode(RunWith("f19"), "true");
-  LabelRequest request;
+  RelearnRequest request;
+  request.valve = "*";
   request.strengths[""] = 0.5;  // As both ids begin.
   EXPECT_THROW(MakeLabelPlan(request, {Path("data")}), NotFoundError);
 }
@@ -306,12 +304,11 @@ TEST_F(AppLabelsTest, RunsOfTheRequestAreNamedInFull) {
   const std::string parent =
       RunJson("show quick")["training_runs"][0].get<std::string>();
   const std::string last =
-      RunJson("train --from-labels --dry-run --runs last")["runs"][2]
+      RunJson("relearn '*' --dry-run --runs last")["training_runs"][2]
           .get<std::string>();
   EXPECT_EQ(Runs().Info("last").id, last);
 
-  const json set =
-      RunJson("train --from-labels --runs last," + parent.substr(0, 11));
+  const json set = RunJson("relearn '*' --runs last," + parent.substr(0, 11));
 
   EXPECT_EQ(set["version"], 2);
   EXPECT_THAT(RunJson("show quick@2")["training_runs"],
@@ -325,25 +322,44 @@ TEST_F(AppLabelsTest, TransmitterThatFailsAtFirstIsNotAMissingSignal) {
   Runs(storage::Access::kOccasionalWriter).Delete(run.info.id);
   run.samples.front().sample.present = kBasicSignals & ~MaskOf(Signal::kX);
   Episode(run, "true");
-  const json episode = RunJson("train --from-labels --dry-run")["episodes"][0];
+  const json episode = RunJson("relearn '*' --dry-run")["episodes"][0];
   EXPECT_TRUE(episode["refused"].is_null()) << episode;
 }
 
 TEST_F(AppLabelsTest, SameLabelsGiveTheSameHash) {
   const std::string id = Episode(RunWith("f1"), "f1");
-  const std::string call = "train --from-labels --strength " + id + "=0.5";
+  const std::string call = "relearn '*' --strength " + id + "=0.5";
   const json first = RunJson(call);
   const std::size_t runs = Runs().List().size();
+  storage::ModelStore(Path("data") / "models.db",
+                      storage::Access::kOccasionalWriter)
+      .Activate({"quick", 1});
 
   EXPECT_EQ(RunJson(call)["content_hash"], first["content_hash"]);
   EXPECT_THAT(Runs().List(), SizeIs(runs));
 }
 
-TEST_F(AppLabelsTest, OptionsOfLabelsNeedThem) {
-  EXPECT_EQ(Run("train --from-labels").code, 3);  // There is no history.db.
-  EXPECT_EQ(Run("train --runs 1a --dry-run").code, 2);
-  EXPECT_EQ(Run("train --from-labels --campaign c.toml").code, 2);
-  EXPECT_EQ(Run("train --from-labels --print-campaign").code, 2);
+TEST_F(AppLabelsTest, WithoutLabelsThereIsNothingToLearn) {
+  EXPECT_EQ(Run("relearn '*'").code, 5);
+  Episode(RunWith("f19"), "true");
+  EXPECT_EQ(Run("relearn '*' --to 2000-01-01").code, 5);
+  EXPECT_EQ(Run("relearn '*' --models").code, 2);
+  const Outcome removed = Run("train --from-labels");
+  EXPECT_EQ(removed.code, 2);
+  EXPECT_THAT(removed.err, HasSubstr("fdi-trainer relearn VALVE"));
+}
+
+// The new set is compared with the old one before it is taken into use.
+TEST_F(AppLabelsTest, ASetThatIsNotWorseIsInUseAfterwards) {
+  const std::string id = Episode(RunWith("f1"), "f1");
+
+  const json set = RunJson("relearn '*' --strength " + id + "=0.5");
+
+  EXPECT_EQ(set["active"], true);
+  EXPECT_THAT(set["worse"], IsEmpty());
+  EXPECT_EQ(set["episodes"][0]["before"], "unknown");
+  EXPECT_EQ(set["episodes"][0]["after"], "f1");
+  EXPECT_EQ(RunJson("show quick")["version"], 2);
 }
 
 }  // namespace

@@ -142,14 +142,14 @@ TEST_F(PlantTest, ADryRunStoresNothingAndListsTags) {
   EXPECT_FALSE(std::filesystem::exists(Path("data")));
 }
 
-TEST_F(PlantTest, ShardsShareTheRowsAndAreBroughtTogether) {
+TEST_F(PlantTest, PartsOfTheTableShareADataDirectory) {
   const std::string table = "A,,,,,,,,,\nB,,,,,,,,,\nD,,,,,,,,,\n";
-  const auto first = Onboard(table, "--shard 1/2", "part-1");
-  const auto second = Onboard(table, "--shard 2/2", "part-2");
-  EXPECT_EQ(first.size() + second.size(), 3U);
-  EXPECT_FALSE(first.contains("B"));
-  EXPECT_TRUE(second.contains("B"));
-  EXPECT_EQ(Run("onboard --plant plant.csv --shard 3/2").code, 2);
+  EXPECT_EQ(Onboard(table, "--rows '[AB]' --jobs 1").size(), 2U);
+  const auto all = Onboard(table, "--jobs 2");
+  EXPECT_EQ(all.at("A")["unchanged"], true);
+  EXPECT_EQ(all.at("B")["unchanged"], true);
+  EXPECT_EQ(all.at("D")["unchanged"], false);
+  EXPECT_EQ(Run("onboard --plant plant.csv --file day.csv --rows X").code, 2);
 }
 
 }  // namespace
