@@ -92,8 +92,8 @@ class Source {
     if (TakeWire(info) != return_code::RETCODE_OK) {
       return Taken::kNothing;
     }
-    item.reception = {info.source_timestamp.to_ns(),
-                      info.reception_timestamp.to_ns(),
+    item.reception = {UtcOfStamp(info.source_timestamp.to_ns()),
+                      UtcOfStamp(info.reception_timestamp.to_ns()),
                       HashOf(info.publication_handle, 16),
                       HashOf(info.publication_handle, 12)};
     item.ended = !info.valid_data;

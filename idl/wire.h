@@ -29,6 +29,15 @@ inline constexpr std::size_t kMaxBatch = 128;
 inline constexpr std::int64_t kMinStampNs = -2'208'988'800'000'000'000;
 inline constexpr std::int64_t kMaxStampNs = 4'102'444'800'000'000'000;
 
+/// UTC [ns] of a stamp that Fast DDS gave a message. RTPS counts seconds since
+/// 1970 in 32 bits (RTPS 2.5, 9.3.2), which the library reads as signed: in
+/// January 2038 its stamps go back to 1901. Read as unsigned they last until
+/// 2106.
+constexpr std::int64_t UtcOfStamp(std::int64_t stamp_ns) {
+  constexpr std::int64_t kWrapNs = (std::int64_t{1} << 32) * 1'000'000'000;
+  return stamp_ns < 0 ? stamp_ns + kWrapNs : stamp_ns;
+}
+
 /// Topics fdi/v1/ValveSample and, with PV, fdi/v2/ValveSample; key valve_id.
 struct ValveSampleMessage {
   std::string valve_id;

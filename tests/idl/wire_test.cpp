@@ -60,4 +60,14 @@ TEST(WireTest, IsolatedFaultIsACandidateWhateverItsFactor) {
 }
 
 }  // namespace
+// The last second of 31 bits, and the next one, which the library calls 1901.
+TEST(WireTest, StampsOfTheLibraryGoOnAfterJanuary2038) {
+  constexpr std::int64_t kSecond = 1'000'000'000;
+  constexpr std::int64_t kLast = ((std::int64_t{1} << 31) - 1) * kSecond;
+  constexpr std::int64_t kNextOfLibrary = -(std::int64_t{1} << 31) * kSecond;
+  EXPECT_EQ(UtcOfStamp(kLast), kLast);
+  EXPECT_EQ(UtcOfStamp(kNextOfLibrary), kLast + kSecond);
+  EXPECT_EQ(UtcOfStamp(kNextOfLibrary + 5), kLast + kSecond + 5);
+}
+
 }  // namespace fdi::idl
