@@ -15,10 +15,11 @@
 #include "base/time_units.h"
 #include "diagnosis/model/fault_catalogue.h"
 #include "diagnosis/records/valve_glob.h"
+#include "simulator/second_look/valve_physics.h"
 #include "trainer/campaign/file_runs.h"
 #include "trainer/campaign/run_input.h"
 #include "trainer/evaluation.h"
-#include "trainer/scoring/detectors.h"
+#include "trainer/scoring/evaluate.h"
 
 namespace fdi::trainer {
 std::vector<std::string> HealthyRuns(const RelearnRequest& request,
@@ -114,7 +115,7 @@ void ForEachHealthyRun(
     const double left_out_s = labels.parent->sample_period_s *
                               static_cast<double>(all - run.samples.size());
     if (!run.samples.empty()) {
-      ConvertFlow(run, *EngineDetector(labels.parent).flow, {});
+      ConvertFlow(run, simulator::FlowTargetOf(*labels.parent), {});
     }
     visit(run, left_out_s);
   };
@@ -254,29 +255,26 @@ void CompareWithParent(const RelearnRequest& request,
                        Relearning& learnt) {
   ParentComparison& result = learnt.comparison;
   const auto now = std::make_shared<const ModelSet>(learnt.models);
-  const Detector before = EngineDetector(learnt.labels.parent);
-  const Detector after = EngineDetector(now);
-  ForEachHealthyRun(
-      request, learnt.labels, directory,
-      [&](const storage::StoredRun& healthy, double) {
-        // A run with a fault that nobody labelled says nothing of false alarms.
-        if (healthy.samples.empty() || FaultOf(healthy) != 0) {
-          return;
-        }
-        ScoredRun run;
-        run.run = healthy;
-        run.name = RunName(healthy);
-        const EvaluationSettings normal{.assume_normal = true};
-        try {
-          const EvaluatedRun first = Evaluate(before, run, normal);
-          const EvaluatedRun second = Evaluate(after, run, normal);
-          result.alarms_before += first.indices.episodes;
-          result.alarms_after += second.indices.episodes;
-          result.hours += second.duration_s / 3600.0;
-        } catch (const DataError&) {
-          // Of another period or without a signal: it suits neither set.
-        }
-      });
+  ForEachHealthyRun(request, learnt.labels, directory,
+                    [&](const storage::StoredRun& healthy, double) {
+                      // A run with a fault that nobody labelled says nothing of
+                      // false alarms.
+                      if (healthy.samples.empty() || FaultOf(healthy) != 0) {
+                        return;
+                      }
+                      try {
+                        const EvaluatedRun first =
+                            Evaluate(learnt.labels.parent, healthy, true);
+                        const EvaluatedRun second =
+                            Evaluate(now, healthy, true);
+                        result.alarms_before += first.indices.episodes;
+                        result.alarms_after += second.indices.episodes;
+                        result.hours += second.duration_s / 3600.0;
+                      } catch (const DataError&) {
+                        // Of another period or without a signal: it suits
+                        // neither set.
+                      }
+                    });
   if (result.alarms_after > result.alarms_before) {
     char hours[32];
     std::snprintf(hours, sizeof hours, "%.2f", result.hours);
