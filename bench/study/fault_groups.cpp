@@ -89,7 +89,7 @@ ConfusionMatrix BuildConfusion(const std::vector<EvaluatedRun>& runs,
   for (const EvaluatedRun& run : runs) {
     if (run.has_truth) {
       rows.insert(GroupOf(run.indices.fault, groups));
-      for (const int fault : Outcome(run)) {
+      for (const int fault : FinalSet(run)) {
         columns.insert(GroupOf(fault, groups));
       }
       if (run.indices.fault != 0) {
@@ -107,7 +107,7 @@ ConfusionMatrix BuildConfusion(const std::vector<EvaluatedRun>& runs,
     }
     std::vector<double>& counts =
         matrix.counts[IndexIn(rows, GroupOf(run.indices.fault, groups))];
-    const std::vector<int>& outcome = Outcome(run);
+    const std::vector<int>& outcome = FinalSet(run);
     if (outcome.empty()) {
       counts[columns.size() + (IsDetected(run) ? 0 : 1)] += 1.0;
     }

@@ -132,7 +132,7 @@ std::string RunTitle(const EvaluatedRun& run, const report::FaultTexts& texts) {
   if (i.t_dt >= 0.0) {
     text += " after " + FormatNumber(i.t_dt, 0) + " s";
   }
-  const std::string set = SetText(Outcome(run));
+  const std::string set = SetText(FinalSet(run));
   return text + (set.empty() ? ", no fault named"
                              : ", final set " + WithName(set, texts));
 }

@@ -14,6 +14,7 @@
 #include "report/text_table.h"
 #include "trainer/campaign/campaign_runs.h"
 #include "trainer/campaign/file_runs.h"
+#include "trainer/campaign/run_input.h"
 #include "trainer/statistics.h"
 
 namespace fdi::trainer::study {

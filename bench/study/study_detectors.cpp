@@ -169,13 +169,6 @@ Scores Evaluate(const Detector& detector, const std::vector<ScoredRun>& runs,
   return scores;
 }
 
-int FaultOf(const storage::StoredRun& run) {
-  const auto first = std::find_if(
-      run.samples.begin(), run.samples.end(),
-      [](const storage::StoredSample& s) { return TruthOf(s).fault != 0; });
-  return first == run.samples.end() ? 0 : TruthOf(*first).fault;
-}
-
 Detector EngineDetector(const std::shared_ptr<const ModelSet>& models) {
   return {models->name,
           models->version,

@@ -55,9 +55,6 @@ EvaluatedRun Evaluate(const Detector& detector, const ScoredRun& run,
 Scores Evaluate(const Detector& detector, const std::vector<ScoredRun>& runs,
                 const EvaluationSettings& settings = {});
 
-/// The first fault that acts in a run; 0: none does.
-int FaultOf(const storage::StoredRun& run);
-
 /// The monitor's engine. @throws DataError from `follow` as Rescore().
 Detector EngineDetector(const std::shared_ptr<const ModelSet>& models);
 

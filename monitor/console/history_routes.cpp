@@ -13,6 +13,7 @@
 #include "diagnosis/model/fault_catalogue.h"
 #include "import/csv.h"
 #include "monitor/console/api.h"
+#include "report/plot/episode_figure.h"
 #include "report/plot/episode_text.h"
 #include "report/plot/gnuplot.h"
 #include "report/report.h"

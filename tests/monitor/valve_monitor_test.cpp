@@ -151,45 +151,6 @@ TEST_F(ValveMonitorTest, AnEpisodeWithoutANameKeepsWhatCouldExplainItLast) {
   EXPECT_THAT(notebook_.events[2].candidates, testing::IsEmpty());
 }
 
-// This monitor was away, settles, and the other one has seen the fault begin.
-TEST_F(ValveMonitorTest, AnEpisodeOfAnotherMonitorGoesOnUnderItsId) {
-  FaultEvent other;
-  other.valve_id = "V1";
-  other.source_id = 1;
-  other.episode_id = EpisodeId("V1", 1, PlantSample(450).stamp_ns);
-  other.transition.detection_stamp_ns = PlantSample(450).stamp_ns;
-  other.transition.stamp_ns = PlantSample(452).stamp_ns;
-  other.transition.faults = 0b10;
-  other.candidates = {{7, 1.0, 1.0, true}, {1, 0.6, 0.1, false}};
-  other.model_hash = 0x1234;
-  Feed(0, 100);
-  Feed(500, 505, kF7Offset);
-  for (const TransitionKind kind :
-       {TransitionKind::kDetected, TransitionKind::kIsolated}) {
-    other.transition.kind = kind;
-    other.transition.faults = kind == TransitionKind::kIsolated ? 0b10 : 0;
-    valve_.Adopt(other, notebook_);
-  }
-  Feed(505, 600, kF7Offset);
-  EXPECT_THAT(notebook_.Kinds(), testing::IsEmpty());
-  EXPECT_THAT(notebook_.resumed, ElementsAre(other.episode_id));
-  Feed(600, 650);
-  ASSERT_THAT(notebook_.Kinds(),
-              ElementsAre(TransitionKind::kCleared, TransitionKind::kClosed));
-  EXPECT_EQ(notebook_.events[0].episode_id, other.episode_id);
-
-  // One that has ended meanwhile is not resumed.
-  other.episode_id = EpisodeId("V1", 1, PlantSample(700).stamp_ns);
-  other.transition.kind = TransitionKind::kDetected;
-  Feed(900, 905, kF7Offset);
-  valve_.Adopt(other, notebook_);
-  other.transition.kind = TransitionKind::kClosed;
-  valve_.Adopt(other, notebook_);
-  Feed(905, 1000, kF7Offset);
-  EXPECT_EQ(notebook_.resumed.size(), 1U);
-  EXPECT_NE(notebook_.events.back().episode_id, other.episode_id);
-}
-
 TEST_F(ValveMonitorTest, EvidenceRunsFromBeforeDetectionToTheEndWithoutHoles) {
   Feed(0, 100);
   Feed(100, 150, kF7Offset);

@@ -60,6 +60,13 @@ FaultTruth TruthOf(const storage::StoredSample& stored) {
   return truth;
 }
 
+int FaultOf(const storage::StoredRun& run) {
+  const auto first = std::find_if(
+      run.samples.begin(), run.samples.end(),
+      [](const storage::StoredSample& s) { return TruthOf(s).fault != 0; });
+  return first == run.samples.end() ? 0 : TruthOf(*first).fault;
+}
+
 SignalMask UsualSignals(const storage::StoredRun& run) {
   std::map<SignalMask, std::int64_t> counts;
   for (const storage::StoredSample& stored : run.samples) {

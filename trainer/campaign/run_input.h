@@ -19,6 +19,9 @@ bool HasTruth(const storage::StoredRun& run);
 /// The truth beside a sample; {0, 0} while no fault acts or none is known.
 FaultTruth TruthOf(const storage::StoredSample& stored);
 
+/// The first fault that acts in a run; 0: none does.
+int FaultOf(const storage::StoredRun& run);
+
 /// The signals that most accepted samples have: a transmitter that failed for a
 /// while costs those samples, not the signal.
 SignalMask UsualSignals(const storage::StoredRun& run);

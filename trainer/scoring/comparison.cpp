@@ -83,7 +83,7 @@ std::vector<std::string> DifferencesOf(const EvaluatedRun& a,
       {"detected", IsDetected(a) != IsDetected(b)},
       {"delay", a.indices.t_dt != b.indices.t_dt},
       {"isolation", a.indices.t_it != b.indices.t_it},
-      {"final set", Outcome(a) != Outcome(b)},
+      {"final set", FinalSet(a) != FinalSet(b)},
       {"wrong faults",
        a.indices.wrong_isolations != b.indices.wrong_isolations},
       {"false alarms", a.has_truth && FalseAlarms(a) != FalseAlarms(b)}};
@@ -151,7 +151,7 @@ Json SideJson(const EvaluatedRun& run) {
           {"r_fd", i.r_fd},
           {"episodes", i.episodes},
           {"wrong_isolations", i.wrong_isolations},
-          {"final_set", SetJson(Outcome(run))},
+          {"final_set", SetJson(FinalSet(run))},
           {"live_s", LiveSeconds(run)}};
 }
 

@@ -28,13 +28,13 @@ bool IsDetected(const EvaluatedRun& run) {
 }
 
 const Wording* AnswerWording(const EvaluatedRun& run) {
-  if (!IsDetected(run) && Outcome(run).empty()) {
+  if (!IsDetected(run) && FinalSet(run).empty()) {
     return nullptr;
   }
   return run.indices.fault != 0 ? &run.indices.wording : &run.last_wording;
 }
 
-const std::vector<int>& Outcome(const EvaluatedRun& run) {
+const std::vector<int>& FinalSet(const EvaluatedRun& run) {
   return run.indices.fault != 0 ? run.indices.final_set : run.last_set;
 }
 

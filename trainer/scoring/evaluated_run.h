@@ -38,7 +38,7 @@ bool IsDetected(const EvaluatedRun& run);
 const Wording* AnswerWording(const EvaluatedRun& run);
 
 /// The set that a run ended with: under the fault, or at all without one.
-const std::vector<int>& Outcome(const EvaluatedRun& run);
+const std::vector<int>& FinalSet(const EvaluatedRun& run);
 
 /// Answers of one certainty.
 struct AnswerCount {

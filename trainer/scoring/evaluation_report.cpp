@@ -79,7 +79,7 @@ Json RunJson(const EvaluatedRun& run) {
       {"detected", IsDetected(run)},
       {"t_dt", run.indices.t_dt},
       {"t_it", run.indices.t_it},
-      {"final_set", SetJson(Outcome(run))},
+      {"final_set", SetJson(FinalSet(run))},
       {"certainty",
        wording == nullptr ? Json() : Json(CertaintyName(wording->certainty))},
       {"episodes", run.indices.episodes},
