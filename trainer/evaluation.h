@@ -71,7 +71,7 @@ RunZones ZonesOf(const std::vector<Indication>& indications, double horizon_s);
 
 /// True if the engine says that no known fault explains the episode, or has
 /// nothing but findings of the floor: a name that it gave before counts no
-/// more. Older sets never take a name back.
+/// more. Sets without limits of a fit take none back (JudgesFit).
 bool IsWithdrawn(const ModelSet& models, const Verdict& verdict);
 
 /// The numbers of the faults in `set`, ascending. Findings of the floor are not

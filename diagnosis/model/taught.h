@@ -7,8 +7,8 @@
 namespace fdi {
 
 /// Ends the name of an observer that a label has taught ("f6 0.40 taught"):
-/// unlike the others of an onboarded valve, it has seen the fault there. Part
-/// of the stored name, so that older sets keep their bytes and hash.
+/// unlike the others of an onboarded valve, it has seen the fault there. It
+/// is part of the stored name.
 inline constexpr std::string_view kTaughtMark = " taught";
 
 inline bool IsTaught(const Observer& observer) {
