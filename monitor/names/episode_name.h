@@ -52,9 +52,9 @@ struct EpisodeNow {
 ///
 /// 1. a second look whose answer counts (simulator::LookBook);
 /// 2. the name that an earlier session gave: one by a look until a look of this
-///    session has an answer, or for ten minutes; then, like any other, until the
-///    observers name a fault, for which the floor is not enough; with a second
-///    fault on top, both until the first one is named by itself;
+///    session has an answer, or for ten minutes; then, like any other, until
+///    the observers name a fault, for which the floor is not enough; with a
+///    second fault on top, both until the first one is named by itself;
 /// 3. the observers, with their memory, and the floor until they have a name.
 ///
 /// The engine is an input and never changed: its transitions that name a fault

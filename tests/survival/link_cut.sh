@@ -70,6 +70,7 @@ supervise() {
 
 "$bin/fdi-trainer" train --campaign "$(dirname "$0")/quick.toml" \
   --activate >/dev/null
+: >"$out/codes.log"
 supervise &
 supervisor=$!
 ip netns exec "$far" "$bin/fdi-simulator" --interface 10.77.0.2 \
