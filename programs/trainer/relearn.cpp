@@ -422,11 +422,13 @@ report::Report ReportOf(const Relearning& learnt, const std::string& origin) {
     report.Line("not in runs.db: " + JoinText(learnt.labels.missing));
   }
   AddTables(learnt, report);
-  const auto& before = learnt.parent().floor;
-  if (before && learnt.models.floor && before != learnt.models.floor) {
+  const auto deviation = [](const ModelSet& models) {
+    return models.floor ? FormatNumber(models.floor->deviation, 1) : "";
+  };
+  if (deviation(learnt.parent()) != deviation(learnt.models)) {
     report.Line("floor: the rod may deviate from the command by " +
-                FormatNumber(learnt.models.floor->deviation, 1) +
-                " % instead of " + FormatNumber(before->deviation, 1) + " %");
+                deviation(learnt.models) + " % instead of " +
+                deviation(learnt.parent()) + " %");
   }
   if (IsOnboarded(learnt.models)) {
     report.Line(AlarmRateText(learnt.models));

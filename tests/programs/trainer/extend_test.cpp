@@ -95,9 +95,9 @@ TEST_F(ExtendTest, WhatIsGoneIsNamedAndNothingIsStored) {
 }
 
 TEST_F(ExtendTest, OtherSetsAndNoNewHoursAreRefused) {
-  EXPECT_EQ(Run("relearn V9 --models --file new.csv").code, 5);
   const std::string run = StoreRun();
   StoreSet({run});
+  EXPECT_EQ(Run("relearn V9 --models --file new.csv").code, 5);
   const Outcome nothing = Run("relearn V1 --models");
   EXPECT_EQ(nothing.code, 2);
   EXPECT_THAT(nothing.err, HasSubstr("--runs ID,... or --file CSV"));

@@ -318,14 +318,14 @@ TEST_F(AppLimitsTest, AFileNeedsTheSignalsOfTheValveAlone) {
   EXPECT_NEAR(set["hours"].get<double>(), 1.0, 0.05);
 }
 
-// f6 adds 20 to F at most: limits that let 25 pass hide it.
+// f3 and f6 add 20 to F at most: limits that let 25 pass hide them.
 TEST_F(AppLimitsTest, ASetThatIsWorseIsStoredAndNotInUse) {
   RecordAlarm("false", [](std::size_t k, Sample& sample) {
     sample.values[Index(Signal::kF)] += k >= 1800 && k < 3000 ? 25.0 : 0.0;
   });
   const Outcome worse = Run("relearn LV1");
   EXPECT_EQ(worse.code, 3);
-  EXPECT_THAT(worse.out, AllOf(HasSubstr("worse: it does not see f6"),
+  EXPECT_THAT(worse.out, AllOf(HasSubstr("worse: it does not see f3, f6 at"),
                                HasSubstr("LV1@2 is stored and not in use")));
   EXPECT_EQ(storage::ModelStore(Models()).AssignedModelSet("LV1")->version, 1);
 
