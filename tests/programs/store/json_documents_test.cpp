@@ -453,10 +453,12 @@ TEST_F(JsonDocumentsTest, SimulatorAndTrainerAreOnThePage) {
   EXPECT_THAT(page.complaints(), IsEmpty());
   // A set that learnt from labels has episodes, and taught observers where it
   // was onboarded; one of the preset `extended` has windows; limits are
-  // compared here without a label, and no fault shows at another strength.
+  // compared here without a label, and no fault shows at another strength. What
+  // changes no limit is not stored, so that there is no lineage.
   EXPECT_THAT(
       page.Unseen(called_, {"training_episode", "taught_observer", "window",
-                            "learnt_episode", "fault_visibility"}),
+                            "learnt_episode", "fault_visibility", "parent",
+                            "relearnt_set.lineage"}),
       IsEmpty());
 }
 
