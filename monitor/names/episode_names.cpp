@@ -6,48 +6,13 @@
 #include <iterator>
 #include <numeric>
 
-#include "simulator/second_look/taught_names.h"
-
 namespace fdi::monitor {
 namespace {
 
 // Smaller changes of a strength are not worth a row of the history.
 constexpr double kMinMove = 0.02;
 
-EpisodeName::Look LookOf(const simulator::LookAnswer& answer,
-                         const std::vector<int>& names,
-                         const ModelSet& models) {
-  EpisodeName::Look look;
-  look.outside = answer.outcome == simulator::LookOutcome::kNoneFits;
-  for (const simulator::Explanation& e : answer.faults) {
-    const int index = FaultIndex(models, e.fault);
-    if (index >= 0 && std::ranges::count(names, e.fault) > 0) {
-      look.faults.push_back(
-          {static_cast<std::size_t>(index), {e.strength, e.lowest, e.highest}});
-    }
-  }
-  return look;
-}
-
 }  // namespace
-
-std::optional<EpisodeName::Look> LookThatCounts(
-    const Verdict& engine, const ModelSet& models,
-    const simulator::LookAnswer* answer) {
-  const auto names = answer != nullptr
-                         ? simulator::NamesBeside(engine, models, *answer)
-                         : std::nullopt;
-  return names ? std::optional(LookOf(*answer, *names, models)) : std::nullopt;
-}
-
-std::optional<EpisodeName::Look> SecondThatCounts(
-    const Verdict& engine, const ModelSet& models,
-    const simulator::LookAnswer* answer) {
-  const auto names =
-      answer != nullptr ? simulator::NamesOf(*answer, engine.second.faults != 0)
-                        : std::nullopt;
-  return names ? std::optional(LookOf(*answer, *names, models)) : std::nullopt;
-}
 
 EpisodeNames::EpisodeNames(std::string valve_id,
                            std::shared_ptr<const ModelSet> models,
@@ -109,7 +74,7 @@ void EpisodeNames::StepLooks(const Sample& sample, const Verdict& engine,
 // An answer counts until the next one does, but is recorded once.
 std::optional<EpisodeName::Look> EpisodeNames::TakeAnswer(
     const Verdict& engine) {
-  const simulator::LookAnswer* answer = looks_->Answer();
+  const LookAnswer* answer = looks_->Answer();
   auto look = LookThatCounts(engine, *models_, answer);
   if (look && std::exchange(look_ns_, answer->stamp_ns) != answer->stamp_ns) {
     look_ = RecordOf(*answer);
@@ -157,8 +122,8 @@ bool EpisodeNames::HasMoved(const std::vector<StrengthPoint>& points) const {
 }
 
 // The rows, up to 27 kB, go to the worker; only what Enter() needs is kept.
-void EpisodeNames::RequestLook(simulator::LookTask task) {
-  simulator::LookTask key;
+void EpisodeNames::RequestLook(LookTask task) {
+  LookTask key;
   key.occasion = task.occasion;
   key.stamp_ns = task.stamp_ns;
   key.window.detection = task.window.detection;
@@ -207,8 +172,8 @@ void EpisodeNames::CollectGrowth() {
   while (!pending_growth_.empty() && pending_growth_.front().answer.wait_for(
                                          kNow) == future_status::ready) {
     const LookWorker::Answer answer = pending_growth_.front().answer.get();
-    if (answer && answer->outcome == simulator::LookOutcome::kNamed) {
-      for (const simulator::Explanation& e : answer->faults) {
+    if (answer && answer->outcome == LookOutcome::kNamed) {
+      for (const Explanation& e : answer->faults) {
         RecordStrength(e, pending_growth_.front().middle_ns);
       }
       // The next one begins where this one ended.
@@ -221,18 +186,18 @@ void EpisodeNames::CollectGrowth() {
 }
 
 // Of a look that gives a name. An early one does so by a few seconds of data.
-void EpisodeNames::RecordStrengths(const simulator::LookAnswer& answer) {
+void EpisodeNames::RecordStrengths(const LookAnswer& answer) {
   known_.clear();
-  if (answer.outcome != simulator::LookOutcome::kNamed) {
+  if (answer.outcome != LookOutcome::kNamed) {
     return;
   }
   known_ = answer.faults;
-  std::erase_if(known_, [this](const simulator::Explanation& e) {
+  std::erase_if(known_, [this](const Explanation& e) {
     return FaultIndex(*models_, e.fault) < 0;
   });
   const auto rows = static_cast<std::int64_t>(answer.simulated.size());
   const std::int64_t first_ns = answer.stamp_ns - (rows - 1) * PeriodNs();
-  for (const simulator::Explanation& e : known_) {
+  for (const Explanation& e : known_) {
     // A growing fault has its strength at the end of the window. Another one
     // has had it since it began, so the middle stands for it.
     const std::int64_t begins_ns =
@@ -244,8 +209,7 @@ void EpisodeNames::RecordStrengths(const simulator::LookAnswer& answer) {
   }
 }
 
-void EpisodeNames::RecordStrength(const simulator::Explanation& e,
-                                  std::int64_t stamp_ns) {
+void EpisodeNames::RecordStrength(const Explanation& e, std::int64_t stamp_ns) {
   StrengthPoint& point = strength_points_.emplace_back();
   point.stamp_ns = stamp_ns;
   point.fault = e.fault;
@@ -259,20 +223,20 @@ std::int64_t EpisodeNames::PeriodNs() const {
   return std::llround(models_->sample_period_s * 1e9);
 }
 
-EpisodeLook EpisodeNames::RecordOf(const simulator::LookAnswer& answer) const {
+EpisodeLook EpisodeNames::RecordOf(const LookAnswer& answer) const {
   EpisodeLook look;
   look.period_ns = PeriodNs();
   const auto rows = static_cast<std::int64_t>(answer.simulated.size());
   look.first_ns = answer.stamp_ns - (rows - 1) * look.period_ns;
   look.misfit = answer.misfit;
-  if (answer.outcome != simulator::LookOutcome::kNoneFits) {
-    for (const simulator::Explanation& e : answer.faults) {
+  if (answer.outcome != LookOutcome::kNoneFits) {
+    for (const Explanation& e : answer.faults) {
       const std::int64_t begins_ns = detection_ns_ + e.start * look.period_ns;
       look.faults.push_back({e.fault, e.strength, e.lowest, e.highest,
                              std::max(begins_ns, look.first_ns), e.growing});
     }
   }
-  for (const simulator::RecordAnswer& row : answer.simulated) {
+  for (const RecordAnswer& row : answer.simulated) {
     look.x_pct.push_back(row.x_pct);
     look.flow.push_back(row.flow);
   }

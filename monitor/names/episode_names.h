@@ -9,27 +9,14 @@
 #include <utility>
 #include <vector>
 
+#include "diagnosis/decision/episode_name.h"
+#include "diagnosis/decision/episode_strengths.h"
+#include "diagnosis/decision/valve_looks.h"
 #include "diagnosis/records/episode_look.h"
 #include "diagnosis/records/strength_point.h"
-#include "monitor/names/episode_name.h"
-#include "monitor/names/episode_strengths.h"
 #include "monitor/names/look_worker.h"
-#include "simulator/second_look/episode_looks.h"
 
 namespace fdi::monitor {
-
-/// What a look says beside the observers (simulator::NamesBeside()), in their
-/// order of likelihood. Faults that the set does not have cannot be recorded
-/// and stay out. @returns nothing where the look does not count.
-/// @param answer null: there is none.
-std::optional<EpisodeName::Look> LookThatCounts(
-    const Verdict& engine, const ModelSet& models,
-    const simulator::LookAnswer* answer);
-
-/// The same of what comes on top of the fault of the episode.
-std::optional<EpisodeName::Look> SecondThatCounts(
-    const Verdict& engine, const ModelSet& models,
-    const simulator::LookAnswer* answer);
 
 /// The episodes of one valve and what EpisodeName calls them: asks for second
 /// looks and for strengths when they are due, and gives it the answers. So what
@@ -85,7 +72,7 @@ class EpisodeNames {
  private:
   // A look that was asked for.
   struct PendingLook {
-    simulator::LookTask task;  // Without its rows.
+    LookTask task;  // Without its rows.
     std::future<LookWorker::Answer> answer;
   };
 
@@ -100,13 +87,13 @@ class EpisodeNames {
   std::optional<EpisodeName::Look> TakeAnswer(const Verdict& engine);
   void FollowStrengths(const Verdict& engine);
   bool HasMoved(const std::vector<StrengthPoint>& points) const;
-  void RequestLook(simulator::LookTask task);
+  void RequestLook(LookTask task);
   void CollectAnswers();
   void CollectGrowth();
-  void RecordStrengths(const simulator::LookAnswer& answer);
-  void RecordStrength(const simulator::Explanation& e, std::int64_t stamp_ns);
+  void RecordStrengths(const LookAnswer& answer);
+  void RecordStrength(const Explanation& e, std::int64_t stamp_ns);
   std::int64_t PeriodNs() const;
-  EpisodeLook RecordOf(const simulator::LookAnswer& answer) const;
+  EpisodeLook RecordOf(const LookAnswer& answer) const;
   void Reset();
   void ForgetEpisode();
 
@@ -116,14 +103,14 @@ class EpisodeNames {
   LookWorker* worker_;
   EpisodeName name_;
   EpisodeStrengths strengths_;
-  std::optional<simulator::ValveLooks> looks_;  // Made anew at an end.
+  std::optional<ValveLooks> looks_;  // Made anew at an end.
   std::deque<PendingLook> pending_looks_;
   std::int64_t detection_ns_{0};
   bool suspects_{false};
   // Of the open episode.
   std::int64_t look_ns_{0};  // Of the look that counts, its last row.
   std::optional<EpisodeLook> look_;
-  std::vector<simulator::Explanation> known_;  // What it is named after.
+  std::vector<Explanation> known_;  // What it is named after.
   std::deque<PendingGrowth> pending_growth_;
   std::vector<StrengthPoint> strength_points_;
 };

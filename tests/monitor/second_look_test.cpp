@@ -24,7 +24,6 @@ namespace {
 
 using simulator::Abrupt;
 using simulator::kLeadIn;
-using simulator::RecordRow;
 using std::chrono::seconds;
 using testing::ElementsAre;
 using testing::HasSubstr;
@@ -248,19 +247,18 @@ TEST_F(SecondLookTest, ALookForGrowthTellsTheStrengthAndChangesNoName) {
 
 // The worker takes it last, however early it was asked for.
 TEST_F(SecondLookTest, ALookForGrowthWaitsForTheOthersAndReplacesNone) {
-  const simulator::LookWindow window = simulator::Window({Abrupt(19, 0.25)});
-  const auto ask = [&](simulator::LookOccasion occasion) {
-    simulator::LookTask task;
+  const LookWindow window = simulator::Window({Abrupt(19, 0.25)});
+  const auto ask = [&](LookOccasion occasion) {
+    LookTask task;
     task.window = window;
     task.stamp_ns = kSecond * 1000;
     task.occasion = occasion;
-    simulator::Explanation f19;
+    Explanation f19;
     f19.fault = 19;
     f19.strength = 0.2;
     task.known = {f19};
     return worker_.Submit("V1", physics_, std::move(task));
   };
-  using simulator::LookOccasion;
   auto growth = ask(LookOccasion::kGrowth);
   auto again = ask(LookOccasion::kGrowth);
   auto naming = ask(LookOccasion::kEpisode);
@@ -455,7 +453,7 @@ TEST_F(SecondLookTest, ARoutineLookAsksForAnEpisodeAndNamesIt) {
 class LookWorkerTest : public SecondLookTest {
  protected:
   std::future<LookWorker::Answer> Submit(const std::string& valve) {
-    simulator::LookTask task;
+    LookTask task;
     task.window = simulator::Window({Abrupt(19, 0.25)});
     return worker_.Submit(valve, physics_, std::move(task));
   }

@@ -1,11 +1,12 @@
 #include "trainer/scoring/evaluate.h"
 
 #include "base/parallel_for.h"
+#include "diagnosis/decision/episode_name.h"
+#include "diagnosis/decision/look_answer.h"
+#include "diagnosis/decision/valve_looks.h"
 #include "diagnosis/model/fault_catalogue.h"
 #include "diagnosis/model/quality_count.h"
-#include "monitor/names/episode_names.h"
-#include "simulator/second_look/episode_looks.h"
-#include "simulator/second_look/valve_physics.h"
+#include "simulator/second_look/second_look.h"
 #include "trainer/campaign/run_input.h"
 #include "trainer/scoring/rescore.h"
 
@@ -19,14 +20,14 @@ class RunNames {
   explicit RunNames(const std::shared_ptr<const ModelSet>& models)
       : models_(models) {
     if (!models->physics.empty()) {
-      physics_ = simulator::PhysicsFrom(models->physics);
+      simulation_.emplace(*models);
     }
     BeginAnew();
   }
 
   void BeginAnew() {
-    if (physics_) {
-      looks_.emplace(*physics_, models_.get());
+    if (simulation_) {
+      looks_.emplace(*simulation_, models_.get());
     }
     name_.emplace(models_, std::make_shared<const SeverityCatalogue>());
   }
@@ -35,16 +36,15 @@ class RunNames {
   bool suspects() const { return looks_ && looks_->suspects(); }
 
   NamedVerdict Step(const Sample& sample, const Verdict& engine) {
-    monitor::EpisodeName::Inputs inputs{
+    EpisodeName::Inputs inputs{
         engine, engine.isolated, {}, looks_.has_value(), {}};
     if (looks_) {
       TakeLook(sample, engine);
       if (engine.detected && !OutOfOrder(engine.intake)) {
-        inputs.look =
-            monitor::LookThatCounts(engine, *models_, looks_->Answer());
+        inputs.look = LookThatCounts(engine, *models_, looks_->Answer());
         inputs.remembered = looks_->Observed(*models_, engine.isolated);
         inputs.on_top =
-            monitor::SecondThatCounts(engine, *models_, looks_->SecondAnswer());
+            SecondThatCounts(engine, *models_, looks_->SecondAnswer());
       }
     }
     const Verdict& named = name_->Step(inputs);
@@ -55,16 +55,16 @@ class RunNames {
  private:
   void TakeLook(const Sample& sample, const Verdict& engine) {
     if (const auto task = looks_->Step(sample, engine)) {
-      if (auto answer = simulator::TakeLook(*physics_, *task)) {
+      if (auto answer = fdi::TakeLook(*simulation_, *task)) {
         looks_->Enter(*task, std::move(*answer));
       }
     }
   }
 
   std::shared_ptr<const ModelSet> models_;
-  std::optional<simulator::ValvePhysics> physics_;
-  std::optional<simulator::ValveLooks> looks_;
-  std::optional<monitor::EpisodeName> name_;
+  std::optional<simulator::ValveLooker> simulation_;
+  std::optional<ValveLooks> looks_;
+  std::optional<EpisodeName> name_;
 };
 
 // The last second fault of the run, and its last name.

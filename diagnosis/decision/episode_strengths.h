@@ -9,7 +9,7 @@
 #include "diagnosis/model/verdict.h"
 #include "diagnosis/records/strength_point.h"
 
-namespace fdi::monitor {
+namespace fdi {
 
 /// What is due of the strengths of an open episode.
 enum class StrengthDue : std::uint8_t {
@@ -54,4 +54,4 @@ class EpisodeStrengths {
   std::vector<Track> tracks_{};
 };
 
-}  // namespace fdi::monitor
+}  // namespace fdi
