@@ -95,12 +95,16 @@ struct LookTask {
   std::int64_t detection_stamp_ns{0};  ///< Key of the episode, or of what
                                        ///< comes on top (kSecond).
   LookOccasion occasion{LookOccasion::kEpisode};
-  std::vector<Explanation> known{};  ///< Of kGrowth: EstimateStrengths().
+  std::vector<Explanation> known{};  ///< Of kGrowth.
   std::int64_t slowness{1};          ///< See SlownessOf().
   /// The flow has changed while nothing was read, just before the window.
   bool changed_unread{false};
   /// By how much the stamps of the valve were set back since the detection.
   std::int64_t set_back_ns{0};
+  /// Of kGrowth: the middle of the rows, and the last row of the look that
+  /// named `known`.
+  std::int64_t middle_ns{0};
+  std::int64_t named_ns{0};
 
   /// Of the episode, at the last row.
   std::int64_t age_ns() const {

@@ -1,12 +1,11 @@
-#include "monitor/names/episode_names.h"
+#include "diagnosis/decision/episode_names.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <iterator>
 #include <numeric>
 
-namespace fdi::monitor {
+namespace fdi {
 namespace {
 
 // Smaller changes of a strength are not worth a row of the history.
@@ -14,40 +13,40 @@ constexpr double kMinMove = 0.02;
 
 }  // namespace
 
-EpisodeNames::EpisodeNames(std::string valve_id,
-                           std::shared_ptr<const ModelSet> models,
-                           LookWorker::Physics physics, LookWorker* worker,
+EpisodeNames::EpisodeNames(std::shared_ptr<const ModelSet> models,
+                           std::shared_ptr<const LookSimulation> simulation,
                            std::shared_ptr<const SeverityCatalogue> severities)
-    : valve_id_(std::move(valve_id)),
-      models_(std::move(models)),
-      physics_(std::move(physics)),
-      worker_(worker),
+    : models_(std::move(models)),
+      simulation_(std::move(simulation)),
       name_(models_, std::move(severities)) {
   Reset();
 }
 
 const Verdict& EpisodeNames::Step(const Sample& sample, const Verdict& engine,
                                   bool held) {
+  held_ = held;
   for (const Transition& transition : engine.Transitions()) {
     detection_ns_ = transition.detection_stamp_ns;
     if (transition.kind == TransitionKind::kDetected) {
       ForgetEpisode();
     }
   }
+  open_ = engine.detected;
   EpisodeName::Inputs inputs{
-      engine, engine.isolated, {}, physics_ != nullptr, {}};
+      engine, engine.isolated, {}, simulation_ != nullptr, {}};
   const bool in_order = !OutOfOrder(engine.intake);
   if (looks_) {
-    StepLooks(sample, engine, held);
-    if (engine.detected && !held && in_order) {
+    StepLooks(sample, engine);
+    if (open_ && !held && in_order) {
       inputs.look = TakeAnswer(engine);
       inputs.remembered = looks_->Observed(*models_, engine.isolated);
       inputs.on_top =
           SecondThatCounts(engine, *models_, looks_->SecondAnswer());
     }
   }
+  overruled_ = inputs.look || inputs.remembered != engine.isolated;
   name_.Step(inputs);
-  if (!engine.detected) {
+  if (!open_) {
     ForgetEpisode();
   }
   if (in_order) {
@@ -58,17 +57,19 @@ const Verdict& EpisodeNames::Step(const Sample& sample, const Verdict& engine,
 
 // The looks see the verdict of the engine, not the name that counts: their own
 // answers would otherwise become what the observers say.
-void EpisodeNames::StepLooks(const Sample& sample, const Verdict& engine,
-                             bool held) {
+void EpisodeNames::StepLooks(const Sample& sample, const Verdict& engine) {
   auto due = looks_->Step(sample, engine);
-  if (due && !held) {
-    RequestLook(std::move(*due));
+  if (due && !held_) {
+    due_.push_back(std::move(*due));
   }
-  if (!OutOfOrder(engine.intake)) {
-    CollectAnswers();
-    CollectGrowth();
+}
+
+void EpisodeNames::Answer(const LookTask& task, LookAnswer answer) {
+  if (task.occasion == LookOccasion::kGrowth) {
+    AnswerGrowth(task, answer);
+  } else if (looks_) {
+    looks_->Enter(task, std::move(answer));
   }
-  suspects_ = looks_->suspects() && !held;
 }
 
 // An answer counts until the next one does, but is recorded once.
@@ -104,6 +105,7 @@ void EpisodeNames::FollowStrengths(const Verdict& engine) {
     }
   }
   name_.Follow(strength_points_);
+  told_ = std::exchange(strength_points_, {});
 }
 
 // Whether a fault of the name is not as strong any more as it is said to be.
@@ -121,37 +123,6 @@ bool EpisodeNames::HasMoved(const std::vector<StrengthPoint>& points) const {
   });
 }
 
-// The rows, up to 27 kB, go to the worker; only what Enter() needs is kept.
-void EpisodeNames::RequestLook(LookTask task) {
-  LookTask key;
-  key.occasion = task.occasion;
-  key.stamp_ns = task.stamp_ns;
-  key.window.detection = task.window.detection;
-  key.detection_stamp_ns = task.detection_stamp_ns;
-  key.set_back_ns = task.set_back_ns;
-  key.slowness = task.slowness;
-  pending_looks_.push_back(
-      {std::move(key), worker_->Submit(valve_id_, physics_, std::move(task))});
-}
-
-// No sample waits for a simulation: wait_for(0) only asks. LookBook compares
-// each look with the earlier ones; the worker takes the looks at an episode in
-// their order, but a routine look that was asked for before them may come after
-// them.
-void EpisodeNames::CollectAnswers() {
-  using std::future_status;
-  static constexpr std::chrono::seconds kNow{0};
-  std::erase_if(pending_looks_, [this](PendingLook& look) {
-    if (look.answer.wait_for(kNow) != future_status::ready) {
-      return false;
-    }
-    if (LookWorker::Answer answer = look.answer.get()) {
-      looks_->Enter(look.task, std::move(*answer));
-    }
-    return true;
-  });
-}
-
 void EpisodeNames::RequestGrowth() {
   if (known_.empty() || name_.verdict().second.open) {
     return;  // A strength that explains both faults is that of neither.
@@ -159,29 +130,24 @@ void EpisodeNames::RequestGrowth() {
   if (auto task = looks_->GrowthTask(known_)) {
     const auto rows = static_cast<std::int64_t>(task->window.rows.size());
     // The strength is fitted as constant over the rows.
-    const std::int64_t middle_ns = task->stamp_ns - (rows - 1) * PeriodNs() / 2;
-    pending_growth_.push_back(
-        {middle_ns, look_ns_,
-         worker_->Submit(valve_id_, physics_, std::move(*task))});
+    task->middle_ns = task->stamp_ns - (rows - 1) * PeriodNs() / 2;
+    task->named_ns = look_ns_;
+    due_.push_back(std::move(*task));
   }
 }
 
-void EpisodeNames::CollectGrowth() {
-  using std::future_status;
-  constexpr std::chrono::seconds kNow{0};
-  while (!pending_growth_.empty() && pending_growth_.front().answer.wait_for(
-                                         kNow) == future_status::ready) {
-    const LookWorker::Answer answer = pending_growth_.front().answer.get();
-    if (answer && answer->outcome == LookOutcome::kNamed) {
-      for (const Explanation& e : answer->faults) {
-        RecordStrength(e, pending_growth_.front().middle_ns);
-      }
-      // The next one begins where this one ended.
-      if (pending_growth_.front().look_ns == look_ns_) {
-        known_ = answer->faults;
-      }
-    }
-    pending_growth_.pop_front();
+void EpisodeNames::AnswerGrowth(const LookTask& task,
+                                const LookAnswer& answer) {
+  if (!open_ || task.detection_stamp_ns != detection_ns_ ||
+      answer.outcome != LookOutcome::kNamed) {
+    return;
+  }
+  for (const Explanation& e : answer.faults) {
+    RecordStrength(e, task.middle_ns);
+  }
+  // The next one begins where this one ended.
+  if (task.named_ns == look_ns_) {
+    known_ = answer.faults;
   }
 }
 
@@ -250,27 +216,24 @@ Transition EpisodeNames::End(Transition closed) {
 }
 
 // ValveLooks learns of an end from verdicts, and one from outside is in none.
-// Unlike those of std::async, the futures of promises do not block in their
-// destructors.
 void EpisodeNames::Reset() {
-  if (physics_) {
-    looks_.emplace(*physics_, models_.get());
+  if (simulation_) {
+    looks_.emplace(*simulation_, models_.get());
   }
-  suspects_ = false;
-  pending_looks_.clear();
+  open_ = false;
+  due_.clear();
   strengths_ = {};
   ForgetEpisode();
 }
 
-// pending_looks_ stays: ValveLooks ignores answers to an episode that has
-// ended, and routine looks go on. Answers for growth carry no episode and would
-// be recorded with the next one.
+// Looks that are due stay: ValveLooks ignores answers to an episode that has
+// ended, and routine looks go on.
 void EpisodeNames::ForgetEpisode() {
   look_ns_ = 0;
   look_.reset();
   known_.clear();
-  pending_growth_.clear();
   strength_points_.clear();
+  told_.clear();
 }
 
-}  // namespace fdi::monitor
+}  // namespace fdi
