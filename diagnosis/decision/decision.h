@@ -72,7 +72,7 @@ class Decision {
   const Verdict& verdict() const {
     return named_ != nullptr ? *named_ : engine_.verdict();
   }
-  /// What the engine said of the last sample, by itself.
+  /// The verdict of the engine on the last sample, by itself.
   const Verdict& engine() const { return engine_.verdict(); }
   const EpisodeNames& names() const { return *names_; }
   bool episode_open() const { return engine_.episode_open(); }

@@ -16,7 +16,7 @@ constexpr std::ptrdiff_t kMinMeasuredRows = 20;
 constexpr std::int64_t kRoutineNs = 300 * kNsPerSecond;
 constexpr std::ptrdiff_t kRoutineMeasured = 300;  // of its rows
 
-// Of a sample a second.
+// For a sample a second.
 std::int64_t AgeAfter(std::int64_t age_ns) {
   return age_ns < kFirstLookAge    ? kFirstLookAge
          : age_ns < kMiddleLookAge ? kMiddleLookAge
@@ -231,8 +231,8 @@ std::optional<LookTask> EpisodeLooks::SecondTask(const Verdict& verdict) {
 std::optional<LookTask> EpisodeLooks::Step(const Sample& sample,
                                            const Verdict& verdict,
                                            bool suspected) {
-  // Of any sample: the first one of a new source ends the episode even if it is
-  // rejected.
+  // Whatever the intake: the first sample of a new source ends the episode even
+  // if it is rejected.
   for (const Transition& transition : verdict.Transitions()) {
     if (transition.kind == TransitionKind::kDetected) {
       detection_ns_ = transition.detection_stamp_ns;

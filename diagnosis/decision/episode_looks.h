@@ -60,7 +60,7 @@ class EpisodeLooks {
   bool at_position_;
   SignalMask signals_{0};
   std::deque<Row> rows_{};
-  // Of the last time that the rows began anew: when, if nothing was read for
+  // About the last time that the rows began anew: when, if nothing was read for
   // five minutes or more before; the last stamp and FlowShare() before that.
   std::int64_t outage_end_ns_{0};
   std::int64_t before_ns_{0};
@@ -70,9 +70,9 @@ class EpisodeLooks {
   std::int64_t set_back_ns_{0};    // See LookTask.
   bool by_routine_{false};         // The open episode.
   std::int64_t second_ns_{0};      // Detection of what is on top.
-  std::int64_t second_age_ns_{0};  // Of the next look at it.
+  std::int64_t second_age_ns_{0};  // At which the next look at it is due.
   std::size_t judged_{0};  // Rows in a row that a routine look may hold.
-  std::int64_t slot_{0};   // Of a routine look.
+  std::int64_t slot_{0};   // Five minutes that the last sample was in.
 };
 
 }  // namespace fdi

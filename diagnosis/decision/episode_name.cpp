@@ -142,7 +142,7 @@ void EpisodeName::FollowLook(const Inputs& inputs) {
   }
 }
 
-// Of a name that is not the engine's, the engine knows nothing on top.
+// The engine knows nothing on top of a name that is not its own.
 // A look that counts is the better judge of what is on top: observers know each
 // fault by itself, the physics simulates both at once.
 void EpisodeName::FollowSecond(const Inputs& inputs) {
@@ -174,7 +174,7 @@ void EpisodeName::Begin() {
   named_ = inherited_ && inherited_->isolated;
 }
 
-// What came on top is on top of the name, whatever a look at both of them says.
+// A second fault is on top of the name, whatever a look at both of them says.
 EpisodeName::Choice EpisodeName::Choose(const Inputs& inputs) {
   const SecondFault& second = inputs.engine.second;
   if ((now_.faults & second.standing) != 0) {
@@ -227,7 +227,7 @@ bool EpisodeName::InheritedStands(const Inputs& inputs) const {
          TakesTwoForOne(observed);
 }
 
-// What came on top has to be found anew, and until then both faults together
+// A second fault has to be found anew, and until then both faults together
 // may look like either of them, at another strength, like a third one or none.
 bool EpisodeName::TakesTwoForOne(FaultSet faults) const {
   if (!inherited_ || !inherited_->second.open) {
@@ -263,8 +263,8 @@ void EpisodeName::Rename(const Choice& choice, const Inputs& inputs) {
   named_ = true;
 }
 
-// Of a new name: what the look found, what the earlier session knew, or else
-// what the observers estimate, likeliest first.
+// A new name has the strengths that the look found, what the earlier session
+// knew, or else what the observers estimate, likeliest first.
 void EpisodeName::Estimates(const Inputs& inputs) {
   now_.estimates.clear();
   if (now_.source == NameSource::kLook) {

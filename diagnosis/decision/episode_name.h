@@ -16,7 +16,7 @@
 
 namespace fdi {
 
-/// What gave an episode its name.
+/// Who gave an episode its name.
 enum class NameSource : std::uint8_t {
   kNone,       ///< It has no name.
   kFloor,      ///< Limits alone found it.
@@ -146,7 +146,7 @@ class EpisodeName {
   const Verdict* current_{&verdict_};
 };
 
-/// What a look says beside the observers (NamesBeside()), in their
+/// The faults that a look names beside the observers (NamesBeside()), in their
 /// order of likelihood. Faults that the set does not have cannot be recorded
 /// and stay out. @returns nothing where the look does not count.
 /// @param answer null: there is none.

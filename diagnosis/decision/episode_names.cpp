@@ -84,7 +84,7 @@ std::optional<EpisodeName::Look> EpisodeNames::TakeAnswer(
   return look;
 }
 
-// What is told of the strengths is stored: at its times, and where a fault has
+// Strengths are stored at their times, and where a fault has
 // moved since. Looks tell those of a name that is theirs.
 void EpisodeNames::FollowStrengths(const Verdict& engine) {
   const EpisodeNow& now = name_.now();
@@ -151,7 +151,7 @@ void EpisodeNames::AnswerGrowth(const LookTask& task,
   }
 }
 
-// Of a look that gives a name. An early one does so by a few seconds of data.
+// An early look gives a name by a few seconds of data, too little for a point.
 void EpisodeNames::RecordStrengths(const LookAnswer& answer) {
   known_.clear();
   if (answer.outcome != LookOutcome::kNamed) {

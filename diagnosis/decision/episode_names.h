@@ -14,9 +14,9 @@
 
 namespace fdi {
 
-/// What the episodes of one valve are called (EpisodeName) and how strong their
-/// faults are: says which looks are due, and takes their answers, which arrive
-/// between two samples, at once or many samples later.
+/// Names the episodes of one valve (EpisodeName) and follows how strong their
+/// faults are. It says which looks are due, and takes their answers, which
+/// arrive between two samples, at once or many samples later.
 class EpisodeNames {
  public:
   /// @param simulation null: no looks are taken.
@@ -97,10 +97,10 @@ class EpisodeNames {
   bool open_{false};
   bool held_{false};
   bool overruled_{false};
-  // Of the open episode.
-  std::int64_t look_ns_{0};  // Of the look that counts, its last row.
+  // About the open episode:
+  std::int64_t look_ns_{0};  // Last row of the look that counts.
   std::optional<EpisodeLook> look_;
-  std::vector<Explanation> known_;  // What it is named after.
+  std::vector<Explanation> known_;  // The faults that it is named after.
   std::vector<StrengthPoint> strength_points_;
   std::vector<StrengthPoint> told_;  // Those of the last Step().
 };

@@ -47,10 +47,10 @@ struct Explanation {
   int start{0};          ///< Row that the fault begins at; < 0: before.
   bool growing{false};   ///< From 0 at `start` to `strength` at the end.
   double distance{0.0};  ///< Behind the best explanation [2 log-likelihood].
-  double supply{1.0};    ///< Of what onboarding took for the supply pressure.
+  double supply{1.0};    ///< Supply pressure, as a share of the onboarded one.
 };
 
-/// What the physics of the valve says about a window.
+/// How each fault explains a window.
 struct SecondLook {
   /// All hypotheses, best first.
   std::vector<Explanation> ranked;
@@ -61,7 +61,7 @@ struct SecondLook {
   /// Mean square of the best explanation's errors in units of the healthy
   /// ones; far above 1 where none fits.
   double misfit{0.0};
-  double readings{0.0};  ///< Of X and F that count as independent.
+  double readings{0.0};  ///< Independent readings of X and F.
   /// Both pressures and the position were measured: the force on the rod and
   /// what drives the flow are known, and so is which of the two a fault
   /// changes.
@@ -76,7 +76,7 @@ struct StrengthLook {
   /// As they were asked for, with their strengths and intervals; empty if it
   /// was asked to stop.
   std::vector<Explanation> faults;
-  double misfit{0.0};  ///< Of the one that fits best, as in SecondLook.
+  double misfit{0.0};  ///< Least among them, as in SecondLook.
 };
 
 /// Why a look is due.
@@ -91,22 +91,22 @@ enum class LookOccasion : std::uint8_t {
 /// A look that is due: at what, and for which episode.
 struct LookTask {
   LookWindow window;
-  std::int64_t stamp_ns{0};            ///< Of the last row.
+  std::int64_t stamp_ns{0};            ///< Stamp of the last row.
   std::int64_t detection_stamp_ns{0};  ///< Key of the episode, or of what
                                        ///< comes on top (kSecond).
   LookOccasion occasion{LookOccasion::kEpisode};
-  std::vector<Explanation> known{};  ///< Of kGrowth.
+  std::vector<Explanation> known{};  ///< kGrowth only.
   std::int64_t slowness{1};          ///< See SlownessOf().
   /// The flow has changed while nothing was read, just before the window.
   bool changed_unread{false};
   /// By how much the stamps of the valve were set back since the detection.
   std::int64_t set_back_ns{0};
-  /// Of kGrowth: the middle of the rows, and the last row of the look that
+  /// kGrowth only: the middle of the rows, and the last row of the look that
   /// named `known`.
   std::int64_t middle_ns{0};
   std::int64_t named_ns{0};
 
-  /// Of the episode, at the last row.
+  /// Age of the episode at the last row.
   std::int64_t age_ns() const {
     return stamp_ns + set_back_ns - detection_stamp_ns;
   }
@@ -128,11 +128,11 @@ inline bool Explains(const std::vector<Explanation>& explanations, int fault) {
   return std::ranges::count(explanations, fault, &Explanation::fault) > 0;
 }
 
-/// What a second look makes of the name of an episode.
+/// How a second look answers.
 enum class LookOutcome : std::uint8_t {
   kNamed,     ///< The set stands: what the data do not separate is in it.
   kUnclear,   ///< More than four faults explain the window: a shortlist.
-  kNothing,   ///< So does no fault at all, or a constant shift.
+  kNothing,   ///< No fault, or a constant shift, explains it as well.
   kNoneFits,  ///< No hypothesis follows the record: outside what is known.
 };
 
@@ -153,21 +153,21 @@ struct LookAnswer {
   bool late{false};
   /// The valve's answer under the best explanation, a row each.
   std::vector<RecordAnswer> simulated;
-  std::int64_t stamp_ns{0};  ///< Of the last row.
+  std::int64_t stamp_ns{0};  ///< Stamp of the last row.
   /// Misfit without any fault, of a routine look alone.
   double without_fault{0.0};
 };
 
-/// What is usual of a valve while it is healthy.
+/// Readings of a valve while it is healthy.
 struct UsualValve {
-  double period_s{1.0};  ///< Of its samples, > 0.
-  double p1_kpa{0.0};    ///< What an input is taken for that is not measured.
+  double period_s{1.0};  ///< Between samples, > 0.
+  double p1_kpa{0.0};    ///< Stands in for an input that is not measured.
   double p2_kpa{0.0};
   double t1_degc{0.0};
   double coldest_degc{0.0};  ///< Temperatures that can be simulated.
   double hottest_degc{0.0};
   double flow{0.0};          ///< Mean [flow unit].
-  double slow_flow_sd{0.0};  ///< Of its means over ten minutes [flow unit].
+  double slow_flow_sd{0.0};  ///< Deviation of ten-minute means [flow unit].
 };
 
 /// A simulation of one valve, which is not known here. The same window has the
@@ -198,8 +198,8 @@ class LookSimulation {
                                  const std::vector<Explanation>& known,
                                  const std::stop_token& stop) const = 0;
 
-  /// Of the window without any fault, but for a constant shift of X or F: 0.6
-  /// to 1.2 of a healthy valve. A hundredth of the work of Look().
+  /// Misfit of the window without any fault, but for a constant shift of X or
+  /// F: 0.6 to 1.2 of a healthy valve. A hundredth of the work of Look().
   virtual double Misfit(const LookWindow& window) const = 0;
 
  private:

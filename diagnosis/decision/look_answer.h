@@ -13,7 +13,7 @@ namespace fdi {
 /// Largest distance behind the best explanation at which a fault stays in the
 /// set; see docs/method.md.
 inline constexpr double kLookMargin = 15.0;
-/// Of an early look at least this share of what the best gains over none: by
+/// An early look keeps at least this share of what the best gains over none: by
 /// so much the physics may be off, which a short window does not average out.
 inline constexpr double kEarlyLookShare = 0.1;
 /// A fault that gains less over none, per independent reading, may be what a

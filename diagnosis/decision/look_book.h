@@ -46,11 +46,12 @@ class LookBook {
   bool AcceptsLate(const LookAnswer& answer);
 
   std::vector<Entry> entries_;
-  std::vector<Explanation> doubt_;  // What the last look named instead.
+  std::vector<Explanation> doubt_;  // The other name that the last look gave.
 };
 
-/// What routine looks find. Two in a row that name the same fault make the
-/// valve suspect, until one finds that it follows its physics without a fault.
+/// Collects what routine looks find. Two in a row that name the same fault make
+/// the valve suspect, until one finds that it follows its physics without a
+/// fault.
 class Suspicion {
  public:
   void Enter(std::int64_t stamp_ns, LookAnswer answer);
@@ -58,14 +59,14 @@ class Suspicion {
   void Advance(std::int64_t stamp_ns);
   void Dismiss();
 
-  /// Of the look that made the valve suspect; null: it is not.
+  /// Answer of the look that made the valve suspect; null: it is not.
   const LookAnswer* found() const { return found_ ? &*found_ : nullptr; }
 
  private:
   void Take(LookAnswer answer);
 
   std::deque<std::pair<std::int64_t, LookAnswer>> waiting_;  // By stamp.
-  std::optional<LookAnswer> last_;  // Of the last look, if it named a fault.
+  std::optional<LookAnswer> last_;  // The last look, if it named a fault.
   std::optional<LookAnswer> found_;
 };
 

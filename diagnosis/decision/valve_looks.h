@@ -30,13 +30,14 @@ class ValveLooks {
   /// nothing.
   void Enter(const LookTask& task, LookAnswer answer);
 
-  /// What counts for the open episode at the last sample, if there is one.
+  /// The answer that counts for the open episode at the last sample, if there
+  /// is one.
   const LookAnswer* Answer() const;
   /// The same for what is on top of the fault of that episode.
   const LookAnswer* SecondAnswer() const;
 
-  /// What the observers name at the last sample, where the engine isolates
-  /// `isolated`: see ObserversMemory. Empty if that is more than
+  /// The faults that the observers name at the last sample, where the engine
+  /// isolates `isolated`: see ObserversMemory. Empty if that is more than
   /// kMaxNamedFaults.
   FaultSet Observed(const ModelSet& models, FaultSet isolated) const;
 
@@ -56,7 +57,7 @@ class ValveLooks {
   TrainedSignals trained_;
   std::int64_t period_ns_;
   LookBook book_;
-  LookBook second_book_;  // Of what is on top.
+  LookBook second_book_;  // About what is on top.
   Suspicion suspicion_;
   ObserversMemory memory_;
   std::int64_t stamp_ns_{0};
