@@ -37,20 +37,25 @@ EpisodeTracker::EpisodeTracker(std::string valve_id,
       options_(options),
       trace_(options.before_points, Ns(options.before_s)) {}
 
-const OpenEpisode* EpisodeTracker::Resumable(std::uint64_t source_id,
-                                             const ModelSet& models) const {
+bool EpisodeTracker::Resumes(std::uint64_t source_id,
+                             const ModelSet& models) const {
   return recovered_ && recovered_->source_id == source_id &&
-                 recovered_->model_hash == models.content_hash
+         recovered_->model_hash == models.content_hash;
+}
+
+const OpenEpisode* EpisodeTracker::Resumable(const Sample& sample,
+                                             const ModelSet& models) const {
+  return Resumes(sample.source_id, models) && !Expires(sample, models)
              ? &*recovered_
              : nullptr;
 }
 
 // TryRecovery() follows RecordGap(), which needs to know whether any sample
 // came before.
-void EpisodeTracker::Advance(const Sample& sample, const Verdict& engine,
+void EpisodeTracker::Advance(const Sample& sample, const Verdict& verdict,
                              const ModelSet& models, EpisodeOutlet& outlet) {
-  if (!OutOfOrder(engine.intake)) {
-    RecordGap(sample, engine, models, outlet);
+  if (!OutOfOrder(verdict.intake)) {
+    RecordGap(sample, verdict, models, outlet);
     TryRecovery(sample, models, outlet);
     source_id_ = sample.source_id;
     seq_ = sample.seq;
@@ -151,19 +156,28 @@ void EpisodeTracker::TryRecovery(const Sample& sample, const ModelSet& models,
                     "monitor_down"});
     }
   }
+  if (const std::optional<EndReason> reason = Expires(sample, models)) {
+    CloseRecovered(*reason, sample.stamp_ns, outlet);
+  }
+}
+
+// Why the next sample ends what was to be resumed, if it does.
+std::optional<EndReason> EpisodeTracker::Expires(const Sample& sample,
+                                                 const ModelSet& models) const {
   if (!recovered_) {
-    return;
+    return std::nullopt;
   }
   // The bits of its faults mean nothing in another model set. What the audit
   // found, it does not find again within that time.
   if (recovered_->model_hash != models.content_hash &&
       recovered_->layer != Layer::kAudit) {
-    CloseRecovered(EndReason::kModelChanged, sample.stamp_ns, outlet);
-  } else if (recovered_->model_hash != models.content_hash ||
-             recovered_->source_id != sample.source_id ||
-             sample.stamp_ns - first_stamp_ns_ > ResumeWindowNs(models)) {
-    CloseRecovered(EndReason::kUnknown, sample.stamp_ns, outlet);
+    return EndReason::kModelChanged;
   }
+  const std::int64_t first_ns = seen_ ? first_stamp_ns_ : sample.stamp_ns;
+  return !Resumes(sample.source_id, models) ||
+                 sample.stamp_ns - first_ns > ResumeWindowNs(models)
+             ? std::optional(EndReason::kUnknown)
+             : std::nullopt;
 }
 
 void EpisodeTracker::CloseRecovered(EndReason reason, std::int64_t stamp_ns,
@@ -202,7 +216,7 @@ bool EpisodeTracker::Begin(const Transition& transition, const Verdict& verdict,
                            const ModelSet& models, EpisodeOutlet& outlet) {
   open_ = Open{};
   open_->trace_until_ns = transition.stamp_ns + Ns(options_.after_detection_s);
-  if (Resumable(verdict.source_id, models) != nullptr) {
+  if (Resumes(verdict.source_id, models)) {
     const OpenEpisode episode = *std::exchange(recovered_, std::nullopt);
     open_->episode_id = episode.episode_id;
     open_->source_id = episode.source_id;

@@ -54,10 +54,9 @@ class EpisodeTracker {
   /// An earlier session left `episode` open. Before the first Step().
   void Recover(const OpenEpisode& episode) { recovered_ = episode; }
 
-  /// The next sample and what the engine with `models` said about it: the gap
-  /// before it, and whether recovering() may still go on. Comes before the
-  /// episode is named, which depends on that.
-  void Advance(const Sample& sample, const Verdict& engine,
+  /// The next sample and its verdict by `models`: the gap before it, and
+  /// whether recovering() may still go on.
+  void Advance(const Sample& sample, const Verdict& verdict,
                const ModelSet& models, EpisodeOutlet& outlet);
 
   /// The same sample, and the verdict with the name that counts.
@@ -93,9 +92,9 @@ class EpisodeTracker {
   const OpenEpisode* recovering() const {
     return recovered_ ? &*recovered_ : nullptr;
   }
-  /// The episode that a detection of this source with these models resumes;
-  /// null: it begins a new one.
-  const OpenEpisode* Resumable(std::uint64_t source_id,
+  /// The episode that a detection at `sample`, the next one, with these models
+  /// resumes; null: it begins a new one.
+  const OpenEpisode* Resumable(const Sample& sample,
                                const ModelSet& models) const;
   std::size_t trace_bytes() const { return trace_.bytes(); }
   /// The instants are evidence of an open episode.
@@ -116,6 +115,9 @@ class EpisodeTracker {
                  const ModelSet& models, EpisodeOutlet& outlet);
   void TryRecovery(const Sample& sample, const ModelSet& models,
                    EpisodeOutlet& outlet);
+  std::optional<EndReason> Expires(const Sample& sample,
+                                   const ModelSet& models) const;
+  bool Resumes(std::uint64_t source_id, const ModelSet& models) const;
   void CloseRecovered(EndReason reason, std::int64_t stamp_ns,
                       EpisodeOutlet& outlet);
   FaultEvent EndOf(const OpenEpisode& episode, EndReason reason,

@@ -32,13 +32,13 @@ ValveMonitor::ValveMonitor(const std::string& id,
       models_(ModelsOf(parts)),
       required_(parts ? parts->plan->required() : 0),
       looks_(looks),
+      pending_(id, looks),
       severities_(std::move(severities)),
       tracker_(id, options),
       judge_(id_, audits, severities_) {
   if (parts) {
-    engine_.emplace(*parts);
+    decision_.emplace(*parts, Physics(), severities_);
   }
-  NameEpisodes();
 }
 
 void ValveMonitor::Recover(const OpenEpisode& episode) {
@@ -52,21 +52,16 @@ void ValveMonitor::Recover(EpisodeTracker tracker) {
   normal_by_audit_ = open != nullptr && open->layer == Layer::kAudit;
 }
 
-void ValveMonitor::NameEpisodes() {
-  LookWorker::Physics physics;
-  if (looks_ != nullptr && models_ != nullptr) {
-    physics = looks_->PhysicsOf(*models_);
-  }
-  names_ = engine_ ? std::make_unique<EpisodeNames>(
-                         id_, models_, std::move(physics), looks_, severities_)
-                   : nullptr;
+LookWorker::Physics ValveMonitor::Physics() const {
+  return looks_ != nullptr && models_ != nullptr ? looks_->PhysicsOf(*models_)
+                                                 : nullptr;
 }
 
 bool ValveMonitor::RestartsEngine(const Sample& sample) const {
   const std::int64_t moved = sample.stamp_ns - stamp_ns_;
   const std::int64_t longest =
-      engine_ ? std::llround(kStalePeriods * models_->sample_period_s * 1e9)
-              : kMaxPeriodNs;
+      decision_ ? std::llround(kStalePeriods * models_->sample_period_s * 1e9)
+                : kMaxPeriodNs;
   return sample.source_id != source_id_ || sample.epoch != epoch_ ||
          moved <= 0 || moved > longest;
 }
@@ -103,23 +98,21 @@ ValveOutcome ValveMonitor::Step(const Sample& sample, std::uint64_t writer,
   stale_ = false;
   ended_ = false;
   const bool swapped = std::exchange(swapped_, false);
-  if (!engine_) {
+  if (!decision_) {
     return StepLoop(sample, writer, swapped, outlet);
   }
   RestoreOnce(sample.source_id);
-  const bool was_open = engine_->episode_open();
-  const Verdict& engine = engine_->Step(sample);
-  tracker_.Advance(sample, engine, *models_, outlet);
+  for (auto& [task, answer] : pending_.Collect()) {
+    decision_->Answer(task, std::move(answer));
+  }
   // An episode that this sample opens has the old name only if it resumes that
   // episode.
-  if (!was_open) {
-    names_->Inherit(tracker_.Resumable(sample.source_id, *models_));
+  if (!decision_->episode_open()) {
+    decision_->Inherit(tracker_.Resumable(sample, *models_));
   }
-  const Verdict& verdict = names_->Step(sample, engine, isolation_held_);
-  // From the next sample on; the verdict on this one stands.
-  engine_->Suspect(names_->suspects());
-  engine_->TakeName(names_->beside());
-  answer_ = &verdict;
+  const Verdict& verdict = decision_->Step(sample);
+  pending_.Request(decision_->TakeDue(), decision_->simulation());
+  tracker_.Advance(sample, verdict, *models_, outlet);
   if (CountsAsTime(verdict)) {
     RecordPosition(sample);
     coverage_.Add(sample.stamp_ns, verdict.quality, 1,
@@ -136,8 +129,8 @@ ValveOutcome ValveMonitor::Step(const Sample& sample, std::uint64_t writer,
   if (!judge_.watch().episode_open() || !tracker_.tracing()) {
     tracker_.Step(sample, verdict, models_, outlet);
   }
-  tracker_.Take(names_->TakeLook(), outlet);
-  tracker_.Take(names_->TakeStrengths(), outlet);
+  tracker_.Take(decision_->TakeLook(), outlet);
+  tracker_.Take(decision_->TakeStrengths(), outlet);
   ConfirmNormal(verdict, outlet);
   const auto missing = static_cast<SignalMask>(required_ & ~sample.present);
   return {verdict, models_.get(), swapped, missing, period_s()};
@@ -149,7 +142,6 @@ ValveOutcome ValveMonitor::StepLoop(const Sample& sample, std::uint64_t writer,
   MeasurePeriod(sample.stamp_ns);
   const Verdict& verdict = judge_.Step(sample, period_s());
   const LoopWatch& watch = judge_.watch();
-  answer_ = &verdict;
   swapped = swapped || models_ != watch.models();
   models_ = watch.models();
   if (!CountsAsTime(verdict)) {
@@ -229,29 +221,29 @@ void ValveMonitor::ConfirmNormal(const Verdict& verdict,
 
 void ValveMonitor::RestoreOnce(std::uint64_t source_id) {
   if (saved_ && saved_->source_id == source_id) {
-    engine_->Restore(saved_->bytes);
+    decision_->Restore(saved_->bytes);
   }
   saved_.reset();
 }
 
 void ValveMonitor::HoldIsolation(bool hold) {
   isolation_held_ = hold;
-  if (engine_) {
-    engine_->HoldIsolation(hold);
+  if (decision_) {
+    decision_->HoldIsolation(hold);
   }
 }
 
 void ValveMonitor::TakeCheckpoint(Checkpoint& checkpoint) {
   coverage_.DrainInto(id_, period_s(), checkpoint.coverage);
-  if (engine_ && seen_ && !stale_ && !ended_) {
+  if (decision_ && seen_ && !stale_ && !ended_) {
     checkpoint.accumulators.push_back(
-        {id_, source_id_, models_->content_hash, stamp_ns_, engine_->Save()});
+        {id_, source_id_, models_->content_hash, stamp_ns_, decision_->Save()});
   }
 }
 
 double ValveMonitor::period_s() const {
-  return engine_ ? models_->sample_period_s
-                 : static_cast<double>(unassigned_period_ns_) / 1e9;
+  return decision_ ? models_->sample_period_s
+                   : static_cast<double>(unassigned_period_ns_) / 1e9;
 }
 
 bool ValveMonitor::EndStream(std::uint64_t writer, EpisodeOutlet& outlet) {
@@ -269,38 +261,36 @@ bool ValveMonitor::Adopt(const std::optional<EngineParts>& parts,
                          EpisodeOutlet& outlet) {
   std::shared_ptr<const ModelSet> models = ModelsOf(parts);
   // A hash of 0 identifies nothing: the set does not come from a store.
-  if ((!models && !engine_) || (models && models == models_) ||
+  if ((!models && !decision_) || (models && models == models_) ||
       (models && models_ && models->content_hash != 0 &&
        models->content_hash == models_->content_hash)) {
     return false;
   }
-  if (parts && engine_) {
-    const std::optional<Transition> closed = engine_->Adopt(*parts);
+  // The old set has to last until the end of its episode is recorded with it.
+  const std::shared_ptr<const ModelSet> old =
+      std::exchange(models_, std::move(models));
+  const auto end = [&](const std::optional<Transition>& closed) {
     if (closed) {
-      End(*closed, outlet);
+      tracker_.End(*closed, old, outlet);
     }
+  };
+  if (parts && decision_) {
+    end(decision_->Adopt(*parts, Physics()));
   } else if (parts) {
     if (!judge_.beside_models()) {  // Else what the audit has found goes on.
       CloseAudit(EndReason::kModelChanged, outlet);
     }
-    engine_.emplace(*parts);
-    engine_->HoldIsolation(isolation_held_);
+    decision_.emplace(*parts, Physics(), severities_);
+    decision_->HoldIsolation(isolation_held_);
   } else {
-    if (const auto closed = engine_->EndEpisode(EndReason::kModelChanged)) {
-      End(*closed, outlet);
-    }
-    engine_.reset();
+    end(decision_->End(EndReason::kModelChanged));
+    decision_.reset();
     // The period is measured anew, beginning with that of the old set.
-    unassigned_period_ns_ = std::llround(models_->sample_period_s * 1e9);
+    unassigned_period_ns_ = std::llround(old->sample_period_s * 1e9);
     unassigned_interval_ns_.reset();
     stamp_ns_ = 0;
   }
-  // The old set has to last until here: the end of the episode is recorded with
-  // it. answer_ may point into names_, which is replaced.
-  models_ = std::move(models);
-  answer_ = nullptr;
-  // By models_, which has to be the new set here.
-  NameEpisodes();
+  pending_.Clear();
   required_ = parts ? parts->plan->required() : SignalMask{0};
   swapped_ = true;
   return true;
@@ -346,7 +336,7 @@ void ValveMonitor::CheckTimeout(TimePoint now,
 // For a valve that sends, the time of its samples decides instead:
 // EpisodeTracker::TryRecovery().
 void ValveMonitor::ExpireRecovery(std::int64_t now_ns, EpisodeOutlet& outlet) {
-  if (!seen_ || stale_ || ended_ || !engine_) {
+  if (!seen_ || stale_ || ended_ || !decision_) {
     tracker_.ExpireRecovery(now_ns, outlet);
   }
 }
@@ -354,12 +344,9 @@ void ValveMonitor::ExpireRecovery(std::int64_t now_ns, EpisodeOutlet& outlet) {
 void ValveMonitor::Close(EndReason reason, EpisodeOutlet& outlet) {
   normal_samples_ = 0;
   CloseAudit(reason, outlet);
-  const std::optional<Transition> closed =
-      engine_ ? engine_->EndEpisode(reason) : std::nullopt;
-  // It may be the verdict of names_, which still shows the episode.
-  answer_ = nullptr;
-  if (closed) {
-    End(*closed, outlet);
+  if (const auto closed = decision_ ? decision_->End(reason) : std::nullopt) {
+    pending_.Clear();
+    tracker_.End(*closed, models_, outlet);
   }
 }
 
@@ -368,10 +355,6 @@ void ValveMonitor::CloseAudit(EndReason reason, EpisodeOutlet& outlet) {
     normal_by_audit_ = reason != EndReason::kSuperseded;
     tracker_.End(*closed, judge_.watch().models(), outlet);
   }
-}
-
-void ValveMonitor::End(const Transition& closed, EpisodeOutlet& outlet) {
-  tracker_.End(names_ ? names_->End(closed) : closed, models_, outlet);
 }
 
 }  // namespace fdi::monitor

@@ -8,16 +8,16 @@
 #include <utility>
 #include <vector>
 
-#include "diagnosis/decision/valve_engine.h"
+#include "diagnosis/decision/decision.h"
 #include "monitor/checkpoint.h"
 #include "monitor/episode_tracker.h"
-#include "monitor/names/episode_names.h"
 #include "monitor/names/loop_judge.h"
+#include "monitor/names/pending_looks.h"
 #include "monitor/sinks.h"
 
 namespace fdi::monitor {
 
-/// One valve of the plant: its engine, its episodes and their names, its clock.
+/// One valve of the plant: the decision on it, its episodes, its clock.
 /// A valve without a model set is judged by the audit of its loop (LoopJudge),
 /// with the set of AuditModels(); until it is, its quality is UNASSIGNED.
 /// Of a valve with one the audit tells, if it is to (AuditWorker), while the
@@ -105,14 +105,12 @@ class ValveMonitor {
   bool seen() const { return seen_; }
   /// The verdict on the last sample.
   const Verdict& verdict() const {
-    return answer_   ? *answer_
-           : engine_ ? engine_->verdict()
-                     : judge_.watch().verdict();
+    return decision_ ? decision_->verdict() : judge_.watch().verdict();
   }
   bool stale() const { return stale_; }
   bool ended() const { return ended_; }
   bool episode_open() const {
-    return (engine_ && engine_->episode_open()) ||
+    return (decision_ && decision_->episode_open()) ||
            judge_.watch().episode_open();
   }
   /// An episode of an earlier session may go on here.
@@ -132,20 +130,18 @@ class ValveMonitor {
   void MeasurePeriod(std::int64_t stamp_ns);
   void Close(EndReason reason, EpisodeOutlet& outlet);
   void CloseAudit(EndReason reason, EpisodeOutlet& outlet);
-  void End(const Transition& closed, EpisodeOutlet& outlet);
-  void NameEpisodes();
+  LookWorker::Physics Physics() const;
   void ConfirmNormal(const Verdict& verdict, EpisodeOutlet& outlet);
   void RestoreOnce(std::uint64_t source_id);
   double period_s() const;
 
   std::string id_;
   std::shared_ptr<const ModelSet> models_;
-  SignalMask required_{0};  // By models_.
-  std::optional<ValveEngine> engine_;
+  SignalMask required_{0};            // By models_.
+  std::optional<Decision> decision_;  // Nothing: no model set.
   LookWorker* looks_;
+  PendingLooks pending_;
   std::shared_ptr<const SeverityCatalogue> severities_;
-  std::unique_ptr<EpisodeNames> names_;  // Null: no model set.
-  const Verdict* answer_{nullptr};       // On the last sample.
   EpisodeTracker tracker_;
   LoopJudge judge_;
   CoverageBook coverage_;

@@ -9,6 +9,7 @@
 #include <variant>
 #include <vector>
 
+#include "diagnosis/model/record_row.h"
 #include "diagnosis/model/sample.h"
 
 namespace fdi::simulator {
@@ -23,15 +24,6 @@ struct ProcessInputs {
   double inlet_pressure_pa{0.0};
   double outlet_pressure_pa{0.0};
   double temperature_c{0.0};
-};
-
-/// One instant of a recorded excitation, in the units of Sample.
-struct InputRow {
-  double cv_pct;
-  double p1_kpa;
-  double p2_kpa;
-  double t1_degc;
-  ValveMode mode{ValveMode::kAuto};  ///< Of the sample.
 };
 
 /// A first-order autoregressive disturbance: stationary standard deviation and

@@ -2,22 +2,12 @@
 
 #include <vector>
 
+#include "diagnosis/model/record_row.h"
 #include "simulator/excitation.h"
 #include "simulator/fault_effects.h"
 #include "simulator/valve_parameters.h"
 
 namespace fdi::simulator {
-
-/// One instant of a plant record: inputs and response of the valve.
-struct RecordRow {
-  InputRow input;
-  double x_pct;
-  double flow;  ///< In the flow unit of the parameter set.
-  /// False for filled-in values, which drive the valve but do not count in
-  /// fits.
-  bool x_measured{true};
-  bool flow_measured{true};
-};
 
 /// How the inputs of a record act between its rows.
 struct RecordDrive {
@@ -38,12 +28,6 @@ double DelayedCommand(const std::vector<RecordRow>& record, std::size_t k,
 /// Seconds that a row is simulated for. A valve settles within ten: longer ones
 /// change nothing at their ends but what the simulation costs.
 double SimulatedPeriod(double period_s);
-
-/// Response of the simulated valve in one row.
-struct RecordAnswer {
-  double x_pct;
-  double flow;
-};
 
 /// Differences simulation - record over some rows.
 struct RecordFit {

@@ -5,10 +5,10 @@
 #include <string>
 #include <vector>
 
+#include "diagnosis/decision/certainty.h"
 #include "diagnosis/decision/engine_plan.h"
 #include "diagnosis/model/model_set.h"
 #include "diagnosis/model/verdict.h"
-#include "diagnosis/records/certainty.h"
 #include "trainer/dataset.h"
 
 namespace fdi::trainer {

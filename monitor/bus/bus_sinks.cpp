@@ -4,8 +4,8 @@
 #include <utility>
 
 #include "base/log.h"
+#include "diagnosis/decision/certainty.h"
 #include "diagnosis/model/fault_catalogue.h"
-#include "diagnosis/records/certainty.h"
 #include "storage/models/models.h"
 
 namespace fdi::monitor {

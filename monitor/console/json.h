@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "diagnosis/records/certainty.h"
+#include "diagnosis/decision/certainty.h"
 #include "monitor/console/live_board.h"
 #include "report/fault_texts.h"
 #include "report/json_output.h"

@@ -8,7 +8,7 @@
 
 #include "base/mutex.h"
 #include "base/time_units.h"
-#include "diagnosis/records/certainty.h"
+#include "diagnosis/decision/certainty.h"
 #include "monitor/trace.h"
 
 namespace fdi::console {

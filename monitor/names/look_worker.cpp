@@ -8,6 +8,8 @@
 #include <unistd.h>
 
 #include "base/printable.h"
+#include "diagnosis/decision/look_answer.h"
+#include "simulator/second_look/second_look.h"
 
 namespace fdi::monitor {
 
@@ -22,8 +24,7 @@ LookWorker::Physics LookWorker::PhysicsOf(const ModelSet& models) const {
     return nullptr;
   }
   try {
-    return std::make_shared<const simulator::ValvePhysics>(
-        simulator::PhysicsFrom(models.physics));
+    return std::make_shared<const simulator::ValveLooker>(models);
   } catch (const std::exception& error) {
     report_(LookFate::kFailed,
             "model_set=" + models.name + "@" + std::to_string(models.version),
@@ -34,11 +35,10 @@ LookWorker::Physics LookWorker::PhysicsOf(const ModelSet& models) const {
 
 std::future<LookWorker::Answer> LookWorker::Submit(std::string valve_id,
                                                    Physics physics,
-                                                   simulator::LookTask task) {
+                                                   LookTask task) {
   Look look{std::move(valve_id), std::move(physics), std::move(task)};
   std::future<Answer> answer = look.answer.get_future();
   const MutexLock lock(mutex_);
-  using simulator::LookOccasion;
   const bool naming = look.task.occasion == LookOccasion::kEpisode ||
                       look.task.occasion == LookOccasion::kSecond;
   const bool growth = look.task.occasion == LookOccasion::kGrowth;
@@ -104,7 +104,7 @@ void LookWorker::TakeLooks() {
 
 LookWorker::Answer LookWorker::Take(const Look& look) const {
   try {
-    return simulator::TakeLook(*look.physics, look.task, stop_.get_token());
+    return TakeLook(*look.physics, look.task, stop_.get_token());
   } catch (const std::exception& error) {
     report_(LookFate::kFailed, "valve=" + LogValue(look.valve_id),
             error.what());

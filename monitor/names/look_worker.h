@@ -15,8 +15,8 @@
 
 #include "base/mutex.h"
 #include "base/worker.h"
+#include "diagnosis/decision/look.h"
 #include "diagnosis/model/model_set.h"
-#include "simulator/second_look/episode_looks.h"
 
 namespace fdi::monitor {
 
@@ -37,9 +37,9 @@ using LookReport = std::function<void(LookFate, const std::string& whose,
 /// Built idle. Thread safe, but for Start() and Stop().
 class LookWorker {
  public:
-  using Physics = std::shared_ptr<const simulator::ValvePhysics>;
+  using Physics = std::shared_ptr<const LookSimulation>;
   /// Nothing: the look was dropped, replaced or failed.
-  using Answer = std::optional<simulator::LookAnswer>;
+  using Answer = std::optional<LookAnswer>;
 
   explicit LookWorker(LookReport report, std::size_t capacity = 64)
       : report_(std::move(report)), capacity_(capacity) {}
@@ -54,7 +54,7 @@ class LookWorker {
   /// Asks for a look. Unless it is for growth, it replaces one at the same
   /// valve that still waits.
   std::future<Answer> Submit(std::string valve_id, Physics physics,
-                             simulator::LookTask task);
+                             LookTask task);
 
   void Start();
   /// Ends the thread, at once between two hypotheses; what waits is given up.
@@ -71,7 +71,7 @@ class LookWorker {
   struct Look {
     std::string valve_id;
     Physics physics;
-    simulator::LookTask task;
+    LookTask task;
     std::promise<Answer> answer{};
   };
 

@@ -7,8 +7,8 @@
 #include "base/log.h"
 #include "base/text.h"
 #include "base/time_text.h"
+#include "diagnosis/decision/certainty.h"
 #include "diagnosis/model/fault_catalogue.h"
-#include "diagnosis/records/certainty.h"
 #include "storage/history/episode.h"
 
 namespace fdi::monitor {

@@ -4,8 +4,8 @@
 
 #include "base/text.h"
 #include "base/time_text.h"
+#include "diagnosis/decision/certainty.h"
 #include "diagnosis/model/fault_catalogue.h"
-#include "diagnosis/records/certainty.h"
 #include "monitor/console/model_facts.h"
 #include "report/text_table.h"
 #include "storage/history/episode.h"

@@ -914,4 +914,44 @@ double MisfitWithoutFault(const ValvePhysics& physics,
   return Looker(physics, window).MisfitOfHealthy();
 }
 
+namespace {
+
+UsualValve UsualOf(const ValvePhysics& physics) {
+  const bool is_water = physics.parameters.medium.fluid == Fluid::kWater;
+  UsualValve usual;
+  usual.period_s = physics.drive.period_s;
+  usual.p1_kpa = physics.p1.mean;
+  usual.p2_kpa = physics.p2.mean;
+  usual.t1_degc = physics.t1.mean;
+  usual.coldest_degc = is_water ? 0.0 : kColdestMediumC;
+  usual.hottest_degc = is_water ? kMaxTemperatureC : kHottestMediumC;
+  usual.flow = physics.flow_mean;
+  usual.slow_flow_sd = physics.flow.slow_sd;
+  return usual;
+}
+
+}  // namespace
+
+ValveLooker::ValveLooker(const ValvePhysics& physics)
+    : LookSimulation(UsualOf(physics)), physics_(physics) {}
+
+double ValveLooker::HealthyFlow(const InputRow& input, double x_pct) const {
+  return FlowReading(physics_.parameters, {}, input, x_pct);
+}
+
+SecondLook ValveLooker::Look(const LookWindow& window,
+                             const std::stop_token& stop) const {
+  return RunSecondLook(physics_, window, stop);
+}
+
+StrengthLook ValveLooker::Strengths(const LookWindow& window,
+                                    const std::vector<Explanation>& known,
+                                    const std::stop_token& stop) const {
+  return EstimateStrengths(physics_, window, known, stop);
+}
+
+double ValveLooker::Misfit(const LookWindow& window) const {
+  return MisfitWithoutFault(physics_, window);
+}
+
 }  // namespace fdi::simulator

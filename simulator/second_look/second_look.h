@@ -1,62 +1,12 @@
 #pragma once
 
-#include <cstddef>
-#include <optional>
 #include <stop_token>
 #include <vector>
 
-#include "diagnosis/model/sample.h"
+#include "diagnosis/decision/look.h"
 #include "simulator/second_look/valve_physics.h"
 
 namespace fdi::simulator {
-
-/// Recorded rows about an episode, one period apart.
-struct LookWindow {
-  std::vector<RecordRow> rows;  ///< At least 20, with X or F measured in 20.
-  std::size_t detection{0};     ///< Row of the first abnormal sample; 0 if it
-                                ///< lies before the window.
-  SignalMask signals{0};        ///< That were measured.
-  /// A fault that acts all the time: what is sought comes on top of it. 0:
-  /// none.
-  int standing{0};
-  double standing_strength{0.0};  ///< Signed [-].
-  /// The command of the rows is the position that was read
-  /// (PositionAsCommand): faults of which only the rod's way to it tells are no
-  /// hypotheses.
-  bool at_position{false};
-};
-
-/// How one fault, at its best, explains the window.
-struct Explanation {
-  int fault{0};          ///< 0: none, but for a constant shift of X or F.
-  double strength{0.0};  ///< Most likely; signed [-].
-  double lowest{0.0};    ///< Ends of its 95 % interval [-].
-  double highest{0.0};   ///<
-  int start{0};          ///< Row that the fault begins at; < 0: before.
-  bool growing{false};   ///< From 0 at `start` to `strength` at the end.
-  double distance{0.0};  ///< Behind the best explanation [2 log-likelihood].
-  double supply{1.0};    ///< Of what onboarding took for the supply pressure.
-};
-
-/// What the physics of the valve says about a window.
-struct SecondLook {
-  /// All hypotheses, best first.
-  std::vector<Explanation> ranked;
-  /// f10 with the supply pressure that suits it best, where f16 is the best
-  /// explanation: a healthy record does not tell that pressure, which decides
-  /// between the two.
-  std::optional<Explanation> perforation{};
-  /// Mean square of the best explanation's errors in units of the healthy
-  /// ones; far above 1 where none fits.
-  double misfit{0.0};
-  double readings{0.0};  ///< Of X and F that count as independent.
-  /// Both pressures and the position were measured: the force on the rod and
-  /// what drives the flow are known, and so is which of the two a fault
-  /// changes.
-  bool complete{true};
-  /// The valve's answer under the best explanation, one per row.
-  std::vector<RecordAnswer> best;
-};
 
 /// Simulates the valve over the window with every fault of the catalogue that
 /// moves X, F or an input (f8 and f14 do not), in each direction, abrupt or
@@ -81,13 +31,7 @@ SecondLook RunSecondLook(const ValvePhysics& physics, const LookWindow& window,
 /// The strengths of faults that are known, over a window that they act in all
 /// the time: no other fault, course or supply pressure is tried. A twentieth of
 /// the work of RunSecondLook().
-struct StrengthLook {
-  /// As they were asked for, with their strengths and intervals; empty if it
-  /// was asked to stop.
-  std::vector<Explanation> faults;
-  double misfit{0.0};  ///< Of the one that fits best, as in SecondLook.
-};
-
+///
 /// @param known fault, sign, supply pressure and about the strength of each.
 /// @throws as RunSecondLook().
 StrengthLook EstimateStrengths(const ValvePhysics& physics,
@@ -100,5 +44,26 @@ StrengthLook EstimateStrengths(const ValvePhysics& physics,
 /// @throws CvodeError; std::invalid_argument as RunSecondLook().
 double MisfitWithoutFault(const ValvePhysics& physics,
                           const LookWindow& window);
+
+/// The looks at one valve, by its physics.
+class ValveLooker final : public LookSimulation {
+ public:
+  explicit ValveLooker(const ValvePhysics& physics);
+
+  /// With the physics of `models`. @throws as PhysicsFrom().
+  explicit ValveLooker(const ModelSet& models)
+      : ValveLooker(PhysicsFrom(models.physics)) {}
+
+  double HealthyFlow(const InputRow& input, double x_pct) const override;
+  SecondLook Look(const LookWindow& window,
+                  const std::stop_token& stop) const override;
+  StrengthLook Strengths(const LookWindow& window,
+                         const std::vector<Explanation>& known,
+                         const std::stop_token& stop) const override;
+  double Misfit(const LookWindow& window) const override;
+
+ private:
+  ValvePhysics physics_;
+};
 
 }  // namespace fdi::simulator

@@ -4,7 +4,7 @@
 #include <string_view>
 #include <vector>
 
-#include "diagnosis/records/certainty.h"
+#include "diagnosis/decision/certainty.h"
 #include "storage/history/episode.h"
 
 namespace fdi::storage {

@@ -6,8 +6,8 @@
 
 #include "base/error.h"
 #include "base/text.h"
+#include "diagnosis/decision/certainty.h"
 #include "diagnosis/model/fault_catalogue.h"
-#include "diagnosis/records/certainty.h"
 #include "storage/database/record.h"
 #include "storage/history/episode.h"
 #include "storage/history/health.h"

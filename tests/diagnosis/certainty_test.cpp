@@ -1,4 +1,4 @@
-#include "diagnosis/records/certainty.h"
+#include "diagnosis/decision/certainty.h"
 
 #include <memory>
 #include <string>

@@ -8,10 +8,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "diagnosis/decision/episode_names.h"
 #include "monitor/counters.h"
 #include "monitor/episode_tracker.h"
-#include "monitor/names/episode_names.h"
 #include "monitor/names/look_worker.h"
+#include "monitor/names/pending_looks.h"
 #include "monitor/pipeline.h"
 #include "monitor/throttled_log.h"
 #include "tests/monitor/fake_sinks.h"
@@ -24,7 +25,6 @@ namespace {
 
 using simulator::Abrupt;
 using simulator::kLeadIn;
-using simulator::RecordRow;
 using std::chrono::seconds;
 using testing::ElementsAre;
 using testing::HasSubstr;
@@ -123,11 +123,20 @@ class SecondLookTest : public testing::Test {
   const Verdict& Step(std::uint64_t k) {
     const Sample sample = SampleOf(rows_.at(k), k);
     tracker_.Advance(sample, engine_, *models_, outlet_);
+    for (auto& [task, answer] : pending_.Collect()) {
+      names_.Answer(task, std::move(answer));
+    }
     const Verdict& verdict = names_.Step(sample, engine_, held_);
+    pending_.Request(names_.TakeDue(), physics_);
     tracker_.Step(sample, verdict, models_, outlet_);
     tracker_.Take(names_.TakeLook(), outlet_);
     tracker_.Take(names_.TakeStrengths(), outlet_);
     return verdict;
+  }
+
+  void RequestGrowth() {
+    names_.RequestGrowth();
+    pending_.Request(names_.TakeDue(), physics_);
   }
 
   // Rows [from, to).
@@ -154,7 +163,8 @@ class SecondLookTest : public testing::Test {
       LookReportOf({counters_, log_, [] { return std::int64_t{0}; }}), 3};
   std::shared_ptr<const ModelSet> models_{Models()};
   LookWorker::Physics physics_{worker_.PhysicsOf(*models_)};
-  EpisodeNames names_{"V1", models_, physics_, &worker_};
+  EpisodeNames names_{models_, physics_};
+  PendingLooks pending_{"V1", &worker_};
   EpisodeTracker tracker_{"V1", {}};
   EventList outlet_;
   std::vector<RecordRow> rows_{
@@ -210,7 +220,7 @@ TEST_F(SecondLookTest, TheSimulationCorrectsTheNameTenSecondsAfterItsSamples) {
 }
 
 TEST_F(SecondLookTest, ALookForGrowthTellsTheStrengthAndChangesNoName) {
-  names_.RequestGrowth();  // Nothing is named yet.
+  RequestGrowth();  // Nothing is named yet.
   Feed(0, kFirstLook + 1);
   worker_.Start();
   ASSERT_TRUE(AwaitLooks(1));
@@ -222,7 +232,7 @@ TEST_F(SecondLookTest, ALookForGrowthTellsTheStrengthAndChangesNoName) {
                                 2);
   EXPECT_EQ(named.strength, outlet_.looks[0].faults[0].strength);
 
-  names_.RequestGrowth();
+  RequestGrowth();
   ASSERT_TRUE(AwaitLooks(2));
   Feed(kCounts + 20, kCounts + 21);
   ASSERT_EQ(outlet_.strengths.size(), 2U);
@@ -239,7 +249,7 @@ TEST_F(SecondLookTest, ALookForGrowthTellsTheStrengthAndChangesNoName) {
   EXPECT_EQ(outlet_.events.size(), 3U);
   EXPECT_EQ(outlet_.looks.size(), 1U);
 
-  names_.RequestGrowth();
+  RequestGrowth();
   ASSERT_TRUE(AwaitLooks(3));
   Clear(kCounts + 21);
   Step(kCounts + 21);  // It is over: what the look found is of no use.
@@ -248,19 +258,18 @@ TEST_F(SecondLookTest, ALookForGrowthTellsTheStrengthAndChangesNoName) {
 
 // The worker takes it last, however early it was asked for.
 TEST_F(SecondLookTest, ALookForGrowthWaitsForTheOthersAndReplacesNone) {
-  const simulator::LookWindow window = simulator::Window({Abrupt(19, 0.25)});
-  const auto ask = [&](simulator::LookOccasion occasion) {
-    simulator::LookTask task;
+  const LookWindow window = simulator::Window({Abrupt(19, 0.25)});
+  const auto ask = [&](LookOccasion occasion) {
+    LookTask task;
     task.window = window;
     task.stamp_ns = kSecond * 1000;
     task.occasion = occasion;
-    simulator::Explanation f19;
+    Explanation f19;
     f19.fault = 19;
     f19.strength = 0.2;
     task.known = {f19};
     return worker_.Submit("V1", physics_, std::move(task));
   };
-  using simulator::LookOccasion;
   auto growth = ask(LookOccasion::kGrowth);
   auto again = ask(LookOccasion::kGrowth);
   auto naming = ask(LookOccasion::kEpisode);
@@ -455,7 +464,7 @@ TEST_F(SecondLookTest, ARoutineLookAsksForAnEpisodeAndNamesIt) {
 class LookWorkerTest : public SecondLookTest {
  protected:
   std::future<LookWorker::Answer> Submit(const std::string& valve) {
-    simulator::LookTask task;
+    LookTask task;
     task.window = simulator::Window({Abrupt(19, 0.25)});
     return worker_.Submit(valve, physics_, std::move(task));
   }

@@ -53,6 +53,11 @@ inline const ValvePhysics& Physics() {
   return physics;
 }
 
+inline const ValveLooker& Looker() {
+  static const ValveLooker looker(Physics());
+  return looker;
+}
+
 inline LookWindow Window(const std::vector<FaultSchedule>& faults,
                          std::uint64_t seed = 2, double moved = 0.0) {
   return {Recording(kLeadIn + 200, seed, faults, moved), kLeadIn,

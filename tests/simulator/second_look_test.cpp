@@ -11,10 +11,11 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
+#include "diagnosis/decision/look_answer.h"
+#include "diagnosis/decision/valve_looks.h"
 #include "diagnosis/model/fault_catalogue.h"
 #include "diagnosis/records/growth.h"
 #include "simulator/fault_effects.h"
-#include "simulator/second_look/episode_looks.h"
 #include "tests/simulator/recorded_valve.h"
 
 namespace fdi::simulator {
@@ -675,7 +676,7 @@ Verdict DetectedAt(std::int64_t stamp_ns) {
 // The flow of a valve without X is `share` of the usual from `from` on; rows
 // `gap` to `from` are not read.
 std::optional<LookTask> LookAfter(int gap, int from, double share) {
-  EpisodeLooks looks(Physics());
+  EpisodeLooks looks(Looker());
   for (int k = 0; k < from + 200; ++k) {
     if (k >= gap && k < from) {
       continue;
@@ -709,7 +710,7 @@ TEST(EpisodeLooksTest, SeesThatTheFlowChangedWhileNothingWasRead) {
 // An episode of the engine, abnormal from `first` on.
 std::vector<LookTask> Follow(int samples, int first,
                              SignalQuality quality = SignalQuality::kGood) {
-  EpisodeLooks looks(Physics());
+  EpisodeLooks looks(Looker());
   std::vector<LookTask> tasks;
   for (int k = 0; k < samples; ++k) {
     Sample sample = LivelySample(k, k * kSecond);
@@ -739,7 +740,7 @@ TEST(EpisodeLooksTest, LooksOftenInFiveMinutesFromTwoMinutesBefore) {
 
 // While something is on top, a look at the episode would see both.
 TEST(EpisodeLooksTest, WhatIsOnTopIsLookedAtInFiveMinutes) {
-  EpisodeLooks looks(Physics());
+  EpisodeLooks looks(Looker());
   std::vector<std::pair<std::int64_t, LookOccasion>> due;
   for (int k = 0; k < 1600; ++k) {
     Sample sample = LivelySample(k, k * kSecond);
@@ -780,7 +781,7 @@ TEST(EpisodeLooksTest, ThenAtTwiceTheAgeEach) {
 // The clock of the publisher is set back by an hour, 60 s into an episode: the
 // looks come as if time had gone on, at what came since.
 TEST(EpisodeLooksTest, AClockThatIsSetBackPutsNoLookOff) {
-  EpisodeLooks looks(Physics());
+  EpisodeLooks looks(Looker());
   std::vector<LookTask> tasks;
   for (int k = 0; k < 1000; ++k) {
     Sample sample;
@@ -827,7 +828,7 @@ TEST(EpisodeLooksTest, KnowsWhatWasMeasured) {
 
 // Routine looks at a healthy valve that has `signals`.
 int LooksWith(SignalMask signals) {
-  EpisodeLooks looks(Physics());
+  EpisodeLooks looks(Looker());
   int count = 0;
   for (int k = 0; k < 1000; ++k) {
     Sample sample;
@@ -859,7 +860,8 @@ TEST(EpisodeLooksTest, TakesNoLookWithoutCommandAndAnAnswerToIt) {
 TEST(EpisodeLooksTest, SlowDataAreLookedAtLaterAndNotMoreOften) {
   ValvePhysics slow = Physics();
   slow.drive.period_s = 60.0;
-  EpisodeLooks looks(slow);
+  const ValveLooker slow_looker(slow);
+  EpisodeLooks looks(slow_looker);
   std::vector<std::pair<int, bool>> due;  // Row, and whether it is early.
   for (int k = 0; k < 700; ++k) {
     Sample sample = LivelySample(k, 60 * k * kSecond);
@@ -876,7 +878,7 @@ TEST(EpisodeLooksTest, SlowDataAreLookedAtLaterAndNotMoreOften) {
 // Of an episode that goes on behind a gap, the valve is looked at again as soon
 // as after a detection: it may be another one.
 TEST(EpisodeLooksTest, BehindAGapALookDoesNotWait) {
-  EpisodeLooks looks(Physics());
+  EpisodeLooks looks(Looker());
   std::vector<int> due;
   for (int k = 0; k < 1500; ++k) {
     Sample sample = LivelySample(k, (k < 900 ? k : k + 60) * kSecond);
@@ -891,7 +893,7 @@ TEST(EpisodeLooksTest, BehindAGapALookDoesNotWait) {
 
 // The simulation takes no such inputs and would throw.
 TEST(EpisodeLooksTest, TransmittersThatFailLowDoNotEndALook) {
-  EpisodeLooks looks(Physics());
+  EpisodeLooks looks(Looker());
   std::optional<LookTask> task;
   for (int k = 0; k < 1000 && !task; ++k) {
     Sample sample;
@@ -908,7 +910,7 @@ TEST(EpisodeLooksTest, TransmittersThatFailLowDoNotEndALook) {
 
 // Its first sample is rejected, but ends the episode of the source before.
 TEST(EpisodeLooksTest, ANewSourceEndsTheLooksAtTheEpisodeBefore) {
-  EpisodeLooks looks(Physics());
+  EpisodeLooks looks(Looker());
   std::vector<LookTask> tasks;
   for (int k = 0; k < 1000; ++k) {
     Sample sample;
@@ -1122,12 +1124,12 @@ class RoutineLookTest : public ::testing::Test {
       due_.emplace_back(count_, task->occasion);
       compared_.push_back(
           std::ranges::count_if(task->window.rows, &RecordRow::x_measured));
-      looks_.Enter(*task, TakeLook(Physics(), *task).value());
+      looks_.Enter(*task, TakeLook(Looker(), *task).value());
     }
     ++count_;
   }
 
-  ValveLooks looks_{Physics()};
+  ValveLooks looks_{Looker()};
   Quality quality_{Quality::kLive};
   std::int64_t count_{0};
   std::int64_t detection_ns_{0};

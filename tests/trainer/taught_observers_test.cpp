@@ -8,9 +8,9 @@
 #include <gmock/gmock.h>
 
 #include "base/error.h"
+#include "diagnosis/decision/look_answer.h"
 #include "diagnosis/model/taught.h"
 #include "diagnosis/model/verdict.h"
-#include "simulator/second_look/taught_names.h"
 #include "storage/models/model_codec.h"
 #include "tests/diagnosis/linear_plant.h"
 #include "trainer/evaluation.h"
@@ -164,8 +164,8 @@ TEST(TaughtNamesTest, StandForTheSetOfThePhysicsThatHoldsThem) {
   Verdict engine;
   engine.isolated = FaultSet{1} << FaultIndex(models, 6);
   engine.strengths[static_cast<std::size_t>(FaultIndex(models, 6))] = 0.66;
-  simulator::LookAnswer answer;
-  answer.outcome = simulator::LookOutcome::kNamed;
+  LookAnswer answer;
+  answer.outcome = LookOutcome::kNamed;
   answer.faults = {{.fault = 6}, {.fault = 18}};
   EXPECT_THAT(*NamesBeside(engine, models, answer), ElementsAre(6));
 
@@ -181,7 +181,7 @@ TEST(TaughtNamesTest, StandForTheSetOfThePhysicsThatHoldsThem) {
   EXPECT_THAT(*NamesBeside(engine, models, answer), ElementsAre(1));
 
   // Where no hypothesis follows the record, what was seen before does.
-  answer.outcome = simulator::LookOutcome::kNoneFits;
+  answer.outcome = LookOutcome::kNoneFits;
   EXPECT_FALSE(NamesBeside(engine, models, answer).has_value());
 }
 

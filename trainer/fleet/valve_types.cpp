@@ -91,7 +91,7 @@ std::string TypeText(const ValveType& type, const ModelSet* models) {
   scenario.config.parameters = type.parameters;
   scenario.config.excitation = simulator::SineExcitation{};
   scenario.config.continuous_inputs = type.interpolated_command;
-  const simulator::InputRow& levels = type.levels;
+  const InputRow& levels = type.levels;
   const std::string set =
       models == nullptr ? ""
                         : models->name + '@' + std::to_string(models->version);

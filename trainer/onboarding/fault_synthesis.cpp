@@ -92,8 +92,7 @@ double FaultyFlow(const Transmitter& transmitter, double reading,
 
 }  // namespace
 
-simulator::InputRow InputsOf(const Sample& sample,
-                             const simulator::InputRow& levels) {
+InputRow InputsOf(const Sample& sample, const InputRow& levels) {
   const auto value = [&](Signal signal, double level) {
     return sample.Has(signal) ? sample[signal] : level;
   };

@@ -28,7 +28,7 @@ struct ValveType {
   /// flow transmitter are taken from the record where they differ much.
   bool of_any_size{false};
   /// Stand for P1, P2 and T1 where a valve does not measure them.
-  simulator::InputRow levels{71.67, 3555.0, 2615.0, 100.7};
+  InputRow levels{71.67, 3555.0, 2615.0, 100.7};
 };
 
 /// Faults that onboarding prepares observers for, each at several strengths, by
@@ -39,8 +39,7 @@ std::vector<FaultCondition> OnboardingFaults(
     std::size_t most = kMaxObservers - 1);
 
 /// The inputs of a simulation: what the sample has, else the level.
-simulator::InputRow InputsOf(const Sample& sample,
-                             const simulator::InputRow& levels);
+InputRow InputsOf(const Sample& sample, const InputRow& levels);
 
 /// Puts simulated faults onto recorded healthy samples. The valve type is
 /// simulated with the recorded inputs, once healthy (0) and once with the fault

@@ -271,7 +271,7 @@ ValveType InUnit(ValveType type, FlowUnit unit) {
 
 // Stretches without a gap as records of the simulator.
 std::vector<simulator::HealthyRecord> Records(
-    const std::vector<TrainingRun>& runs, const simulator::InputRow& levels) {
+    const std::vector<TrainingRun>& runs, const InputRow& levels) {
   std::vector<simulator::HealthyRecord> records;
   for (const TrainingRun& run : runs) {
     for (const Stretch& stretch : SplitAtGaps(run)) {
@@ -369,10 +369,9 @@ void NarrowPressures(const std::vector<TrainingRun>& runs,
 // What stands for P1, P2 and T1 where they are not measured, beside those that
 // are: one pressure has the ratio of the type to the other, and a liquid does
 // not boil at it.
-simulator::InputRow LevelsOf(const std::vector<TrainingRun>& runs,
-                             const ValveType& type) {
+InputRow LevelsOf(const std::vector<TrainingRun>& runs, const ValveType& type) {
   constexpr double kColdC = 43.0;
-  simulator::InputRow levels = type.levels;
+  InputRow levels = type.levels;
   const std::vector<double> p1 = SortedReadings(runs, Signal::kP1);
   const std::vector<double> p2 = SortedReadings(runs, Signal::kP2);
   const double ratio = levels.p2_kpa / levels.p1_kpa;
@@ -421,7 +420,7 @@ std::vector<double> FlowShape(const simulator::Trim& trim) {
 // How the healthy valve is simulated, for the second look.
 std::vector<PhysicalValue> Physics(const ValveType& type,
                                    const std::vector<TrainingRun>& runs) {
-  std::vector<std::vector<simulator::RecordRow>> records;
+  std::vector<std::vector<RecordRow>> records;
   for (simulator::HealthyRecord& record : Records(runs, type.levels)) {
     records.push_back(std::move(record.rows));
   }

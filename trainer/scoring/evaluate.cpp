@@ -1,71 +1,16 @@
 #include "trainer/scoring/evaluate.h"
 
+#include <memory>
+
 #include "base/parallel_for.h"
 #include "diagnosis/model/fault_catalogue.h"
 #include "diagnosis/model/quality_count.h"
-#include "monitor/names/episode_names.h"
-#include "simulator/second_look/episode_looks.h"
-#include "simulator/second_look/valve_physics.h"
+#include "simulator/second_look/second_look.h"
 #include "trainer/campaign/run_input.h"
 #include "trainer/scoring/rescore.h"
 
 namespace fdi::trainer {
 namespace {
-
-// Names the episodes of one run as the monitor does: by the observers and,
-// with physics, by looks that are taken at once.
-class RunNames {
- public:
-  explicit RunNames(const std::shared_ptr<const ModelSet>& models)
-      : models_(models) {
-    if (!models->physics.empty()) {
-      physics_ = simulator::PhysicsFrom(models->physics);
-    }
-    BeginAnew();
-  }
-
-  void BeginAnew() {
-    if (physics_) {
-      looks_.emplace(*physics_, models_.get());
-    }
-    name_.emplace(models_, std::make_shared<const SeverityCatalogue>());
-  }
-
-  NameBeside beside() const { return name_->beside(); }
-  bool suspects() const { return looks_ && looks_->suspects(); }
-
-  NamedVerdict Step(const Sample& sample, const Verdict& engine) {
-    monitor::EpisodeName::Inputs inputs{
-        engine, engine.isolated, {}, looks_.has_value(), {}};
-    if (looks_) {
-      TakeLook(sample, engine);
-      if (engine.detected && !OutOfOrder(engine.intake)) {
-        inputs.look =
-            monitor::LookThatCounts(engine, *models_, looks_->Answer());
-        inputs.remembered = looks_->Observed(*models_, engine.isolated);
-        inputs.on_top =
-            monitor::SecondThatCounts(engine, *models_, looks_->SecondAnswer());
-      }
-    }
-    const Verdict& named = name_->Step(inputs);
-    const bool taken_back = inputs.look || inputs.remembered != engine.isolated;
-    return {&named, name_->now().layer, taken_back && named.isolated == 0};
-  }
-
- private:
-  void TakeLook(const Sample& sample, const Verdict& engine) {
-    if (const auto task = looks_->Step(sample, engine)) {
-      if (auto answer = simulator::TakeLook(*physics_, *task)) {
-        looks_->Enter(*task, std::move(*answer));
-      }
-    }
-  }
-
-  std::shared_ptr<const ModelSet> models_;
-  std::optional<simulator::ValvePhysics> physics_;
-  std::optional<simulator::ValveLooks> looks_;
-  std::optional<monitor::EpisodeName> name_;
-};
 
 // The last second fault of the run, and its last name.
 void ScoreSecond(const std::vector<Indication>& all, EvaluatedRun& result) {
@@ -87,13 +32,10 @@ void ScoreSecond(const std::vector<Indication>& all, EvaluatedRun& result) {
 Answer AnswerOf(const std::shared_ptr<const ModelSet>& models,
                 const storage::StoredRun& run, const VerdictSink& sink) {
   QualityCount samples;
-  RunNames names(models);
-  const OutsideKnowledge outside{
-      [&names](const Sample& sample, const Verdict& verdict) {
-        return names.Step(sample, verdict);
-      },
-      [&names] { return names.suspects(); },
-      [&names] { return names.beside(); }, [&names] { names.BeginAnew(); }};
+  const std::shared_ptr<const LookSimulation> simulation =
+      models->physics.empty()
+          ? nullptr
+          : std::make_shared<const simulator::ValveLooker>(*models);
   const auto watch = [&](const Sample& sample, const Verdict& verdict) {
     if (CountsAsTime(verdict)) {
       samples.Add(verdict.quality);
@@ -103,7 +45,7 @@ Answer AnswerOf(const std::shared_ptr<const ModelSet>& models,
     }
   };
   Answer answer;
-  answer.indications = Rescore(models, run, watch, outside);
+  answer.indications = Rescore(models, run, watch, simulation);
   answer.seconds.emplace();
   for (std::size_t q = 0; q < kQualityCount; ++q) {
     (*answer.seconds)[q] =

@@ -4,10 +4,12 @@
 #include <cmath>
 #include <cstdlib>
 #include <string>
+#include <utility>
 
 #include "base/error.h"
 #include "base/usual_period.h"
-#include "diagnosis/decision/valve_engine.h"
+#include "diagnosis/decision/decision.h"
+#include "diagnosis/decision/look_answer.h"
 #include "trainer/campaign/run_input.h"
 
 namespace fdi::trainer {
@@ -88,14 +90,26 @@ void BackdateDetections(const Verdict& verdict, std::int64_t start_ns,
   }
 }
 
+// Those for growth are left out: they change no name.
+void TakeLooks(Decision& decision) {
+  for (const LookTask& task : decision.TakeDue()) {
+    if (task.occasion == LookOccasion::kGrowth) {
+      continue;
+    }
+    if (auto answer = TakeLook(*decision.simulation(), task)) {
+      decision.Answer(task, std::move(*answer));
+    }
+  }
+}
+
 }  // namespace
 
-std::vector<Indication> Rescore(const std::shared_ptr<const ModelSet>& models,
-                                const storage::StoredRun& run,
-                                const VerdictSink& sink,
-                                const OutsideKnowledge& outside) {
+std::vector<Indication> Rescore(
+    const std::shared_ptr<const ModelSet>& models,
+    const storage::StoredRun& run, const VerdictSink& sink,
+    const std::shared_ptr<const LookSimulation>& simulation) {
   RequireSuited(*models, run);
-  ValveEngine engine(models);
+  Decision decision(EngineParts(models), simulation);
   InitialisationWatch watch(run.info.run.period_s);
   std::vector<Indication> all;
   all.reserve(run.samples.size());
@@ -109,35 +123,26 @@ std::vector<Indication> Rescore(const std::shared_ptr<const ModelSet>& models,
     }
     const bool came_from_outside = watch.CameFromOutside(stored);
     if (came_from_outside) {
-      engine.EndEpisode(EndReason::kUnknown);
-    }
-    if ((came_from_outside || stored.model_swapped) && outside.begins_anew) {
-      outside.begins_anew();
+      decision.End(EndReason::kUnknown);
+      decision.ForgetNames();
     }
     if (stored.model_swapped) {
-      engine.Adopt(models);
+      decision.Adopt(EngineParts(models), simulation);
     }
-    const Verdict& verdict = engine.Step(stored.sample);
+    const Verdict& verdict = decision.Step(stored.sample);
     if (sink) {
-      sink(stored.sample, verdict);
+      sink(stored.sample, decision.engine());
     }
-    const NamedVerdict named = outside.name
-                                   ? outside.name(stored.sample, verdict)
-                                   : NamedVerdict{&verdict};
-    if (outside.suspects) {
-      engine.Suspect(outside.suspects());
-    }
-    if (outside.beside) {
-      engine.TakeName(outside.beside());
-    }
+    TakeLooks(decision);
     if (OutOfOrder(verdict.intake)) {
       continue;
     }
     start_ns = all.empty() ? stored.sample.stamp_ns : start_ns;
     Indication indication =
-        IndicationOf(*models, *named.verdict,
-                     all.empty() ? nullptr : &all.back(), named.layer);
-    indication.withdrawn |= named.withdrawn;
+        IndicationOf(*models, verdict, all.empty() ? nullptr : &all.back(),
+                     decision.names().now().layer);
+    indication.withdrawn |=
+        decision.names().overruled() && verdict.isolated == 0;
     indication.time_s =
         static_cast<double>(stored.sample.stamp_ns - start_ns) * kSecondsPerNs;
     indication.truth = TruthOf(stored);

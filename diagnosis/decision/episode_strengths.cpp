@@ -1,4 +1,4 @@
-#include "monitor/names/episode_strengths.h"
+#include "diagnosis/decision/episode_strengths.h"
 
 #include <algorithm>
 #include <bit>
@@ -10,10 +10,10 @@
 #include "diagnosis/model/fault_catalogue.h"
 #include "diagnosis/model/student.h"
 
-namespace fdi::monitor {
+namespace fdi {
 namespace {
 
-constexpr std::int64_t kFirstAge = 450 * kNsPerSecond;
+constexpr std::int64_t kFirstPointAge = 450 * kNsPerSecond;
 constexpr std::size_t kMaxMinutes = 7;
 constexpr std::size_t kMinMinutes = 3;
 
@@ -24,7 +24,7 @@ StrengthDue EpisodeStrengths::Step(const Verdict& engine, FaultSet named,
   for (const Transition& transition : engine.Transitions()) {
     if (transition.kind == TransitionKind::kDetected) {
       detection_ns_ = transition.detection_stamp_ns;
-      next_age_ns_ = kFirstAge;
+      next_age_ns_ = kFirstPointAge;
       tracks_.clear();
     }
   }
@@ -108,4 +108,4 @@ std::vector<StrengthPoint> EpisodeStrengths::Observed(
   return points;
 }
 
-}  // namespace fdi::monitor
+}  // namespace fdi

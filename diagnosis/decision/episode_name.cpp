@@ -1,18 +1,18 @@
-#include "monitor/names/episode_name.h"
+#include "diagnosis/decision/episode_name.h"
 
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
-#include "simulator/second_look/episode_looks.h"
+#include "diagnosis/decision/look_answer.h"
 
-namespace fdi::monitor {
+namespace fdi {
 namespace {
 
-// Four looks are due in the first 300 s of an episode (simulator::EpisodeLooks)
-// and the fifth at 600 s. Where none has had an answer that counts by then,
-// looks fail or say nothing, and there is no reason to expect better.
-constexpr double kLookPatienceS = 600.0;
+// Four looks are due up to kLastLookAge and the fifth at twice that. Where none
+// has had an answer that counts by then, looks fail or say nothing, and there
+// is no reason to expect better.
+constexpr std::int64_t kLookPatience = 2 * kLastLookAge;
 
 FaultSet SetOf(const std::vector<NamedFault>& faults) {
   FaultSet set = 0;
@@ -22,16 +22,49 @@ FaultSet SetOf(const std::vector<NamedFault>& faults) {
   return set;
 }
 
+EpisodeName::Look LookOf(const LookAnswer& answer,
+                         const std::vector<int>& names,
+                         const ModelSet& models) {
+  EpisodeName::Look look;
+  look.outside = answer.outcome == LookOutcome::kNoneFits;
+  for (const Explanation& e : answer.faults) {
+    const int index = FaultIndex(models, e.fault);
+    if (index >= 0 && std::ranges::count(names, e.fault) > 0) {
+      look.faults.push_back(
+          {static_cast<std::size_t>(index), {e.strength, e.lowest, e.highest}});
+    }
+  }
+  return look;
+}
+
 }  // namespace
+
+std::optional<EpisodeName::Look> LookThatCounts(const Verdict& engine,
+                                                const ModelSet& models,
+                                                const LookAnswer* answer) {
+  const auto names =
+      answer != nullptr ? NamesBeside(engine, models, *answer) : std::nullopt;
+  return names ? std::optional(LookOf(*answer, *names, models)) : std::nullopt;
+}
+
+std::optional<EpisodeName::Look> SecondThatCounts(const Verdict& engine,
+                                                  const ModelSet& models,
+                                                  const LookAnswer* answer) {
+  const auto names = answer != nullptr
+                         ? NamesOf(*answer, engine.second.faults != 0)
+                         : std::nullopt;
+  return names ? std::optional(LookOf(*answer, *names, models)) : std::nullopt;
+}
 
 EpisodeName::EpisodeName(std::shared_ptr<const ModelSet> models,
                          std::shared_ptr<const SeverityCatalogue> severities)
     : models_(std::move(models)),
       severities_(std::move(severities)),
       findings_(FindingsOf(*models_)),
-      look_patience_(std::llround(kLookPatienceS / models_->sample_period_s *
-                                  static_cast<double>(simulator::SlownessOf(
-                                      models_->sample_period_s)))) {
+      look_patience_(std::llround(
+          static_cast<double>(SlownessOf(models_->sample_period_s) *
+                              kLookPatience) /
+          (models_->sample_period_s * kNsPerSecond))) {
   Reset();
 }
 
@@ -109,7 +142,7 @@ void EpisodeName::FollowLook(const Inputs& inputs) {
   }
 }
 
-// Of a name that is not the engine's, the engine knows nothing on top.
+// The engine knows nothing on top of a name that is not its own.
 // A look that counts is the better judge of what is on top: observers know each
 // fault by itself, the physics simulates both at once.
 void EpisodeName::FollowSecond(const Inputs& inputs) {
@@ -141,7 +174,7 @@ void EpisodeName::Begin() {
   named_ = inherited_ && inherited_->isolated;
 }
 
-// What came on top is on top of the name, whatever a look at both of them says.
+// A second fault is on top of the name, whatever a look at both of them says.
 EpisodeName::Choice EpisodeName::Choose(const Inputs& inputs) {
   const SecondFault& second = inputs.engine.second;
   if ((now_.faults & second.standing) != 0) {
@@ -194,7 +227,7 @@ bool EpisodeName::InheritedStands(const Inputs& inputs) const {
          TakesTwoForOne(observed);
 }
 
-// What came on top has to be found anew, and until then both faults together
+// A second fault has to be found anew, and until then both faults together
 // may look like either of them, at another strength, like a third one or none.
 bool EpisodeName::TakesTwoForOne(FaultSet faults) const {
   if (!inherited_ || !inherited_->second.open) {
@@ -230,8 +263,8 @@ void EpisodeName::Rename(const Choice& choice, const Inputs& inputs) {
   named_ = true;
 }
 
-// Of a new name: what the look found, what the earlier session knew, or else
-// what the observers estimate, likeliest first.
+// A new name has the strengths that the look found, what the earlier session
+// knew, or else what the observers estimate, likeliest first.
 void EpisodeName::Estimates(const Inputs& inputs) {
   now_.estimates.clear();
   if (now_.source == NameSource::kLook) {
@@ -360,4 +393,4 @@ void EpisodeName::Reset() {
   now_.severity = announced_ = SeverityAt(BandsOf(0), 0.0);
 }
 
-}  // namespace fdi::monitor
+}  // namespace fdi

@@ -1,15 +1,15 @@
-#include "monitor/names/episode_strengths.h"
+#include "diagnosis/decision/episode_strengths.h"
 
 #include <cmath>
 #include <vector>
 
 #include <gtest/gtest.h>
 
+#include "base/time_units.h"
 #include "diagnosis/model/fault_catalogue.h"
 #include "tests/monitor/linear_models.h"
-#include "tests/monitor/test_support.h"
 
-namespace fdi::monitor {
+namespace fdi {
 namespace {
 
 class EpisodeStrengthsTest : public testing::Test {
@@ -18,7 +18,7 @@ class EpisodeStrengthsTest : public testing::Test {
   StrengthDue Step(int k, FaultSet isolated, double strength,
                    bool observed = true) {
     Verdict verdict;
-    verdict.stamp_ns = k * kSecond;
+    verdict.stamp_ns = k * kNsPerSecond;
     verdict.detected = true;
     verdict.strengths.fill(strength);
     if (k == 0) {
@@ -29,7 +29,7 @@ class EpisodeStrengthsTest : public testing::Test {
   }
 
   EpisodeStrengths strengths_;
-  ModelSet models_{LinearModels()};
+  ModelSet models_{monitor::LinearModels()};
 };
 
 TEST_F(EpisodeStrengthsTest, ItIsTimeAtAgesHalfAsMuchAgainEachThenHourly) {
@@ -42,7 +42,7 @@ TEST_F(EpisodeStrengthsTest, ItIsTimeAtAgesHalfAsMuchAgainEachThenHourly) {
   EXPECT_EQ(times, (std::vector{450, 675, 1013, 1519, 2279, 3418, 5126, 7689,
                                 11'289, 14'889, 18'489}));
   Verdict over;
-  over.stamp_ns = 10'000 * kSecond;
+  over.stamp_ns = 10'000 * kNsPerSecond;
   EXPECT_EQ(strengths_.Step(over, 0b10, true), StrengthDue::kNothing);
 }
 
@@ -64,7 +64,7 @@ TEST_F(EpisodeStrengthsTest, ThePointIsTheMeanOfTheMinutes) {
   ASSERT_EQ(points.size(), 1U);
   EXPECT_EQ(points[0].fault, 7);
   EXPECT_EQ(points[0].layer, Layer::kObservers);
-  EXPECT_EQ(points[0].stamp_ns, (60 + 479) * kSecond / 2);
+  EXPECT_EQ(points[0].stamp_ns, (60 + 479) * kNsPerSecond / 2);
   EXPECT_NEAR(points[0].strength, 0.44, 1e-9);
   EXPECT_NEAR(points[0].highest - 0.44, 2.447 * 0.0216 / std::sqrt(7.0), 1e-5);
   EXPECT_NEAR(0.44 - points[0].lowest, 2.447 * 0.0216 / std::sqrt(7.0), 1e-5);
@@ -101,4 +101,4 @@ TEST_F(EpisodeStrengthsTest, AFaultCountsFromWhenItWasIsolatedByObservers) {
 }
 
 }  // namespace
-}  // namespace fdi::monitor
+}  // namespace fdi

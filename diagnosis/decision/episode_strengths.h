@@ -9,9 +9,9 @@
 #include "diagnosis/model/verdict.h"
 #include "diagnosis/records/strength_point.h"
 
-namespace fdi::monitor {
+namespace fdi {
 
-/// What is due of the strengths of an open episode.
+/// Says whether the strengths of an open episode are due.
 enum class StrengthDue : std::uint8_t {
   kNothing,
   kMinute,  ///< Another minute of readings is complete.
@@ -27,7 +27,7 @@ class EpisodeStrengths {
   /// after. @param observed the observers tell how strong they are.
   StrengthDue Step(const Verdict& engine, FaultSet named, bool observed);
 
-  /// Of the faults that the observers have isolated for three minutes or more,
+  /// For the faults that the observers have isolated for three minutes or more,
   /// the mean of their estimates in the last seven. Estimates of neighbouring
   /// samples hang together: the interval is that of the means of minutes, of
   /// which the one that has just begun is none.
@@ -40,7 +40,7 @@ class EpisodeStrengths {
     double sum{0.0};
     int samples{0};
   };
-  // Of an isolated fault, by index.
+  // One isolated fault, by index.
   struct Track {
     std::size_t bit;
     std::vector<Minute> minutes{};  // Seven at most.
@@ -48,10 +48,10 @@ class EpisodeStrengths {
 
   bool UpdateTracks(const Verdict& engine, FaultSet named);
 
-  std::optional<std::int64_t> detection_ns_{};  // Of the open episode.
+  std::optional<std::int64_t> detection_ns_{};  // When an episode is open.
   std::int64_t next_age_ns_{0};
   std::int64_t stamp_ns_{0};
   std::vector<Track> tracks_{};
 };
 
-}  // namespace fdi::monitor
+}  // namespace fdi

@@ -1,4 +1,4 @@
-#include "monitor/names/episode_name.h"
+#include "diagnosis/decision/episode_name.h"
 
 #include <memory>
 #include <vector>
@@ -9,15 +9,15 @@
 #include "diagnosis/model/fault_catalogue.h"
 #include "tests/monitor/linear_models.h"
 
-namespace fdi::monitor {
+namespace fdi {
 namespace {
 
 using testing::ElementsAre;
 using testing::IsEmpty;
 using Kind = TransitionKind;
 
-constexpr FaultSet kF1 = 0b001;
-constexpr FaultSet kF7 = 0b010;
+constexpr FaultSet kFault1 = 0b001;
+constexpr FaultSet kFault7 = 0b010;
 constexpr FaultSet kFinding = 0b100;
 
 // f1, f7 and a finding of the floor. A fault is medium, from 0.25 on high, from
@@ -25,7 +25,7 @@ constexpr FaultSet kFinding = 0b100;
 class EpisodeNameTest : public testing::Test {
  protected:
   static std::shared_ptr<const ModelSet> Models() {
-    ModelSet models = LinearModels();
+    ModelSet models = monitor::LinearModels();
     models.faults.push_back(kFirstFinding);
     return std::make_shared<const ModelSet>(std::move(models));
   }
@@ -123,13 +123,13 @@ TEST_F(EpisodeNameTest, TheFloorNamesItUntilTheObserversDo) {
   Step(kFinding, {Kind::kIsolated});
   EXPECT_EQ(name_.now().source, NameSource::kFloor);
   EXPECT_EQ(name_.now().severity, Severity::kLow);
-  Step(kF7, {Kind::kReisolated});
+  Step(kFault7, {Kind::kReisolated});
   EXPECT_EQ(name_.now().source, NameSource::kObservers);
   EXPECT_EQ(name_.now().severity, Severity::kHigh);
 
   EXPECT_THAT(kinds_,
               ElementsAre(Kind::kDetected, Kind::kIsolated, Kind::kReisolated));
-  EXPECT_THAT(names_, ElementsAre(0U, kFinding, kF7));
+  EXPECT_THAT(names_, ElementsAre(0U, kFinding, kFault7));
   EXPECT_EQ(last_.strength, 0.3);
   EXPECT_EQ(last_.severity, Severity::kHigh);
   EXPECT_EQ(last_.detection_stamp_ns, 7);
@@ -137,27 +137,27 @@ TEST_F(EpisodeNameTest, TheFloorNamesItUntilTheObserversDo) {
 
 TEST_F(EpisodeNameTest, ALookOutranksTheObserversToTheEnd) {
   Step(0, {Kind::kDetected});
-  Step(kF7, {Kind::kIsolated});
+  Step(kFault7, {Kind::kIsolated});
   look_ = EpisodeName::Look{{{0, {-0.7, -0.8, -0.6}}}, false};
-  EXPECT_EQ(Step(kF7).isolated, kF1);
+  EXPECT_EQ(Step(kFault7).isolated, kFault1);
   EXPECT_EQ(name_.now().source, NameSource::kLook);
   EXPECT_EQ(last_.kind, Kind::kReisolated);
   EXPECT_EQ(last_.layer, Layer::kPhysics);
   EXPECT_EQ(last_.lowest, -0.8);
   EXPECT_EQ(last_.severity, Severity::kCritical);
-  Step(kF7 | kF1, {Kind::kReisolated});
+  Step(kFault7 | kFault1, {Kind::kReisolated});
   look_.reset();
-  Step(kF7, {Kind::kCleared, Kind::kClosed});
+  Step(kFault7, {Kind::kCleared, Kind::kClosed});
 
-  EXPECT_THAT(names_, ElementsAre(0U, kF7, kF1, kF1, kF1))
+  EXPECT_THAT(names_, ElementsAre(0U, kFault7, kFault1, kFault1, kFault1))
       << "the observers named it";
 }
 
 TEST_F(EpisodeNameTest, ALookThatNothingFitsSaysUnknown) {
   Step(0, {Kind::kDetected});
-  Step(kF7, {Kind::kIsolated});
+  Step(kFault7, {Kind::kIsolated});
   look_ = EpisodeName::Look{{}, true};
-  const Verdict& verdict = Step(kF7);
+  const Verdict& verdict = Step(kFault7);
   EXPECT_EQ(verdict.state, State::kDetected);
   EXPECT_EQ(verdict.unknown, Unknown::kOutsideKnown);
   EXPECT_EQ(last_.kind, Kind::kReisolated);
@@ -166,67 +166,67 @@ TEST_F(EpisodeNameTest, ALookThatNothingFitsSaysUnknown) {
 
 TEST_F(EpisodeNameTest, TheMemoryOfTheObserversIsTheirName) {
   Step(0, {Kind::kDetected});
-  Step(kF7, {Kind::kIsolated});
-  remembered_ = kF1 | kF7;
-  EXPECT_EQ(Step(kF7).isolated, kF1 | kF7);
+  Step(kFault7, {Kind::kIsolated});
+  remembered_ = kFault1 | kFault7;
+  EXPECT_EQ(Step(kFault7).isolated, kFault1 | kFault7);
   remembered_ = 0;  // More than can be a name.
-  const Verdict& verdict = Step(kF7);
+  const Verdict& verdict = Step(kFault7);
   EXPECT_EQ(verdict.isolated, 0U);
   EXPECT_EQ(verdict.unknown, Unknown::kTooEarly);
 }
 
 TEST_F(EpisodeNameTest, AnInheritedNameStandsUntilTheObserversNameAFault) {
-  const OpenEpisode left = Left(kF7);
+  const OpenEpisode left = Left(kFault7);
   name_.Inherit(&left);
   Step(0, {Kind::kDetected});
   EXPECT_EQ(name_.now().source, NameSource::kRestart);
   EXPECT_EQ(name_.now().severity, Severity::kCritical);
   EXPECT_EQ(name_.now().strength().strength, 0.7);
-  EXPECT_EQ(Step(kFinding, {Kind::kIsolated}).isolated, kF7);
-  Step(kF7, {Kind::kReisolated});
+  EXPECT_EQ(Step(kFinding, {Kind::kIsolated}).isolated, kFault7);
+  Step(kFault7, {Kind::kReisolated});
   EXPECT_EQ(name_.now().source, NameSource::kObservers);
   EXPECT_THAT(kinds_, ElementsAre(Kind::kDetected)) << "it was announced";
 
-  Step(kF1, {Kind::kReisolated});
+  Step(kFault1, {Kind::kReisolated});
   Step(kFinding, {Kind::kReisolated});
-  EXPECT_THAT(names_, ElementsAre(0U, kF1, kFinding));
+  EXPECT_THAT(names_, ElementsAre(0U, kFault1, kFinding));
   EXPECT_EQ(last_.kind, Kind::kReisolated);
 }
 
 TEST_F(EpisodeNameTest, WhatIsOnTopOfAnInheritedNameStandsAsLongAsThat) {
-  OpenEpisode left = Left(kF7);
+  OpenEpisode left = Left(kFault7);
   left.second.open = true;
-  left.second.faults = kF1;
+  left.second.faults = kFault1;
   name_.Inherit(&left);
-  EXPECT_EQ(Step(0, {Kind::kDetected}).second.faults, kF1);
-  EXPECT_EQ(Step(0).second.faults, kF1);
+  EXPECT_EQ(Step(0, {Kind::kDetected}).second.faults, kFault1);
+  EXPECT_EQ(Step(0).second.faults, kFault1);
   EXPECT_THAT(kinds_, ElementsAre(Kind::kDetected)) << "it was announced";
 
-  EXPECT_FALSE(Step(kF7, {Kind::kIsolated}).second.open);
+  EXPECT_FALSE(Step(kFault7, {Kind::kIsolated}).second.open);
   EXPECT_THAT(kinds_, ElementsAre(Kind::kDetected, Kind::kSecond));
   EXPECT_FALSE(last_.second.open);
-  EXPECT_EQ(last_.faults, kF7);
+  EXPECT_EQ(last_.faults, kFault7);
 }
 
 TEST_F(EpisodeNameTest, TwoInheritedFaultsAreNotRenamedAsAThird) {
-  OpenEpisode left = Left(kF7);
+  OpenEpisode left = Left(kFault7);
   left.second.open = true;  // Its name is not known.
   name_.Inherit(&left);
   Step(0, {Kind::kDetected});
-  EXPECT_EQ(Step(kF1, {Kind::kIsolated}).isolated, kF7);
+  EXPECT_EQ(Step(kFault1, {Kind::kIsolated}).isolated, kFault7);
   for (const std::vector<NamedFault>& faults :
        {std::vector<NamedFault>{{0, {0.1, 0.0, 0.2}}}, {}}) {
     look_ = EpisodeName::Look{faults, faults.empty()};
-    EXPECT_EQ(Step(kF1).isolated, kF7);
+    EXPECT_EQ(Step(kFault1).isolated, kFault7);
     EXPECT_TRUE(name_.verdict().second.open);
   }
   look_ = EpisodeName::Look{{{1, {0.5, 0.4, 0.6}}}, false};
-  EXPECT_EQ(Step(kF1).isolated, kF7);
+  EXPECT_EQ(Step(kFault1).isolated, kFault7);
   EXPECT_FALSE(name_.verdict().second.open);
 }
 
 TEST_F(EpisodeNameTest, AnInheritedNameEndsTheEpisodeIfNothingReplacesIt) {
-  const OpenEpisode left = Left(kF7);
+  const OpenEpisode left = Left(kFault7);
   for (const bool outside : {false, true}) {
     names_.clear();
     name_.Inherit(&left);
@@ -235,46 +235,47 @@ TEST_F(EpisodeNameTest, AnInheritedNameEndsTheEpisodeIfNothingReplacesIt) {
     if (outside) {
       Transition closed;
       closed.faults = kFinding;
-      EXPECT_EQ(name_.End(closed).faults, kF7);
+      EXPECT_EQ(name_.End(closed).faults, kFault7);
       engine_.detected = false;
     } else {
       Step(kFinding, {Kind::kCleared, Kind::kClosed});
-      EXPECT_THAT(names_, ElementsAre(0U, kF7, kF7));
+      EXPECT_THAT(names_, ElementsAre(0U, kFault7, kFault7));
     }
   }
 }
 
 TEST_F(EpisodeNameTest, AnInheritedLookWaitsForALookWhereThereAreAny) {
-  const OpenEpisode left = Left(kF7, Layer::kPhysics);
+  const OpenEpisode left = Left(kFault7, Layer::kPhysics);
   for (const bool can_look : {false, true}) {
     can_look_ = can_look;
     look_.reset();
     name_.Inherit(&left);
     Step(0, {Kind::kDetected});
-    EXPECT_EQ(Step(kF1, {Kind::kIsolated}).isolated, can_look ? kF7 : kF1);
+    EXPECT_EQ(Step(kFault1, {Kind::kIsolated}).isolated,
+              can_look ? kFault7 : kFault1);
     look_ = EpisodeName::Look{{{0, {0.1, 0.0, 0.2}}}, false};
-    EXPECT_EQ(Step(0).isolated, kF1);
+    EXPECT_EQ(Step(0).isolated, kFault1);
     Step(0, {Kind::kCleared, Kind::kClosed});
   }
 }
 
 TEST_F(EpisodeNameTest, AnInheritedLookDoesNotWaitForEver) {
-  const OpenEpisode left = Left(kF7, Layer::kPhysics);
+  const OpenEpisode left = Left(kFault7, Layer::kPhysics);
   can_look_ = true;
   name_.Inherit(&left);
   Step(0, {Kind::kDetected});
-  Step(kF1, {Kind::kIsolated});
+  Step(kFault1, {Kind::kIsolated});
   for (int k = 3; k <= 600; ++k) {
-    ASSERT_EQ(Step(kF1).isolated, kF7) << k;
+    ASSERT_EQ(Step(kFault1).isolated, kFault7) << k;
   }
-  EXPECT_EQ(Step(kF1).isolated, kF1);
+  EXPECT_EQ(Step(kFault1).isolated, kFault1);
   EXPECT_EQ(name_.now().source, NameSource::kObservers);
 }
 
 TEST_F(EpisodeNameTest, AFaultThatGetsMoreSevereIsAnnouncedOnce) {
   engine_.strengths[1] = 0.025;
   Step(0, {Kind::kDetected});
-  Step(kF7, {Kind::kIsolated});
+  Step(kFault7, {Kind::kIsolated});
   EXPECT_EQ(name_.now().severity, Severity::kMedium);
   Follow(7, 0.2, 0.01);
   EXPECT_THAT(kinds_, IsEmpty());
@@ -285,7 +286,7 @@ TEST_F(EpisodeNameTest, AFaultThatGetsMoreSevereIsAnnouncedOnce) {
 
   Follow(7, 0.99, 0.01);
   EXPECT_THAT(kinds_, ElementsAre(Kind::kChanged));
-  EXPECT_EQ(last_.faults, kF7);
+  EXPECT_EQ(last_.faults, kFault7);
   EXPECT_EQ(last_.severity, Severity::kCritical);
   EXPECT_EQ(last_.strength, 0.99);
   EXPECT_EQ(last_.highest, 1.0);
@@ -300,29 +301,29 @@ TEST_F(EpisodeNameTest, AFaultThatGetsMoreSevereIsAnnouncedOnce) {
 
 TEST_F(EpisodeNameTest, ASecondFaultIsAnnouncedAndNoLookAtBothRenames) {
   Step(0, {Kind::kDetected});
-  Step(kF1, {Kind::kIsolated});
+  Step(kFault1, {Kind::kIsolated});
   kinds_.clear();
   engine_.second.doubt = true;
-  engine_.second.standing = kF1;
+  engine_.second.standing = kFault1;
   look_ = EpisodeName::Look{{{1, {0.3, 0.2, 0.4}}}, false};
-  EXPECT_EQ(Step(kF1).isolated, kF1) << "it may be a look at both";
+  EXPECT_EQ(Step(kFault1).isolated, kFault1) << "it may be a look at both";
   EXPECT_THAT(kinds_, IsEmpty());
   engine_.second.doubt = false;
   engine_.second.open = true;
-  engine_.second.faults = kF7;
-  EXPECT_EQ(Step(kF1).isolated, kF1);
+  engine_.second.faults = kFault7;
+  EXPECT_EQ(Step(kFault1).isolated, kFault1);
   EXPECT_THAT(kinds_, ElementsAre(Kind::kSecond));
-  EXPECT_EQ(last_.faults, kF1);
-  EXPECT_EQ(last_.second.faults, kF7);
+  EXPECT_EQ(last_.faults, kFault1);
+  EXPECT_EQ(last_.second.faults, kFault7);
   kinds_.clear();
-  Step(kF1);
+  Step(kFault1);
   EXPECT_THAT(kinds_, IsEmpty());
 
   engine_.second = {};
-  EXPECT_EQ(Step(kF1).isolated, kF7) << "looks are heard again";
+  EXPECT_EQ(Step(kFault1).isolated, kFault7) << "looks are heard again";
   EXPECT_THAT(kinds_, ElementsAre(Kind::kReisolated, Kind::kSecond));
   EXPECT_FALSE(last_.second.open);
-  EXPECT_EQ(name_.beside().faults, kF7);
+  EXPECT_EQ(name_.beside().faults, kFault7);
   EXPECT_EQ(name_.beside().likely[0].strength, 0.3);
 }
 
@@ -330,8 +331,8 @@ TEST_F(EpisodeNameTest, TheEngineIsToldEachFaultOfALookLikeliestFirst) {
   Step(0, {Kind::kDetected});
   look_ =
       EpisodeName::Look{{{1, {0.3, 0.2, 0.4}}, {0, {-0.5, -0.6, -0.4}}}, false};
-  Step(kF1);
-  EXPECT_EQ(name_.beside().faults, kF1 | kF7);
+  Step(kFault1);
+  EXPECT_EQ(name_.beside().faults, kFault1 | kFault7);
   EXPECT_EQ(name_.beside().likely[0].bit, 1U);
   EXPECT_EQ(name_.beside().likely[0].strength, 0.3);
   EXPECT_EQ(name_.beside().likely[1].bit, 0U);
@@ -340,23 +341,23 @@ TEST_F(EpisodeNameTest, TheEngineIsToldEachFaultOfALookLikeliestFirst) {
 
 TEST_F(EpisodeNameTest, ALookAtWhatIsOnTopNamesIt) {
   Step(0, {Kind::kDetected});
-  Step(kF1, {Kind::kIsolated});
+  Step(kFault1, {Kind::kIsolated});
   engine_.second.open = true;
-  engine_.second.standing = kF1;
-  Step(kF1);
+  engine_.second.standing = kFault1;
+  Step(kFault1);
   EXPECT_EQ(last_.second.faults, 0U) << "more than one fault";
   kinds_.clear();
   on_top_ = EpisodeName::Look{{{1, {0.3, 0.2, 0.4}}}, false};
-  EXPECT_EQ(Step(kF1).isolated, kF1);
+  EXPECT_EQ(Step(kFault1).isolated, kFault1);
   EXPECT_THAT(kinds_, ElementsAre(Kind::kSecond));
-  EXPECT_EQ(last_.second.faults, kF7);
+  EXPECT_EQ(last_.second.faults, kFault7);
   EXPECT_EQ(last_.second.strength, 0.3);
   // None that it knows fits on top of f1, whatever the observers say.
-  engine_.second.faults = kF7;
+  engine_.second.faults = kFault7;
   on_top_ = EpisodeName::Look{{}, true};
-  EXPECT_EQ(Step(kF1).second.faults, 0U);
+  EXPECT_EQ(Step(kFault1).second.faults, 0U);
   engine_.second.open = false;
-  EXPECT_FALSE(Step(kF1).second.open) << "it is the engine that sees it";
+  EXPECT_FALSE(Step(kFault1).second.open) << "it is the engine that sees it";
 }
 
 TEST_F(EpisodeNameTest, TheGravestOfASetCountsAtItsOwnStrength) {
@@ -365,7 +366,7 @@ TEST_F(EpisodeNameTest, TheGravestOfASetCountsAtItsOwnStrength) {
   engine_.strengths[0] = 0.1;
   engine_.strengths[1] = 0.3;
   Step(0, {Kind::kDetected});
-  Step(kF1 | kF7, {Kind::kIsolated});
+  Step(kFault1 | kFault7, {Kind::kIsolated});
   EXPECT_EQ(last_.strength, 0.1) << "the likeliest one is f1";
   EXPECT_EQ(last_.severity, Severity::kHigh);
   Follow(7, 0.8, 0.01);
@@ -378,19 +379,19 @@ TEST_F(EpisodeNameTest, ALateSampleDatesNoChange) {
   look_ = EpisodeName::Look{{{1, {0.1, 0.0, 0.2}}}, false};
   EXPECT_EQ(Step(0, {}, Intake::kLate).isolated, 0U);
   EXPECT_THAT(kinds_, ElementsAre(Kind::kDetected));
-  EXPECT_EQ(Step(0).isolated, kF7);
+  EXPECT_EQ(Step(0).isolated, kFault7);
   EXPECT_THAT(kinds_, ElementsAre(Kind::kDetected, Kind::kIsolated));
 }
 
 TEST_F(EpisodeNameTest, FromANewSourceOneSampleEndsAnEpisodeAndBeginsOne) {
   Step(0, {Kind::kDetected});
-  Step(kF7, {Kind::kIsolated});
-  Step(kF1, {Kind::kClosed, Kind::kDetected, Kind::kIsolated});
+  Step(kFault7, {Kind::kIsolated});
+  Step(kFault1, {Kind::kClosed, Kind::kDetected, Kind::kIsolated});
   EXPECT_THAT(kinds_,
               ElementsAre(Kind::kDetected, Kind::kIsolated, Kind::kClosed,
                           Kind::kDetected, Kind::kIsolated));
-  EXPECT_THAT(names_, ElementsAre(0U, kF7, kF7, 0U, kF1));
+  EXPECT_THAT(names_, ElementsAre(0U, kFault7, kFault7, 0U, kFault1));
 }
 
 }  // namespace
-}  // namespace fdi::monitor
+}  // namespace fdi

@@ -7,15 +7,16 @@
 #include <span>
 #include <vector>
 
+#include "diagnosis/decision/look.h"
 #include "diagnosis/decision/second_fault.h"
 #include "diagnosis/model/severity.h"
 #include "diagnosis/model/verdict.h"
 #include "diagnosis/records/fault_event.h"
 #include "diagnosis/records/strength_point.h"
 
-namespace fdi::monitor {
+namespace fdi {
 
-/// What gave an episode its name.
+/// Who gave an episode its name.
 enum class NameSource : std::uint8_t {
   kNone,       ///< It has no name.
   kFloor,      ///< Limits alone found it.
@@ -50,7 +51,7 @@ struct EpisodeNow {
 /// Decides what the open episode of one valve is called, from one sample to the
 /// next. The inputs, the strongest first:
 ///
-/// 1. a second look whose answer counts (simulator::LookBook);
+/// 1. a second look whose answer counts (LookBook);
 /// 2. the name that an earlier session gave: one by a look until a look of this
 ///    session has an answer, or for ten minutes; then, like any other, until
 ///    the observers name a fault, for which the floor is not enough; with a
@@ -145,4 +146,17 @@ class EpisodeName {
   const Verdict* current_{&verdict_};
 };
 
-}  // namespace fdi::monitor
+/// The faults that a look names beside the observers (NamesBeside()), in their
+/// order of likelihood. Faults that the set does not have cannot be recorded
+/// and stay out. @returns nothing where the look does not count.
+/// @param answer null: there is none.
+std::optional<EpisodeName::Look> LookThatCounts(const Verdict& engine,
+                                                const ModelSet& models,
+                                                const LookAnswer* answer);
+
+/// The same of what comes on top of the fault of the episode.
+std::optional<EpisodeName::Look> SecondThatCounts(const Verdict& engine,
+                                                  const ModelSet& models,
+                                                  const LookAnswer* answer);
+
+}  // namespace fdi

@@ -1,0 +1,51 @@
+#include "diagnosis/decision/decision.h"
+
+namespace fdi {
+
+Decision::Decision(EngineParts parts,
+                   std::shared_ptr<const LookSimulation> simulation,
+                   std::shared_ptr<const SeverityCatalogue> severities)
+    : models_(parts.plan->shared_models()),
+      simulation_(std::move(simulation)),
+      severities_(std::move(severities)),
+      engine_(std::move(parts)) {
+  ForgetNames();
+}
+
+const Verdict& Decision::Step(const Sample& sample) {
+  engine_.Suspect(names_->suspects());
+  engine_.TakeName(names_->beside());
+  named_ = &names_->Step(sample, engine_.Step(sample), held_);
+  return *named_;
+}
+
+std::optional<Transition> Decision::End(EndReason reason) {
+  std::optional<Transition> closed = engine_.EndEpisode(reason);
+  named_ = nullptr;
+  return closed ? std::optional(names_->End(*closed)) : std::nullopt;
+}
+
+std::optional<Transition> Decision::Adopt(
+    EngineParts parts, std::shared_ptr<const LookSimulation> simulation) {
+  std::shared_ptr<const ModelSet> models = parts.plan->shared_models();
+  std::optional<Transition> closed = engine_.Adopt(std::move(parts));
+  if (closed) {
+    closed = names_->End(*closed);  // With the set that named it.
+  }
+  models_ = std::move(models);
+  simulation_ = std::move(simulation);
+  ForgetNames();
+  return closed;
+}
+
+void Decision::ForgetNames() {
+  named_ = nullptr;
+  names_ = std::make_unique<EpisodeNames>(models_, simulation_, severities_);
+}
+
+void Decision::HoldIsolation(bool hold) {
+  held_ = hold;
+  engine_.HoldIsolation(hold);
+}
+
+}  // namespace fdi
