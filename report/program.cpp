@@ -251,6 +251,15 @@ void Program::AddExamples(std::vector<VerbExamples> examples) {
   std::erase_if(examples, [this](const VerbExamples& of) {
     return removed_.contains({"", of.verb.substr(0, of.verb.find(' '))});
   });
+  for (VerbExamples& of : examples) {
+    std::erase_if(of.examples, [this](const Example& example) {
+      return std::ranges::any_of(removed_, [&](const auto& gone) {
+        return gone.first.second.starts_with("--") &&
+               (example.command + " ").find(" " + gone.first.second + " ") !=
+                   std::string::npos;
+      });
+    });
+  }
   SetExamples(*app_, examples);
   std::ranges::move(examples, std::back_inserter(examples_));
 }

@@ -100,8 +100,8 @@ class Program {
                   const std::string& option);
 
   /// Appends examples to the help of verbs, groups (both named by path,
-  /// "history list") and, for "", the program; ignores those of a verb that is
-  /// left out. Call after adding the verbs.
+  /// "history list") and, for "", the program; ignores those of a verb, or with
+  /// an option, that is left out. Call after adding the verbs.
   /// @throws std::logic_error for an unknown verb.
   void AddExamples(std::vector<VerbExamples> examples);
 

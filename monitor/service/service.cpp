@@ -5,8 +5,8 @@
 // consumers are ready; until then samples queue at the subscriber.
 //
 // Stop: HTTP stops accepting requests, the diagnosis drains the subscriber,
-// recorder and journal store and publish the results, the follower of the
-// history reads the last events, the hook gets a second for its deliveries, the
+// recorder and journal store and publish the results, the parts read the last
+// events, the hook gets a second for its deliveries, the
 // session is closed in the history, and the last status is published. Each step
 // is attempted even if an earlier one failed.
 #include "monitor/service/service.h"
@@ -117,10 +117,6 @@ Service::Service(const ServiceOptions& options, const report::Context& context)
       http_(options.http
                 ? std::make_unique<HttpServer>(HttpServerOptions{*options.http})
                 : nullptr),
-      console_(options.console
-                   ? std::make_unique<console::Console>(
-                         *options.console, context.options, context.log)
-                   : nullptr),
       data_(Prepared(context.options.data_dir, context.log)),
       lock_(data_.lock(), "recording faults"),
       hook_(
@@ -190,8 +186,10 @@ Service::~Service() = default;
 void Service::AttachListeners() {
   pipeline_.Attach(std::make_unique<HealthBooks>(counters_));
   pipeline_.Attach(std::make_unique<ClockWatch>(NowNs, context_.log));
-  if (console_) {
-    pipeline_.Attach(console_->live());
+  for (const auto& part : options_.parts) {
+    if (ValveListener* const listener = part->listener()) {
+      pipeline_.Attach(*listener);
+    }
   }
   if (recorder_) {
     pipeline_.Attach(*recorder_);  // Last: it may wait for the disk.
@@ -200,14 +198,11 @@ void Service::AttachListeners() {
 
 // What becomes of an event, in this order.
 void Service::ListAfterCommit() {
-  if (console_) {
-    after_commit_.Add("console", [this](const FaultEvent& event, bool stored) {
-      console_->OnCommitted(event, stored);
-    });
-  }
-  if (options_.follower) {
-    after_commit_.Add("follower",
-                      [this](const FaultEvent&, bool) { follower_->Wake(); });
+  for (const auto& part : options_.parts) {
+    after_commit_.Add(std::string(part->name()),
+                      [part](const FaultEvent& event, bool stored) {
+                        part->OnCommitted(event, stored);
+                      });
   }
   after_commit_.Add(events_);
   if (hook_) {
@@ -282,23 +277,8 @@ void Service::Start() {
   if (hook_) {
     hook_->Start();
   }
-  if (options_.follower) {
-    follower_ = options_.follower(
-        {data_.history(), context_.log,
-         [this](std::string_view part, const std::function<void()>& step) {
-           Guarded(counters_, log_, part, step);
-         },
-         [this](const report::Json& json) {
-           if (hook_) {
-             hook_->Notify(json);
-           }
-         }});
-    follower_->Start();
-  }
+  StartParts();
   ResendEvents();
-  if (console_) {
-    ServeConsole();
-  }
   if (recorder_) {
     recorder_->Start();
   }
@@ -319,61 +299,39 @@ void Service::ResendEvents() {
   }
 }
 
-// Those of the last month of which anything is known.
-void Service::ExpectSeenValves() {
-  constexpr std::int64_t kMonthNs = 30 * kNsPerDay;
-  const std::vector<Accumulator> seen = history_.Accumulators();
-  std::int64_t newest_ns = 0;
-  for (const Accumulator& valve : seen) {
-    newest_ns = std::max(newest_ns, valve.stamp_ns);
+void Service::StartParts() {
+  if (options_.parts.empty()) {
+    return;
   }
-  for (const Accumulator& valve : seen) {
-    if (valve.stamp_ns >= newest_ns - kMonthNs &&
-        GlobMatches(options_.pipeline.valve_glob, valve.valve_id)) {
-      console_->live().Expect(valve.valve_id, valve.stamp_ns);
-    }
-  }
-}
-
-// A valve whose stream ended has left nothing but its alarm.
-void Service::ExpectAlarmedValves() {
-  storage::HistoryReader reader(data_.history());
-  constexpr std::int64_t kAll = std::numeric_limits<std::int64_t>::max();
-  for (const storage::Alarm& alarm : reader.AlarmList(NowNs(), kAll)) {
-    const storage::Episode& episode = alarm.episode;
-    if (GlobMatches(options_.pipeline.valve_glob, episode.valve_id)) {
-      console_->live().Expect(episode.valve_id, episode.unconfirmed_ns.value_or(
-                                                    episode.detected_ns));
-    }
-  }
-}
-
-// Those with a model set, and those of the plant's table.
-void Service::ExpectAssignedValves() {
-  std::vector<std::string> valves = assignment_->AssignedValves();
-  storage::ModelStore store(data_.models());
-  for (storage::PlantLoop& loop : store.Loops()) {
-    valves.push_back(std::move(loop.name));
-  }
-  for (const std::string& valve_id : valves) {
-    if (GlobMatches(options_.pipeline.valve_glob, valve_id)) {
-      console_->live().Expect(valve_id, 0);
-    }
-  }
-}
-
-void Service::ServeConsole() {
-  const auto facts = [this] {
+  PartContext part{data_, context_.software, started_ns_, context_.log};
+  part.facts = [this] {
     const idl::MonitorStatusMessage status = StatusOf(Facts());
-    return console::MonitorFacts{idl::HealthName(status.health),
-                                 status.counters,
-                                 pipeline_.census().open_episodes};
+    return MonitorFacts{idl::HealthName(status.health), status.counters,
+                        pipeline_.census().open_episodes};
   };
-  console_->Start({data_.history(), data_.models(), context_.software,
-                   started_ns_, facts, NowNs});
-  ExpectSeenValves();
-  ExpectAlarmedValves();
-  ExpectAssignedValves();
+  part.guard = [this](std::string_view name,
+                      const std::function<void()>& step) {
+    Guarded(counters_, log_, name, step);
+  };
+  part.notify = [this](const report::Json& json) {
+    if (hook_) {
+      hook_->Notify(json);
+    }
+  };
+  for (const Accumulator& valve : history_.Accumulators()) {
+    part.seen.emplace_back(valve.valve_id, valve.stamp_ns);
+  }
+  for (const auto& each : options_.parts) {
+    each->Start(part);
+  }
+  TellAssignedValves();
+}
+
+void Service::TellAssignedValves() {
+  const std::vector<std::string> valves = assignment_->AssignedValves();
+  for (const auto& part : options_.parts) {
+    part->OnAssigned(valves);
+  }
 }
 
 void Service::ServeProbes() {
@@ -550,9 +508,7 @@ void Service::LoadModels() {
   assignment_ = next;
   model_sets_ = next->loaded();
   pipeline_.Reassign(std::move(next));
-  if (console_) {
-    ExpectAssignedValves();
-  }
+  TellAssignedValves();
   retry_reload_at_.reset();
 }
 
@@ -578,17 +534,18 @@ StatusFacts Service::Facts() const {
 std::string Service::Metrics() const {
   MetricsFacts facts{context_.software, started_ns_, data_,
                      heartbeat_.members()};
-  if (console_) {
-    facts.streams = console_->streams();
-    facts.board_bytes = console_->board_bytes();
-    facts.admissions = console_->admissions();
-  }
   try {
     facts.alarms = storage::HistoryReader(data_.history()).CountAlarms(NowNs());
   } catch (const std::exception&) {
     // Without the history nobody can tell; fdi_persistence_degraded says so.
   }
-  return MetricsPage(Facts(), facts);
+  std::string page = MetricsPage(Facts(), facts);
+  Exposition more;
+  for (const auto& part : options_.parts) {
+    part->AddMetrics(more);
+  }
+  page += more.text();
+  return page;
 }
 
 void Service::ReportLoss() {
@@ -635,12 +592,12 @@ void Service::Stop() {
   if (http_) {
     errors.Try([this] { http_->Stop(); });
   }
-  if (console_) {
-    errors.Try([this] { console_->Stop(); });
+  for (const auto& part : options_.parts) {
+    errors.Try([&part] { part->Leave(); });
   }
   errors.Try([this] { StopDiagnosis(); });
-  if (follower_) {
-    errors.Try([this] { follower_->Stop(); });
+  for (const auto& part : options_.parts) {
+    errors.Try([&part] { part->Stop(); });
   }
   if (hook_) {
     errors.Try([this] { hook_->Stop(kHookPatience); });
@@ -658,8 +615,8 @@ void Service::Stop() {
   // Last, because clients may keep the server's threads busy for a second.
   // These threads use everything above, so they must end within this call.
   http_.reset();
-  if (console_) {
-    errors.Try([this] { console_->Close(); });
+  for (const auto& part : options_.parts) {
+    errors.Try([&part] { part->Close(); });
   }
   errors.Rethrow();
 }

@@ -14,16 +14,15 @@
 #include "monitor/after_commit.h"
 #include "monitor/bus/bus_sinks.h"
 #include "monitor/bus/share_watch.h"
-#include "monitor/console/console.h"
 #include "monitor/heartbeat.h"
 #include "monitor/http/http_server.h"
 #include "monitor/pipeline.h"
 #include "monitor/recorder.h"
 #include "monitor/service/event_hook.h"
-#include "monitor/service/history_follower.h"
 #include "monitor/service/history_store.h"
 #include "monitor/service/model_assignment.h"
 #include "monitor/service/run_store.h"
+#include "monitor/service/service_part.h"
 #include "monitor/service/status.h"
 #include "report/program.h"
 #include "report/stop_signals.h"
@@ -43,16 +42,14 @@ struct ServiceOptions {
   bool lossless_decisions{false};
   bool best_effort{false};       ///< ValveSample without retransmission.
   double status_period_s{60.0};  ///< Of the status line in the log.
-  /// Runs beside the active sets; without a version the newest one.
   /// Serve metrics and probes over HTTP.
   std::optional<HttpAddress> http;
-  MakeFollower follower;  ///< Of the history; see there.
   /// Notify a program or a web server of events; empty: disabled.
   std::string on_event;
   int on_event_per_minute{60};
   double on_event_timeout_s{10.0};
-  /// Serve the live page.
-  std::optional<console::ConsoleOptions> console;
+  /// Optional parts, which follow valves and events in this order.
+  std::vector<std::shared_ptr<ServicePart>> parts{};
 };
 
 /// The monitor as a service: DDS on one side, the databases on the other, the
@@ -85,10 +82,8 @@ class Service {
 
   void Start();
   void ResendEvents();
-  void ServeConsole();
-  void ExpectSeenValves();
-  void ExpectAlarmedValves();
-  void ExpectAssignedValves();
+  void StartParts();
+  void TellAssignedValves();
   void ServeProbes();
   void Diagnose();
 
@@ -113,8 +108,7 @@ class Service {
 
   ServiceOptions options_;
   const report::Context& context_;
-  std::unique_ptr<HttpServer> http_;           // Null: no probes.
-  std::unique_ptr<console::Console> console_;  // Null: no console.
+  std::unique_ptr<HttpServer> http_;  // Null: no probes.
   storage::DataDirectory data_;
   storage::ExclusiveLock lock_;
   std::unique_ptr<EventHook> hook_;  // Null: no event hook.
@@ -137,8 +131,7 @@ class Service {
   ThrottledLog log_;
   AfterCommit after_commit_;
   ShareWatch shares_;
-  std::unique_ptr<Recorder> recorder_;         // Set together with runs_.
-  std::unique_ptr<HistoryFollower> follower_;  // Null: nothing follows.
+  std::unique_ptr<Recorder> recorder_;  // Set together with runs_.
   Pipeline pipeline_;
   Pulse service_pulse_;  // Beaten by the thread of Run().
   Heartbeat heartbeat_;

@@ -81,19 +81,6 @@ void AddThreads(const std::vector<Heartbeat::Member>& threads,
   }
 }
 
-void AddAdmissions(const console::AdmissionCounts& counts, Exposition& page) {
-  page.Family("fdi_console_actions_total", Type::kCounter,
-              "What people did at the console");
-  for (const auto& [action, count] : counts.actions) {
-    page.Value(count, {"action", action});
-  }
-  page.Family("fdi_console_refused_total", Type::kCounter,
-              "Requests that the console refused, by reason");
-  for (const auto& [reason, count] : counts.refused) {
-    page.Value(count, {"reason", reason});
-  }
-}
-
 void AddAlarms(const storage::AlarmCounts& counts, Exposition& page) {
   const auto add = [&page](const auto& by_severity) {
     for (std::size_t i = 0; i < by_severity.size(); ++i) {
@@ -108,23 +95,6 @@ void AddAlarms(const storage::AlarmCounts& counts, Exposition& page) {
               "Alarms that nobody has acknowledged, active or returned to "
               "normal, and that are not shelved");
   add(counts.unacked);
-}
-
-std::vector<Measure> ConsoleMeasures(const MetricsFacts& facts) {
-  constexpr std::string_view kStreams = "fdi_console_streams_total";
-  const console::StreamCounts& streams = *facts.streams;
-  return {
-      {"", "fdi_console_streams", Type::kGauge, "Live streams now", "", "",
-       streams.clients},
-      {"", kStreams, Type::kCounter,
-       "Live streams opened, refused because all places were taken, or "
-       "dropped because the client did not keep up",
-       "outcome", "admitted", streams.admitted},
-      {"", kStreams, Type::kCounter, "", "outcome", "refused", streams.refused},
-      {"", kStreams, Type::kCounter, "", "outcome", "dropped", streams.dropped},
-      {"", "fdi_console_bytes", Type::kGauge,
-       "Memory of the trends that the console shows", "", "",
-       facts.board_bytes}};
 }
 
 void AddProcess(const MetricsFacts& facts, Exposition& page) {
@@ -364,10 +334,6 @@ std::string MetricsPage(const StatusFacts& status, const MetricsFacts& facts) {
   AddThreads(facts.threads, page);
   if (facts.alarms) {
     AddAlarms(*facts.alarms, page);
-  }
-  if (facts.streams) {
-    page.Add(ConsoleMeasures(facts));
-    AddAdmissions(facts.admissions, page);
   }
   AddProcess(facts, page);
   return page.text();

@@ -11,8 +11,6 @@
 #include "idl/endpoint.h"
 #include "idl/wire.h"
 #include "monitor/bus/share_watch.h"
-#include "monitor/console/admission.h"
-#include "monitor/console/live_stream.h"
 #include "monitor/counters.h"
 #include "monitor/heartbeat.h"
 #include "monitor/http/http_server.h"
@@ -78,9 +76,6 @@ struct MetricsFacts {
   std::int64_t started_ns{0};  ///< UTC.
   storage::DataDirectory data;
   std::vector<Heartbeat::Member> threads;
-  std::optional<console::StreamCounts> streams{};  ///< Nothing: no console.
-  std::uint64_t board_bytes{0};                    ///< Of the console.
-  console::AdmissionCounts admissions{};           ///< Of the console.
   /// Nothing: the history does not tell.
   std::optional<storage::AlarmCounts> alarms{};
 };

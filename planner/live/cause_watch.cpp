@@ -2,7 +2,9 @@
 
 #include <chrono>
 #include <memory>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include "base/log.h"
@@ -14,6 +16,48 @@ namespace {
 // An event that was published before its commit wakes nobody afterwards, and a
 // step that failed is repeated.
 constexpr std::chrono::milliseconds kPeriod{1000};
+
+class Part : public monitor::ServicePart {
+ public:
+  explicit Part(std::vector<storage::CauseGroup> groups)
+      : groups_(std::move(groups)) {}
+
+  std::string_view name() const override { return "common_causes"; }
+  void Start(const monitor::PartContext& context) override {
+    context.log(LogLevel::kInfo,
+                "cause_groups groups=" + std::to_string(groups_.size()));
+    watch_.emplace(
+        context.data.history(), groups_,
+        [log = context.log,
+         notify = context.notify](const storage::CauseChange& change) {
+          Log(log, change);
+          notify(CauseJson(change));
+        },
+        [guard = context.guard](const std::function<void()>& step) {
+          guard("common_causes", step);
+        });
+    watch_->Start();
+  }
+  void OnCommitted(const FaultEvent& /*event*/, bool /*persisted*/) override {
+    if (watch_) {
+      watch_->Wake();
+    }
+  }
+  void Stop() override { watch_.reset(); }
+
+ private:
+  static void Log(const LogSink& log, const storage::CauseChange& change) {
+    log(LogLevel::kWarning,
+        EventLine("common_cause",
+                  {{"kind", std::string(CauseChangeName(change.kind))},
+                   {"cause", change.cause.cause_id},
+                   {"group", change.cause.group},
+                   {"episodes", std::to_string(change.cause.members.size())}}));
+  }
+
+  const std::vector<storage::CauseGroup> groups_;
+  std::optional<CauseWatch> watch_;
+};
 
 }  // namespace
 
@@ -69,31 +113,9 @@ void CauseWatch::ReadAll() {
   } while (!book_.at_end());
 }
 
-monitor::MakeFollower CauseFollower(std::vector<storage::CauseGroup> groups) {
-  if (groups.empty()) {
-    return {};
-  }
-  return [groups = std::move(groups)](const monitor::FollowerContext& service)
-             -> std::unique_ptr<monitor::HistoryFollower> {
-    service.log(LogLevel::kInfo,
-                "cause_groups groups=" + std::to_string(groups.size()));
-    const auto tell = [service](const storage::CauseChange& change) {
-      service.log(
-          LogLevel::kWarning,
-          EventLine(
-              "common_cause",
-              {{"kind", std::string(CauseChangeName(change.kind))},
-               {"cause", change.cause.cause_id},
-               {"group", change.cause.group},
-               {"episodes", std::to_string(change.cause.members.size())}}));
-      service.notify(CauseJson(change));
-    };
-    return std::make_unique<CauseWatch>(
-        service.history, groups, tell,
-        [guard = service.guard](const std::function<void()>& step) {
-          guard("common_causes", step);
-        });
-  };
+std::shared_ptr<monitor::ServicePart> CausePart(
+    std::vector<storage::CauseGroup> groups) {
+  return groups.empty() ? nullptr : std::make_shared<Part>(std::move(groups));
 }
 
 }  // namespace fdi::planner

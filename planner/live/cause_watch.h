@@ -2,11 +2,12 @@
 
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <vector>
 
 #include "base/mutex.h"
 #include "base/worker.h"
-#include "monitor/service/history_follower.h"
+#include "monitor/service/service_part.h"
 #include "storage/history/common_cause.h"
 #include "storage/history/history_database.h"
 
@@ -17,7 +18,7 @@ namespace fdi::planner {
 /// a connection and a thread, so that neither journal nor bus waits for it.
 ///
 /// Built idle. Thread safe except for Start() and Stop().
-class CauseWatch : public monitor::HistoryFollower {
+class CauseWatch {
  public:
   /// Runs a step and takes what it throws; the step is repeated later.
   using Guard = std::function<void(const std::function<void()>&)>;
@@ -28,13 +29,15 @@ class CauseWatch : public monitor::HistoryFollower {
              std::vector<storage::CauseGroup> groups,
              std::function<void(const storage::CauseChange&)> on_change,
              Guard guard);
-  ~CauseWatch() override { Stop(); }
+  ~CauseWatch() { Stop(); }
   CauseWatch(const CauseWatch&) = delete;
   CauseWatch& operator=(const CauseWatch&) = delete;
 
-  void Start() override;
-  void Wake() override;
-  void Stop() override;
+  void Start();
+  /// Further events are committed. Does not wait.
+  void Wake();
+  /// Reads what is committed, then ends the thread.
+  void Stop();
 
  private:
   void Run();
@@ -53,8 +56,9 @@ class CauseWatch : public monitor::HistoryFollower {
   Worker worker_;
 };
 
-/// Logs each change of a common cause of `groups`, and notifies of it; empty if
-/// there are no groups.
-monitor::MakeFollower CauseFollower(std::vector<storage::CauseGroup> groups);
+/// The search as a part of a running monitor, which logs each change of a
+/// common cause and notifies of it. Null if there are no groups.
+std::shared_ptr<monitor::ServicePart> CausePart(
+    std::vector<storage::CauseGroup> groups);
 
 }  // namespace fdi::planner

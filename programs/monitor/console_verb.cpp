@@ -12,14 +12,14 @@
 #include "base/retry.h"
 #include "base/time_text.h"
 #include "base/time_units.h"
+#include "console/console.h"
+#include "console/plant_feed.h"
 #include "diagnosis/records/valve_glob.h"
-#include "monitor/console/console.h"
 #include "monitor/throttled_log.h"
-#include "plant/live/plant_feed.h"
 #include "plant/plant_reader.h"
 #include "programs/monitor/bus_view.h"
-#include "programs/monitor/console_options.h"
-#include "programs/monitor/planner.h"
+#include "programs/monitor/console.h"
+#include "programs/monitor/planner_page.h"
 #include "programs/monitor/verbs.h"
 #include "report/program.h"
 #include "report/stop_signals.h"
@@ -29,8 +29,7 @@ namespace {
 
 struct PlantConsoleOptions {
   std::string from;
-  std::string listen{"127.0.0.1:8081"};
-  console::ConsoleOptions console;
+  PageOptions page{.address = "127.0.0.1:8081"};
   BusOptions bus{.program = "fdi-monitor console"};
 };
 
@@ -59,7 +58,7 @@ void ExpectSeenValves(const std::stop_token& stop,
                       const PlantConsoleOptions& options,
                       console::LiveBoard& board) {
   constexpr std::int64_t kAgeNs =
-      std::chrono::nanoseconds(PlantFeed::kForgetValve).count();
+      std::chrono::nanoseconds(console::PlantFeed::kForgetValve).count();
   constexpr std::chrono::seconds kRetry{10};
   while (!stop.stop_requested()) {
     try {
@@ -76,17 +75,17 @@ void ExpectSeenValves(const std::stop_token& stop,
   }
 }
 
-int RunConsole(const PlantConsoleOptions& given,
+int RunConsole(const PlantConsoleOptions& options,
                const report::Context& context) {
-  PlantConsoleOptions options = given;
-  options.console.address = ParseHttpAddress(options.listen, "--listen");
-  options.console.routes = PlannerRoutes({}, context);
   const LogSink log = LimitLog(context.log);
   report::StopSignals signals(report::StopSignals::HangUp::kStop);
   std::stop_source stopping;
   const std::int64_t started_ns = NowNs();
-  std::optional<PlantFeed> feed;  // Outlives the console's threads.
-  console::Console console(options.console, context.options, log);
+  std::optional<console::PlantFeed> feed;  // Outlives the console's threads.
+  console::Console console(
+      {ParseHttpAddress(options.page.address, "--listen"), options.page.files,
+       options.page.proxy_secret, PlannerRoutes({}, context)},
+      context.options, log);
   feed.emplace(console.live());
   BusView bus(options.bus, context, log);
   console.Start({{},
@@ -113,11 +112,11 @@ int RunConsole(const PlantConsoleOptions& given,
                                               idl::ModelSetInfoMessage>) {
             console.OnModels(feed->Add(message));
           } else {
-            feed->Add(message, reception, PlantFeed::Clock::now());
+            feed->Add(message, reception, console::PlantFeed::Clock::now());
           }
         },
         [](const std::string& /*valve_id*/) {});
-    feed->Poll(PlantFeed::Clock::now());
+    feed->Poll(console::PlantFeed::Clock::now());
   }
   stopping.request_stop();
   console.Close();
@@ -139,23 +138,18 @@ void AddConsoleVerb(report::Program& program) {
       ->required()
       ->type_name("URL");
   console
-      .add_option("--listen", options.listen,
+      .add_option("--listen", options.page.address,
                   "Where to serve it; a PORT alone is on loopback, port 0 any "
                   "free one")
       ->capture_default_str()
       ->type_name("ADDRESS:PORT");
-  AddConsoleProxyOption(console, options.console);
-  console
-      .add_option("--console-files", options.console.files,
-                  "Folder of the page instead of the installed one")
-      ->type_name("DIR");
+  AddPageFiles(program, console, options.page);
   console.add_option("--valves", options.bus.valves,
                      "Only ids that match GLOB");
   console
       .add_option("--max-valves", options.bus.max_valves,
                   "Maximum number of valves")
       ->check(CLI::Range(1, 100000));
-  AddRemovedConsoleOptions(program, "console");
 }
 
 }  // namespace fdi::monitor

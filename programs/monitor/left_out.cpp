@@ -1,7 +1,11 @@
 // What this program says where a build was made without an optional component.
 #include "base/error.h"
+#include "programs/monitor/console.h"
 #include "programs/monitor/planner.h"
 #include "programs/monitor/verbs.h"
+#if FDI_CONSOLE && !FDI_PLANNER
+#include "programs/monitor/planner_page.h"
+#endif
 
 namespace fdi::monitor {
 
@@ -11,8 +15,8 @@ void AddGroupsOption(report::Program& program, CLI::App& /*run*/,
   program.AddLeftOut("run", "--groups", "FDI_PLANNER");
 }
 
-MakeFollower FollowCauses(const std::filesystem::path& /*groups*/,
-                          const report::Context& context) {
+std::shared_ptr<ServicePart> FollowCauses(
+    const std::filesystem::path& /*groups*/, const report::Context& context) {
   const std::filesystem::path usual = context.options.data_dir / "groups.toml";
   if (std::filesystem::exists(usual)) {
     context.log(
@@ -22,9 +26,11 @@ MakeFollower FollowCauses(const std::filesystem::path& /*groups*/,
                    {"reason", report::LeftOut("the search for common causes",
                                               "FDI_PLANNER")}}));
   }
-  return {};
+  return nullptr;
 }
+#endif
 
+#if FDI_CONSOLE && !FDI_PLANNER
 std::vector<console::Route> PlannerRoutes(
     const std::filesystem::path& /*groups*/,
     const report::Context& /*context*/) {
@@ -40,9 +46,23 @@ std::vector<console::Route> PlannerRoutes(
 }
 #endif
 
-#if !FDI_PLANT
+#if !FDI_CONSOLE
+void AddPageOptions(report::Program& program, CLI::App& /*run*/,
+                    PageOptions& /*options*/) {
+  program.AddLeftOut("run", "--console", "FDI_CONSOLE");
+}
+
+std::shared_ptr<ServicePart> MakePage(const PageOptions& /*options*/,
+                                      const std::filesystem::path& /*groups*/,
+                                      const std::string& /*valves*/,
+                                      const report::Context& /*context*/) {
+  return nullptr;
+}
+#endif
+
+#if !FDI_CONSOLE || !FDI_PLANT
 void AddConsoleVerb(report::Program& program) {
-  program.AddLeftOut("", "console", "FDI_PLANT");
+  program.AddLeftOut("", "console", FDI_PLANT ? "FDI_CONSOLE" : "FDI_PLANT");
 }
 #endif
 

@@ -4,12 +4,9 @@
 
 #include "planner/live/cause_groups.h"
 #include "planner/live/cause_watch.h"
-#include "planner/live/console_routes.h"
 
 namespace fdi::monitor {
-namespace {
 
-// None without a file.
 std::vector<storage::CauseGroup> ReadGroups(const std::filesystem::path& groups,
                                             const report::Context& context) {
   const std::filesystem::path usual = context.options.data_dir / "groups.toml";
@@ -18,8 +15,6 @@ std::vector<storage::CauseGroup> ReadGroups(const std::filesystem::path& groups,
   }
   return planner::ReadCauseGroups(groups.empty() ? usual : groups);
 }
-
-}  // namespace
 
 void AddGroupsOption(report::Program& /*program*/, CLI::App& run,
                      std::filesystem::path& groups) {
@@ -31,16 +26,9 @@ void AddGroupsOption(report::Program& /*program*/, CLI::App& run,
       ->type_name("FILE.toml");
 }
 
-MakeFollower FollowCauses(const std::filesystem::path& groups,
-                          const report::Context& context) {
-  std::vector<storage::CauseGroup> read = ReadGroups(groups, context);
-  return read.empty() ? MakeFollower{}
-                      : planner::CauseFollower(std::move(read));
-}
-
-std::vector<console::Route> PlannerRoutes(const std::filesystem::path& groups,
+std::shared_ptr<ServicePart> FollowCauses(const std::filesystem::path& groups,
                                           const report::Context& context) {
-  return planner::ConsoleRoutes(ReadGroups(groups, context));
+  return planner::CausePart(ReadGroups(groups, context));
 }
 
 }  // namespace fdi::monitor

@@ -1,11 +1,12 @@
 #pragma once
 
 #include <filesystem>
+#include <memory>
 #include <vector>
 
-#include "monitor/console/api.h"
-#include "monitor/service/history_follower.h"
+#include "monitor/service/service_part.h"
 #include "report/program.h"
+#include "storage/history/common_cause.h"
 
 /// What the planner adds to the verbs of this program, or left_out.cpp if the
 /// build has no planner.
@@ -15,14 +16,15 @@ namespace fdi::monitor {
 void AddGroupsOption(report::Program& program, CLI::App& run,
                      std::filesystem::path& groups);
 
-/// Looks for common causes in the groups of valves of a file.
+/// The groups of valves of a file; none without one.
 /// @param groups empty: DATA/groups.toml if it exists.
 /// @throws ConfigError naming file, line and key; NotFoundError.
-MakeFollower FollowCauses(const std::filesystem::path& groups,
-                          const report::Context& context);
+std::vector<storage::CauseGroup> ReadGroups(const std::filesystem::path& groups,
+                                            const report::Context& context);
 
-/// Further routes of the console. `groups` as for FollowCauses().
-std::vector<console::Route> PlannerRoutes(const std::filesystem::path& groups,
+/// Looks for common causes in the groups of ReadGroups(); null if there are
+/// none.
+std::shared_ptr<ServicePart> FollowCauses(const std::filesystem::path& groups,
                                           const report::Context& context);
 
 }  // namespace fdi::monitor

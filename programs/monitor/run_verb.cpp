@@ -8,7 +8,8 @@
 #include "base/headroom.h"
 #include "monitor/service/service.h"
 #include "monitor/throttled_log.h"
-#include "programs/monitor/console_options.h"
+#include "programs/monitor/console.h"
+#include "programs/monitor/http_option.h"
 #include "programs/monitor/planner.h"
 #include "programs/monitor/verbs.h"
 #include "report/program.h"
@@ -24,8 +25,7 @@ struct RunArguments {
   std::string model_set;
   std::string record{"off"};
   std::string http{"off"};
-  std::string console{"off"};
-  console::ConsoleOptions console_options;
+  PageOptions page;
   std::filesystem::path groups;
   ServiceOptions service;
 };
@@ -46,44 +46,6 @@ std::string ParseRecord(const std::string& word) {
                                word + " is none of on, lossless, off");
   }
   return word;
-}
-
-// As for --record; an address is validated where it is used.
-std::function<std::string(std::string)> AddressOr(const std::string& usual) {
-  return [usual](const std::string& word) {
-    if (word == "true" || word == "on") {
-      return usual;
-    }
-    return word == "false" ? "off" : word;
-  };
-}
-
-void TakeConsole(const RunArguments& arguments, ServiceOptions& options) {
-  if (arguments.console == "off") {
-    if (!arguments.console_options.proxy_secret.empty() ||
-        !arguments.console_options.files.empty()) {
-      throw ConfigError(
-          "--console-proxy and --console-files need "
-          "--console[=[ADDRESS:]PORT]");
-    }
-    return;
-  }
-  console::ConsoleOptions& console =
-      options.console.emplace(arguments.console_options);
-  console.address = ParseHttpAddress(arguments.console, "--console");
-}
-
-void AddConsoleOptions(CLI::App& run, RunArguments& arguments) {
-  run.add_option("--console", arguments.console,
-                 "Serve the live page and its API; port 0: any free one")
-      ->expected(0, 1)
-      ->default_str("127.0.0.1:8080")
-      ->transform(AddressOr("127.0.0.1:8080"))
-      ->type_name("[=[ADDRESS:]PORT]");
-  AddConsoleProxyOption(run, arguments.console_options);
-  run.add_option("--console-files", arguments.console_options.files,
-                 "Folder of the page instead of the installed one")
-      ->type_name("DIR");
 }
 
 void AddOnEventOptions(CLI::App& run, ServiceOptions& service) {
@@ -113,20 +75,22 @@ int Run(const RunArguments& arguments, const report::Context& context) {
   if (arguments.http != "off") {
     options.http = ParseHttpAddress(arguments.http, "--http");
   }
-  TakeConsole(arguments, options);
-  options.follower = FollowCauses(arguments.groups, context);
-  if (options.console) {
-    options.console->routes = PlannerRoutes(arguments.groups, context);
-  }
-  // Some 25 threads, 55 with the console, and 50 files: a lack is said before
+  // Some 25 threads, 60 with the console, and 50 files: a lack is said before
   // the bus or a file is touched.
   RequireDescriptors(kDescriptors);
-  RequireHeadroom(options.console ? 64 : 32, 64U << 20U);
+  RequireHeadroom(arguments.page.address != "off" ? 64 : 32, 64U << 20U);
   // Before the service, so that a signal during its start requests an orderly
   // stop.
   report::StopSignals signals(report::StopSignals::HangUp::kReload);
   const report::Context limited{context.options, LimitLog(context.log),
                                 context.software, context.command_line};
+  for (auto& part : {FollowCauses(arguments.groups, limited),
+                     MakePage(arguments.page, arguments.groups,
+                              options.pipeline.valve_glob, limited)}) {
+    if (part) {
+      options.parts.push_back(part);
+    }
+  }
   Service service(options, limited);
   return service.Run(signals);
 }
@@ -186,14 +150,12 @@ void AddRunVerb(report::Program& program) {
       ->capture_default_str();
   AddGroupsOption(program, run, arguments.groups);
   AddOnEventOptions(run, service);
-  run.add_option("--http", arguments.http,
-                 "Serve /metrics, /healthz and /readyz; port 0: any free one")
-      ->expected(0, 1)
-      ->default_str("127.0.0.1:9464")
-      ->transform(AddressOr("127.0.0.1:9464"))
-      ->type_name("[=[ADDRESS:]PORT]");
-  AddConsoleOptions(run, arguments);
-  AddRemovedConsoleOptions(program, "run");
+  AddHttpOption(run, "--http", arguments.http, "127.0.0.1:9464",
+                "Serve /metrics, /healthz and /readyz; port 0: any free one");
+  AddPageOptions(program, run, arguments.page);
+  program.AddRemoved("run", "--allow-host",
+                     "nginx answers under other names (docs/console.md, The "
+                     "page beyond this host)");
   for (const char* option : {"--shadow", "--shadow-valves"}) {
     program.AddRemoved("run", option,
                        "record with --record, then compare the two sets with "

@@ -12,8 +12,8 @@ void AddRunVerb(report::Program& program);
 /// `watch`: prints or counts what monitors publish.
 void AddWatchVerb(report::Program& program);
 
-/// `console`: the live page of all monitors; in a build without plant/,
-/// left_out.cpp.
+/// `console`: the live page of all monitors; in a build without
+/// console/ or plant/, left_out.cpp.
 void AddConsoleVerb(report::Program& program);
 
 }  // namespace fdi::monitor

@@ -6,7 +6,7 @@
 #include "base/time_text.h"
 #include "diagnosis/decision/certainty.h"
 #include "diagnosis/model/fault_catalogue.h"
-#include "monitor/console/model_facts.h"
+#include "diagnosis/model/shown_state.h"
 #include "report/text_table.h"
 #include "storage/history/episode.h"
 
@@ -75,7 +75,7 @@ void WatchRecords::Flush(Clock::time_point now) {
 
 WatchRecord WatchRecords::RecordOf(const idl::DecisionMessage& message) const {
   const Verdict& v = message.verdict;
-  const std::string state(console::ShownState(v));
+  const std::string state(ShownState(v));
   const Json residuals = names_.Residuals(message);
   const Json factors = names_.Factors(message);
   std::string line = Start(v.stamp_ns, message.valve_id) + " " +

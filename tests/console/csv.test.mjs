@@ -3,7 +3,7 @@
 import assert from 'node:assert/strict';
 import {test} from 'node:test';
 
-import {csvOf} from '../../monitor/console/web/js/csv.js';
+import {csvOf} from '../../console/web/js/csv.js';
 
 test('CSV has no formulas, and quotes only where it must', () => {
   const rows = ['=1+1', '+1+1', '-cmd', '@SUM(A1)', '\'=1', '-1.5', 'V, "1"',

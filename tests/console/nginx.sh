@@ -6,7 +6,7 @@
 # roles, and stranger, who has none. FOLDER/proxy-secret holds the secret.
 # Usage: nginx.sh FOLDER HTTPS_PORT HTTP_PORT PAGE_PORT METRICS_PORT
 set -euo pipefail
-site=$(dirname "$0")/../../monitor/console/nginx/fdi.conf
+site=$(dirname "$0")/../../console/nginx/fdi.conf
 folder=$(realpath "$1")
 PATH=$PATH:/usr/sbin
 openssl req -x509 -newkey ec -pkeyopt ec_paramgen_curve:P-256 -nodes -days 2 \

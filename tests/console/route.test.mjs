@@ -3,7 +3,7 @@
 import assert from 'node:assert/strict';
 import {test} from 'node:test';
 
-import {link, parseRoute} from '../../monitor/console/web/js/route.js';
+import {link, parseRoute} from '../../console/web/js/route.js';
 
 test('a link leads back to where it came from', () => {
   const {name, id, query} =

@@ -3,7 +3,7 @@
 import assert from 'node:assert/strict';
 import {test} from 'node:test';
 
-import {EventParser} from '../../monitor/console/web/js/stream.js';
+import {EventParser} from '../../console/web/js/stream.js';
 
 test('events come whole from pieces', () => {
   const parser = new EventParser();

@@ -4,7 +4,7 @@ import assert from 'node:assert/strict';
 import {test} from 'node:test';
 
 import {TrendData}
-  from '../../monitor/console/web/js/charts/trend_data.js';
+  from '../../console/web/js/charts/trend_data.js';
 
 function trend(times, extra = {}) {
   return {

@@ -10,7 +10,7 @@ import {after, before, test} from 'node:test';
 import {accessibilityFaults, close, launch, openShared, setScheme} from './browser.mjs';
 import {until} from './programs.mjs';
 
-const kWeb = new URL('../../monitor/console/web/', import.meta.url);
+const kWeb = new URL('../../console/web/', import.meta.url);
 const kTypes = {html: 'text/html', js: 'text/javascript', css: 'text/css',
   svg: 'image/svg+xml'};
 const kNowMs = Date.now();

@@ -2,8 +2,8 @@
 
 #include <csignal>
 #include <filesystem>
-#include <fstream>
 #include <iterator>
+#include <memory>
 #include <string>
 #include <thread>
 #include <vector>
@@ -118,33 +118,40 @@ TEST_F(ServiceTest, AFolderThatHadToBeMadeIsSaidOnce) {
   EXPECT_EQ(Count("data_folder_made"), 1U);
 }
 
-// Twice, as the first participant may leave threads of the library behind.
-TEST_F(ServiceTest, AnErrorAtTheStartLeavesNoThreadOfTheConsole) {
-  const std::filesystem::path page = directory_.path() / "page";
-  std::filesystem::create_directories(page);
-  std::ofstream(page / "index.html") << "<html></html>";
+// Says what the service does with it.
+class TalkingPart : public ServicePart {
+ public:
+  explicit TalkingPart(std::string& said) : said_(said) {}
+  std::string_view name() const override { return "talking"; }
+  void Start(const PartContext& context) override {
+    said_ += "start " + context.software + ", ";
+  }
+  void OnAssigned(const std::vector<std::string>& valves) override {
+    said_ += std::to_string(valves.size()) + " assigned, ";
+  }
+  void OnCommitted(const FaultEvent& /*event*/, bool /*stored*/) override {}
+  void Leave() override { said_ += "leave, "; }
+  void Stop() override { said_ += "stop, "; }
+  void Close() override { said_ += "close"; }
+
+ private:
+  std::string& said_;
+};
+
+TEST_F(ServiceTest, AnErrorAtTheStartEndsItsParts) {
+  std::string said;
   ServiceOptions options;
-  options.console.emplace();
-  options.console->files = page;
-  options.http.emplace();
-  options.http->host = options.console->address.host = "127.0.0.1";
+  options.parts.push_back(std::make_shared<TalkingPart>(said));
   const report::Context context = Context();
   report::StopSignals signals(report::StopSignals::HangUp::kReload);
-  std::size_t threads_left = 0;
-  for (const char* data : {"first", "second"}) {
-    global_.data_dir = directory_.path() / data;
-    lines_.clear();
-    threads_left = ThreadCount();
-    Service service(options, context);
-    Execute(global_.data_dir / "history.db", storage::HistorySchema(),
-            "DROP TABLE accumulator");
+  Service service(options, context);
+  Execute(global_.data_dir / "history.db", storage::HistorySchema(),
+          "DROP TABLE event_outbox");
 
-    EXPECT_THROW(service.Run(signals), std::exception);
+  EXPECT_THROW(service.Run(signals), std::exception);
 
-    EXPECT_EQ(Count("console_listening"), 1U);
-    EXPECT_EQ(Count("monitor_stopped"), 1U);
-  }
-  EXPECT_EQ(ThreadCount(), threads_left);
+  EXPECT_EQ(said, "start fdi-test 1.0, 0 assigned, leave, stop, close");
+  EXPECT_EQ(Count("monitor_stopped"), 1U);
 }
 
 // Who asks for a reload wants to know, however often.

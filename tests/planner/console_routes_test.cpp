@@ -1,5 +1,5 @@
 // The planner's part of the console over real HTTP.
-#include "planner/live/console_routes.h"
+#include "planner/page/console_routes.h"
 
 #include <fstream>
 
@@ -7,7 +7,7 @@
 #include <httplib.h>
 
 #include "base/time_text.h"
-#include "monitor/console/console.h"
+#include "console/console.h"
 #include "tests/html_check.h"
 #include "tests/storage/history_fixture.h"
 

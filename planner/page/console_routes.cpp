@@ -1,0 +1,226 @@
+// Routes for maintenance planners: the work list, and months of a valve.
+#include "planner/page/console_routes.h"
+
+#include <map>
+#include <memory>
+#include <sstream>
+#include <string>
+
+#include <httplib.h>
+
+#include "base/mutex.h"
+#include "base/time_units.h"
+#include "planner/fleet_report.h"
+#include "planner/work_list.h"
+#include "storage/history/foreign_history.h"
+#include "storage/history/health.h"
+
+namespace fdi::planner {
+namespace {
+
+using console::Api;
+using console::Json;
+using console::Parameter;
+using console::TimeParameter;
+
+constexpr std::int64_t kDays = 90;  // Unless since_ms says otherwise.
+constexpr std::int64_t kMaxRows = 1000;
+constexpr std::int64_t kWeek = 7 * kNsPerDay;
+constexpr std::int64_t kCacheNs = 60'000'000'000;
+
+// The last work list that was requested.
+struct WorkListCache {
+  Mutex mutex;
+  std::string query GUARDED_BY(mutex);
+  std::int64_t read_ns GUARDED_BY(mutex){0};
+  std::vector<WorkRow> rows GUARDED_BY(mutex);
+  std::string note GUARDED_BY(mutex);  // What was left out.
+};
+
+std::vector<HealthLimit> LimitsOf(const httplib::Request& request) {
+  std::vector<std::string> texts;
+  for (std::size_t i = 0; i < request.get_param_value_count("limit"); ++i) {
+    texts.push_back(request.get_param_value("limit", i));
+  }
+  return ParseLimits(texts);
+}
+
+report::Report ReadReport(WorkListCache& cache, const Api& api,
+                          const httplib::Request& request) {
+  std::string query = "?";
+  for (const auto& [name, value] : request.params) {
+    query += name + "=" + value + "&";
+  }
+  const std::int64_t now_ns = api.sources.utc_now_ns();
+  const MutexLock lock(cache.mutex);
+  if (query != cache.query || now_ns >= cache.read_ns + kCacheNs ||
+      now_ns < cache.read_ns) {
+    WorkQuery work;
+    work.options.now_ns = now_ns;
+    work.valve_glob = Parameter(request, "valve").value_or("*");
+    work.since_ns =
+        TimeParameter(request, "since_ms", now_ns - kDays * kNsPerDay);
+    work.top = static_cast<std::size_t>(
+        console::IntegerParameter(request, "top", 10, 1, kMaxRows));
+    work.discipline = Parameter(request, "discipline").value_or("");
+    work.limits = LimitsOf(request);
+    const auto history = api.History();
+    cache.rows = ReadWorkList(*history, api.texts, work);
+    cache.note = storage::TakeNote(*history);
+    cache.query = query;
+    cache.read_ns = now_ns;
+  }
+  report::Report report = WorkListReport(cache.rows);
+  report.document["note"] = console::TextOrNull(cache.note);
+  return report;
+}
+
+// One array per quantity, as charts need them; all have the same length.
+Json ColumnsJson(const std::vector<HealthHour>& hours,
+                 const report::FaultTexts& texts) {
+  Json columns;
+  for (const char* key :
+       {"t_ms", "seen_h", "live_h", "alarm_h", "auto_h", "open_h", "shut_h",
+        "d0", "travel_strokes", "path_strokes", "reversals", "slip_jumps",
+        "turns", "steps", "exceeded", "status", "epoch"}) {
+    columns[key] = Json::array();
+  }
+  for (std::size_t i = 0; i < loop::kFigureCount; ++i) {
+    columns[std::string(loop::FigureName(static_cast<loop::Figure>(i)))] =
+        Json::array();
+  }
+  // If an hour lacks a channel, for example because the model set was
+  // different, its columns have nulls.
+  std::map<std::string, Json> channels;
+  const auto fill = [&channels](std::size_t size) {
+    for (auto& [signal, channel] : channels) {
+      for (const char* key : {"mean", "rms", "percent"}) {
+        while (channel[key].size() < size) {
+          channel[key].push_back(nullptr);
+        }
+      }
+    }
+  };
+  const Json rows = HealthHoursJson(hours, texts);
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    for (auto& [key, column] : columns.items()) {
+      column.push_back(key == "t_ms" ? console::Ms(hours[i].hour * kNsPerHour)
+                                     : rows[i][key]);
+    }
+    for (const Json& channel : rows[i]["channels"]) {
+      Json& columns_of = channels[channel["signal"]];
+      columns_of["signal"] = channel["signal"];
+      columns_of["unit"] = channel["unit"];
+      fill(i);
+      for (const char* key : {"mean", "rms", "percent"}) {
+        columns_of[key].push_back(channel[key]);
+      }
+    }
+    fill(i + 1);
+  }
+  columns["channels"] = Json::array();
+  for (auto& [signal, columns_of] : channels) {
+    columns["channels"].push_back(std::move(columns_of));
+  }
+  return columns;
+}
+
+Json Health(const Api& api, const httplib::Request& request) {
+  const std::string valve_id = request.matches[1];
+  const std::int64_t now_ns = api.sources.utc_now_ns();
+  const std::int64_t since_ns =
+      TimeParameter(request, "since_ms", now_ns - kDays * kNsPerDay);
+  const bool hourly =
+      console::IntegerParameter(request, "hourly", 0, 0, 1) == 1;
+  const auto limits = LimitsOf(request);
+  const auto history = api.History();
+  const std::vector<HealthHour> hours =
+      history->Health({valve_id, since_ns, now_ns + kNsPerHour});
+  Json json{{"valve", valve_id}, {"step", hourly ? "hour" : "day"}};
+  json.update(ColumnsJson(hourly ? hours : DaysOf(hours), api.texts));
+  json["trends"] = TrendsJson(TrendsOf(hours, limits));
+  json["note"] = console::TextOrNull(storage::TakeNote(*history));
+  return json;
+}
+
+// The last report that was requested.
+struct FleetCache {
+  Mutex mutex;
+  std::int64_t since_ns GUARDED_BY(mutex){
+      -1};  // As asked for; 0: the last week.
+  std::int64_t made_ns GUARDED_BY(mutex){0};
+  report::Report report GUARDED_BY(mutex);
+};
+
+// Without the audit of stored runs, which takes long.
+report::Report ReadFleet(FleetCache& cache, const Api& api,
+                         const httplib::Request& request) {
+  const std::int64_t since_ns = TimeParameter(request, "since_ms", 0);
+  const std::int64_t now_ns = api.sources.utc_now_ns();
+  const MutexLock lock(cache.mutex);
+  if (since_ns != cache.since_ns || now_ns >= cache.made_ns + kCacheNs ||
+      now_ns < cache.made_ns) {
+    FleetQuery query;
+    query.now_ns = now_ns;
+    query.since_ns = since_ns > 0 ? since_ns : now_ns - kWeek;
+    query.software = api.sources.software;
+    if (!api.sources.plant_history) {
+      query.loops = LoopsOf(api.sources.models);
+      query.causes = CausesOf(api.sources.history, query.since_ns);
+    }
+    for (const console::ValveState& valve : api.board.Valves(false)) {
+      if (valve.models && valve.quality == Quality::kLive &&
+          valve.silence == monitor::Silence::kNone) {
+        query.judged_now.push_back(valve.id);
+      }
+    }
+    const auto history = api.History();
+    cache.report = FleetReport(history.get(), api.texts, query);
+    cache.report.document["note"] =
+        console::TextOrNull(storage::TakeNote(*history));
+    cache.since_ns = since_ns;
+    cache.made_ns = now_ns;
+  }
+  return cache.report;
+}
+
+}  // namespace
+
+std::vector<console::Route> ConsoleRoutes(
+    const std::vector<storage::CauseGroup>& groups) {
+  Json list = Json::array();
+  for (const storage::CauseGroup& group : groups) {
+    list.push_back({{"name", group.name}, {"valves", group.valve_globs}});
+  }
+  const auto fleet = std::make_shared<FleetCache>();
+  const auto cache = std::make_shared<WorkListCache>();
+  return {
+      {"/api/v1/groups",
+       [answer = Json{{"groups", std::move(list)}}](
+           const Api&, const httplib::Request&) { return answer; }},
+      {"/api/v1/worklist",
+       [cache](const Api& api, const httplib::Request& request) {
+         return ReadReport(*cache, api, request).document;
+       }},
+      {"/api/v1/worklist.csv", nullptr,
+       [cache](const Api& api, const httplib::Request& request) {
+         std::ostringstream csv;
+         ReadReport(*cache, api, request).PrintCsv(csv);
+         return console::File{"text/csv; charset=utf-8", "worklist.csv",
+                              csv.str()};
+       }},
+      {"/api/v1/report",
+       [fleet](const Api& api, const httplib::Request& request) {
+         return ReadFleet(*fleet, api, request).document;
+       }},
+      {"/api/v1/report.html", nullptr,
+       [fleet](const Api& api, const httplib::Request& request) {
+         std::ostringstream html;
+         ReadFleet(*fleet, api, request)
+             .PrintHtml(html, kFleetTitle, {true, true});
+         return console::File{"text/html; charset=utf-8", "", html.str(), true};
+       }},
+      {"/api/v1/valves/(.+)/health", Health}};
+}
+
+}  // namespace fdi::planner
