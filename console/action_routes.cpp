@@ -37,7 +37,7 @@ Json AlarmRow(const Api& api, const std::string& id) {
   const auto reader = api.History();
   return AlarmJson(
       reader->Alarms({reader->Show(id)}, api.sources.utc_now_ns()).front(),
-      api.texts);
+      api.texts, *api.alarms.Facts());
 }
 
 Json Acknowledge(const Api& api, const httplib::Request& request,

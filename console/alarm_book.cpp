@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "base/error.h"
-#include "storage/history/certainty.h"
 
 namespace fdi::console {
 namespace {
@@ -14,6 +13,8 @@ namespace {
 using storage::Alarm;
 using storage::AlarmState;
 using storage::HistoryAwayError;
+
+constexpr std::int64_t kFactsNs = 60'000'000'000;
 
 void AddTo(ValveAlarm& valve, const Alarm& alarm,
            const report::FaultTexts& texts) {
@@ -26,15 +27,14 @@ void AddTo(ValveAlarm& valve, const Alarm& alarm,
   if (!e.ended_ns || (e.unconfirmed_ns && valve.episode.empty())) {
     valve.since_ns = e.detected_ns;
     valve.episode = e.episode_id;
-    valve.severity =
-        texts.Words(e.fault.value_or("unknown"), e.strength, e.priority)
-            .severity;
-    valve.strength = IsNamed(e) ? std::optional(e.strength) : std::nullopt;
+    const findings::Finding finding = findings::FindingOf(e, texts);
+    valve.severity = finding.words.severity;
+    valve.strength = finding.strength;
     valve.unconfirmed_ns = e.unconfirmed_ns;
     valve.fault = e.fault.value_or("");
     valve.by_audit = !e.ended_ns && e.layer == LayerName(Layer::kAudit);
-    valve.certainty = storage::CertaintyOf(e);
-    valve.look_alikes = storage::LookAlikesOf(e);
+    valve.certainty = *finding.certainty;
+    valve.look_alikes = finding.look_alikes;
     valve.second = e.second;
   }
 }
@@ -86,6 +86,24 @@ std::vector<Json> AlarmBook::Refresh(std::int64_t now_ns) {
   }
 }
 
+// Labels and grades change seldom, and to count labels takes a while.
+void AlarmBook::ReadFacts(storage::History& history, std::int64_t now_ns) {
+  if (facts_read_ns_ && now_ns >= *facts_read_ns_ &&
+      now_ns < *facts_read_ns_ + kFactsNs) {
+    return;
+  }
+  auto facts = std::make_shared<const findings::RankFacts>(
+      findings::ReadRankFacts(history, models_, now_ns));
+  facts_read_ns_ = now_ns;
+  const MutexLock lock(mutex_);
+  facts_ = std::move(facts);
+}
+
+std::shared_ptr<const findings::RankFacts> AlarmBook::Facts() const {
+  const MutexLock lock(mutex_);
+  return facts_;
+}
+
 std::vector<Json> AlarmBook::Read(storage::History& history,
                                   std::int64_t now_ns) {
   // Shelves begin and end without a commit, so the version alone is not enough.
@@ -93,6 +111,8 @@ std::vector<Json> AlarmBook::Read(storage::History& history,
   if (version_ == version && now_ns < next_shelf_change_ns_) {
     return {};
   }
+  ReadFacts(history, now_ns);
+  const auto facts = Facts();
   const std::vector<Alarm> alarms = history.AlarmList(now_ns, kMaxAlarms);
   const auto shelves = history.Shelves(now_ns);
   std::map<std::string, std::string> last;
@@ -104,7 +124,7 @@ std::vector<Json> AlarmBook::Read(storage::History& history,
   std::vector<Json> changed;
   for (const Alarm& alarm : alarms) {
     const std::string& id = alarm.episode.episode_id;
-    Json row = AlarmJson(alarm, texts_);
+    Json row = AlarmJson(alarm, texts_, *facts);
     rows[id] = JsonText(row);
     const auto known = last.find(id);
     if (known == last.end() || known->second != rows[id]) {
@@ -117,7 +137,7 @@ std::vector<Json> AlarmBook::Read(storage::History& history,
     }
     try {
       const auto left = history.Alarms({history.Show(id)}, now_ns);
-      changed.push_back(AlarmJson(left.front(), texts_));
+      changed.push_back(AlarmJson(left.front(), texts_, *facts));
     } catch (const NotFoundError&) {  // Pruned.
     } catch (const HistoryAwayError&) {
       throw;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <functional>
 #include <map>
 #include <memory>
@@ -31,8 +32,10 @@ class AlarmBook {
  public:
   using ByValveMap = std::map<std::string, ValveAlarm>;
 
-  AlarmBook(OpenHistory open, const report::FaultTexts& texts)
-      : open_(std::move(open)), texts_(texts) {}
+  /// @param models file of models.db, which has the grades of the loops.
+  AlarmBook(OpenHistory open, const report::FaultTexts& texts,
+            std::filesystem::path models = {})
+      : open_(std::move(open)), texts_(texts), models_(std::move(models)) {}
 
   /// Polls the history, and reopens it after a failure. One thread.
   /// @returns rows, as JSON, that are new, have changed or have left the list;
@@ -42,6 +45,8 @@ class AlarmBook {
 
   /// By valve id, as of the last Refresh(). Thread safe.
   std::shared_ptr<const ByValveMap> ByValve() const;
+  /// What weighs in the rank of alarms, at most a minute old. Thread safe.
+  std::shared_ptr<const findings::RankFacts> Facts() const;
   /// Adds an event heard on the bus: its episode counts as an alarm until the
   /// history contains it or it closes. @returns false if the history already
   /// has it, with its acknowledgement. Thread safe.
@@ -53,17 +58,22 @@ class AlarmBook {
 
  private:
   std::vector<Json> Read(storage::History& history, std::int64_t now_ns);
+  void ReadFacts(storage::History& history, std::int64_t now_ns);
   void Combine() REQUIRES(mutex_);
 
   OpenHistory open_;
   const report::FaultTexts& texts_;
+  const std::filesystem::path models_;
   std::unique_ptr<storage::History> history_;
   std::optional<std::string> version_;
   std::int64_t next_shelf_change_ns_{0};
+  std::optional<std::int64_t> facts_read_ns_;
   bool read_{false};
 
   mutable Mutex mutex_;
   std::optional<HistoryAway> away_ GUARDED_BY(mutex_);
+  std::shared_ptr<const findings::RankFacts> facts_ GUARDED_BY(mutex_){
+      std::make_shared<findings::RankFacts>()};
   std::map<std::string, std::string> rows_
       GUARDED_BY(mutex_);  // By episode, as last returned.
   std::map<std::string, storage::Alarm> unstored_

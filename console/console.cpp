@@ -88,7 +88,7 @@ void Console::Start(ConsoleSources sources) {
           : [path = sources.history]() -> std::unique_ptr<storage::History> {
         return std::make_unique<storage::HistoryReader>(path);
       },
-      texts_);
+      texts_, sources.models);
   // With `new`: the places of an Api can be neither moved nor copied.
   api_.reset(new Api{std::move(sources), board_, stream_, *alarms_, *models_,
                      texts_, access_, NewInstance(), stopping_.get_token()});

@@ -40,7 +40,7 @@ Json Alarms(const Api& api, const httplib::Request& /*request*/) {
     note = storage::TakeNote(*reader);
   }
   return {{"now_ms", Ms(now_ns)},
-          {"alarms", AlarmsJson(alarms, api.texts)},
+          {"alarms", AlarmsJson(alarms, api.texts, *api.alarms.Facts())},
           {"note", TextOrNull(note)}};
 }
 
@@ -85,7 +85,7 @@ Json History(const Api& api, const httplib::Request& request) {
   std::reverse(episodes.begin(), episodes.end());
   return {{"episodes",
            AlarmsJson(reader->Alarms(std::move(episodes), filter.now_ns),
-                      api.texts)},
+                      api.texts, *api.alarms.Facts())},
           {"more", more},
           {"note", TextOrNull(note)}};
 }
@@ -322,7 +322,7 @@ Json Episode(const Api& api, const httplib::Request& request) {
   Json look = LookJson(reader->Look(episode.id), points, trace);
   Json growth =
       GrowthJson(storage::GrowthOf(episode, reader->Strengths(episode.id)));
-  return {{"episode", AlarmJson(alarm, api.texts)},
+  return {{"episode", AlarmJson(alarm, api.texts, *api.alarms.Facts())},
           {"events", std::move(list)},
           {"look", std::move(look)},
           {"growth", std::move(growth)},

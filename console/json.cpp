@@ -8,7 +8,6 @@
 #include "diagnosis/model/fault_catalogue.h"
 #include "diagnosis/model/shown_state.h"
 #include "storage/database/database.h"
-#include "storage/history/certainty.h"
 
 namespace fdi::console {
 namespace {
@@ -311,21 +310,19 @@ Json ShelfJson(const storage::Shelf& shelf) {
           {"planned_ms", Ms(shelf.planned_ns)}};
 }
 
-Json AlarmJson(const storage::Alarm& alarm, const report::FaultTexts& texts) {
+Json AlarmJson(const storage::Alarm& alarm, const report::FaultTexts& texts,
+               const findings::RankFacts& facts) {
   const storage::Episode& e = alarm.episode;
-  report::FaultWords words =
-      texts.Words(e.fault.value_or("unknown"), e.strength, e.priority);
-  if (const auto no_name = storage::NoNameText(e); !no_name.empty()) {
-    words.name = no_name;
-  }
+  const findings::Finding finding = findings::FindingOf(e, texts, facts);
+  const report::FaultWords& words = finding.words;
   const auto strength = [&e](std::optional<double> value) {
     return IsNamed(e) ? Rounded(value, kFactorDecimals) : Json();
   };
   Json json{{"episode", e.episode_id},
             {"valve", e.valve_id},
             {"fault", TextOrNull(e.fault)},
-            {"certainty", CertaintyName(storage::CertaintyOf(e))},
-            {"look_alikes", storage::LookAlikesOf(e)},
+            {"certainty", CertaintyName(*finding.certainty)},
+            {"look_alikes", finding.look_alikes},
             {"second", TextOrNull(e.second)},
             {"layer", TextOrNull(e.layer)},
             {"state", StateOf(e)},
@@ -349,6 +346,7 @@ Json AlarmJson(const storage::Alarm& alarm, const report::FaultTexts& texts) {
             {"model_set", e.model_set},
             {"severity", SeverityName(words.severity)},
             {"priority", PriorityOf(words.severity)},
+            {"score", Rounded(finding.score(), kFactorDecimals)},
             {"discipline", words.discipline},
             {"namur", report::NamurName(words.namur)},
             {"name", words.name},
@@ -360,10 +358,11 @@ Json AlarmJson(const storage::Alarm& alarm, const report::FaultTexts& texts) {
 }
 
 Json AlarmsJson(const std::vector<storage::Alarm>& alarms,
-                const report::FaultTexts& texts) {
+                const report::FaultTexts& texts,
+                const findings::RankFacts& facts) {
   Json list = Json::array();
   for (const storage::Alarm& alarm : alarms) {
-    list.push_back(AlarmJson(alarm, texts));
+    list.push_back(AlarmJson(alarm, texts, facts));
   }
   return list;
 }

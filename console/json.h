@@ -8,6 +8,7 @@
 #include "console/live_board.h"
 #include "diagnosis/decision/certainty.h"
 #include "report/fault_texts.h"
+#include "report/findings/finding.h"
 #include "report/json_output.h"
 #include "storage/history/alarm.h"
 
@@ -68,9 +69,11 @@ Json TrendJson(const ModelFacts* models, const std::string& valve_id,
                const std::vector<TracePoint>& points);
 Json GapJson(const DataGap& gap);
 
-Json AlarmJson(const storage::Alarm& alarm, const report::FaultTexts& texts);
+Json AlarmJson(const storage::Alarm& alarm, const report::FaultTexts& texts,
+               const findings::RankFacts& facts = {});
 Json AlarmsJson(const std::vector<storage::Alarm>& alarms,
-                const report::FaultTexts& texts);
+                const report::FaultTexts& texts,
+                const findings::RankFacts& facts);
 Json ShelfJson(const storage::Shelf& shelf);
 
 /// The alarm that `event` belongs to, made from the event alone because it is

@@ -417,15 +417,6 @@ void PlantReader::CountUnsound(const char* what, std::string_view sql,
   }
 }
 
-std::vector<EpisodeStatistics> PlantReader::Statistics(
-    const EpisodeFilter& filter) {
-  CountUnsound("episode", sql::plant_unsound, sql::plant_sound, filter);
-  return Judged<EpisodeStatistics>(
-      "statistics", Query(Replaced(std::string(sql::plant_statistics),
-                                   "{sound}", sql::plant_sound),
-                          filter));
-}
-
 std::vector<DataGap> PlantReader::Gaps(const EpisodeFilter& filter) {
   return Judged<DataGap>(
       "data gap", Query(Replaced(std::string(sql::plant_gaps), "{columns}",
@@ -517,8 +508,9 @@ std::vector<std::string> PlantReader::HealthValves(const std::string& glob) {
   return valves;
 }
 
-std::vector<CommonCause> PlantReader::OpenCauses() {
-  const PlantRows rows = plant_.Read(sql::plant_open_causes);
+std::vector<CommonCause> PlantReader::Causes(std::int64_t since_ns) {
+  const PlantRows rows =
+      plant_.Read(sql::plant_causes, {std::to_string(since_ns)});
   struct Row {
     std::string monitor;
     CommonCause cause;  // Of one member.
@@ -529,12 +521,13 @@ std::vector<CommonCause> PlantReader::OpenCauses() {
     row.cause.cause_id = rows.Text(r, 1).value_or("");
     row.cause.group = rows.Text(r, 2).value_or("");
     ParseColumn("opened_ns", rows.Text(r, 3), row.cause.opened_ns);
+    ParseColumn("ended_ns", rows.Text(r, 4), row.cause.ended_ns);
     CauseMember& member = row.cause.members.emplace_back();
-    member.episode_id = rows.Text(r, 4).value_or("");
-    member.valve_id = rows.Text(r, 5).value_or("");
-    member.fault = rows.Text(r, 6).value_or("");
-    ParseColumn("isolated_ns", rows.Text(r, 7), member.isolated_ns);
-    ParseColumn("ended_ns", rows.Text(r, 8), member.ended_ns);
+    member.episode_id = rows.Text(r, 5).value_or("");
+    member.valve_id = rows.Text(r, 6).value_or("");
+    member.fault = rows.Text(r, 7).value_or("");
+    ParseColumn("isolated_ns", rows.Text(r, 8), member.isolated_ns);
+    ParseColumn("ended_ns", rows.Text(r, 9), member.ended_ns);
     return row;
   };
   std::vector<CommonCause> causes;

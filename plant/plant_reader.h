@@ -35,8 +35,6 @@ class PlantReader : public ForeignHistory {
   std::optional<EpisodeLook> Look(std::uint64_t episode_id) override;
   std::vector<StrengthPoint> Strengths(std::uint64_t episode_id) override;
   std::vector<TracePoint> Trace(std::uint64_t episode_id) override;
-  std::vector<EpisodeStatistics> Statistics(
-      const EpisodeFilter& filter) override;
   std::vector<DataGap> Gaps(const EpisodeFilter& filter) override;
   std::vector<CoverageTime> Coverage(const EpisodeFilter& filter) override;
   std::vector<Alarm> AlarmList(std::int64_t now_ns,
@@ -47,7 +45,7 @@ class PlantReader : public ForeignHistory {
       std::optional<std::int64_t> not_over_at_ns) override;
   std::vector<HealthHour> Health(const HealthFilter& filter) override;
   std::vector<std::string> HealthValves(const std::string& glob) override;
-  std::vector<CommonCause> OpenCauses() override;
+  std::vector<CommonCause> Causes(std::int64_t since_ns) override;
   std::string Version() override;
   void FinishWithin(std::chrono::milliseconds time) override;
   void SayTo(LogSink log) override;

@@ -304,26 +304,6 @@ SELECT * FROM (
   WHERE {episodes}
   ORDER BY utc(e.detected_ns) DESC, e.valve_id DESC LIMIT {limit}) l
 ORDER BY detected_ns, valve_id, host, monitor
--- name: plant_statistics
-SELECT e.valve_id, coalesce(e.fault, ''), count(*),
-  count(*) FILTER (WHERE e.ended_ns IS NULL),
-  count(*) FILTER (WHERE e.acked_by IS NULL),
-  count(*) FILTER (WHERE e.label = 'true' OR strpos(
-    '|' || coalesce(e.fault, '') || '|', '|' || e.label || '|') > 0),
-  count(*) FILTER (WHERE NOT (e.label = 'true' OR strpos(
-    '|' || coalesce(e.fault, '') || '|', '|' || e.label || '|') > 0)),
-  avg((e.isolated_ns - e.detected_ns) * 1e-9::float8),
-  avg((e.ended_ns - e.detected_ns) * 1e-9::float8), max(e.peak_factor),
-  max(e.detected_ns)
-FROM episode e
-WHERE {episodes} AND {sound}
-GROUP BY e.valve_id, e.fault ORDER BY e.valve_id, e.fault
--- Beside what the checks say: the sums of this row cannot overflow.
--- name: plant_sound
-(is_stamp(e.detected_ns) AND is_stamp(e.isolated_ns) IS NOT FALSE
-  AND is_stamp(e.ended_ns) IS NOT FALSE AND is_finite(e.peak_factor))
--- name: plant_unsound
-SELECT count(*) FROM episode e WHERE {episodes} AND NOT {sound}
 -- The time is that of the spans, not of their detection.
 -- name: plant_spans
 SELECT e.valve_id, coalesce(e.fault, ''), e.detected_ns, e.ended_ns, e.label,
@@ -392,13 +372,14 @@ SELECT DISTINCT ON (hour, epoch, model_hash)
 FROM health_hour JOIN monitor m USING (monitor_id)
 WHERE valve_id = $1 AND hour >= $2 AND hour < $3 AND ($4 = '' OR m.monitor = $4)
 ORDER BY hour, epoch, model_hash, live_ms DESC, m.host, m.monitor
--- Open causes with their members, of which the columns make a CauseMember.
--- name: plant_open_causes
-SELECT c.monitor_id, c.cause_id, c.group_name, c.opened_ns, m.episode_id,
-  m.valve_id, m.fault, m.isolated_ns, e.ended_ns
+-- $1 causes that have ended count from their opening on. The last five columns
+-- make a CauseMember.
+-- name: plant_causes
+SELECT c.monitor_id, c.cause_id, c.group_name, c.opened_ns, c.ended_ns,
+  m.episode_id, m.valve_id, m.fault, m.isolated_ns, e.ended_ns
 FROM common_cause c JOIN common_cause_member m USING (monitor_id, cause_id)
   LEFT JOIN episode e USING (monitor_id, episode_id)
-WHERE c.ended_ns IS NULL
+WHERE c.ended_ns IS NULL OR c.opened_ns >= $1
 ORDER BY c.opened_ns, c.monitor_id, c.cause_id, m.isolated_ns, m.valve_id
 -- The last hour of each valve since hour $1.
 -- name: plant_seen

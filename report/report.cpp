@@ -166,9 +166,9 @@ const char* ToneName(Tone tone) {
 }  // namespace
 
 Report& Report::Table(std::string key, std::vector<Column> columns,
-                      std::string if_empty, std::size_t widest) {
-  views_.emplace_back(TableView{std::move(key), std::move(columns),
-                                std::move(if_empty), widest});
+                      std::string if_empty) {
+  views_.emplace_back(
+      TableView{std::move(key), std::move(columns), std::move(if_empty)});
   return *this;
 }
 
@@ -235,11 +235,7 @@ class Report::TextPrinter {
         }
       }
     }
-    TextStyle style = style_.text;
-    if (style.width == 0) {
-      style.width = view.widest;
-    }
-    table.Print(out_, style);
+    table.Print(out_, style_.text);
   }
 
   void operator()(const FieldsView& view) const {

@@ -82,10 +82,10 @@ class Report {
   /// Shows the array at `key`, a member of the document or a path "a/b", as a
   /// table. A row is an object. `if_empty` is printed if there is no row.
   /// Of an object {"f3": {...}, ...} each member is a row, its name the row's
-  /// member "name". Beside a terminal, which says how wide it is, the text is
-  /// no wider than `widest`; 0: unlimited.
+  /// member "name". Only a terminal makes the text narrower; files and pipes
+  /// get all columns.
   Report& Table(std::string key, std::vector<Column> columns,
-                std::string if_empty = "", std::size_t widest = 0);
+                std::string if_empty = "");
   /// Shows members of the object at `key` ("" is the document) as aligned
   /// lines "heading:  value".
   Report& Fields(std::string key, std::vector<Column> fields);
@@ -117,7 +117,6 @@ class Report {
     std::string key;
     std::vector<Column> columns;
     std::string if_empty;
-    std::size_t widest{0};
   };
   struct FieldsView {
     std::string key;

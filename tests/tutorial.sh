@@ -83,13 +83,13 @@ check_tutorial() {
   fdi-store models list | grep >/dev/null '^paper@2 *yes' || fail "paper@2 is not active"
 }
 check_plant() {
-  local list report
+  local list worst
   list=$(fdi-store valves list)
   grep -q 'FIC103 .*saturated' <<<"$list" || fail "FIC103 is not at an end: $list"
   grep -q 'FIC101 .*undetermined' <<<"$list" || fail "FIC101: $list"
-  report=$(fdi-store report --csv | sed -n 2p)
-  grep -q 'FIC103.*saturated' <<<"$report" || fail "not the worst: $report"
-  [ -s FIC103.png ] && [ -s report.html ] || fail "no picture or no report"
+  worst=$(fdi-store worklist --audit-windows 3 --csv | sed -n 2p)
+  grep -q 'FIC103.*saturated' <<<"$worst" || fail "not the worst: $worst"
+  [ -s FIC103.png ] && [ -s worklist.html ] || fail "no picture or no page"
 }
 "check_$page"
 echo "$page: $(ls "$out"/*.sh | wc -l) blocks in $SECONDS s"

@@ -10,8 +10,9 @@
 
 #include "base/mutex.h"
 #include "base/time_units.h"
-#include "planner/fleet_report.h"
 #include "planner/work_list.h"
+#include "planner/work_report.h"
+#include "report/findings/finding.h"
 #include "storage/history/foreign_history.h"
 #include "storage/history/health.h"
 
@@ -23,19 +24,7 @@ using console::Json;
 using console::Parameter;
 using console::TimeParameter;
 
-constexpr std::int64_t kDays = 90;  // Unless since_ms says otherwise.
-constexpr std::int64_t kMaxRows = 1000;
-constexpr std::int64_t kWeek = 7 * kNsPerDay;
 constexpr std::int64_t kCacheNs = 60'000'000'000;
-
-// The last work list that was requested.
-struct WorkListCache {
-  Mutex mutex;
-  std::string query GUARDED_BY(mutex);
-  std::int64_t read_ns GUARDED_BY(mutex){0};
-  std::vector<WorkRow> rows GUARDED_BY(mutex);
-  std::string note GUARDED_BY(mutex);  // What was left out.
-};
 
 std::vector<HealthLimit> LimitsOf(const httplib::Request& request) {
   std::vector<std::string> texts;
@@ -45,8 +34,17 @@ std::vector<HealthLimit> LimitsOf(const httplib::Request& request) {
   return ParseLimits(texts);
 }
 
-report::Report ReadReport(WorkListCache& cache, const Api& api,
-                          const httplib::Request& request) {
+// The last work list that was requested.
+struct ListCache {
+  Mutex mutex;
+  std::string query GUARDED_BY(mutex);
+  std::int64_t read_ns GUARDED_BY(mutex){0};
+  Json document GUARDED_BY(mutex);
+};
+
+// Without the audit of stored runs, which takes long.
+Json ReadList(ListCache& cache, const Api& api,
+              const httplib::Request& request) {
   std::string query = "?";
   for (const auto& [name, value] : request.params) {
     query += name + "=" + value + "&";
@@ -56,23 +54,29 @@ report::Report ReadReport(WorkListCache& cache, const Api& api,
   if (query != cache.query || now_ns >= cache.read_ns + kCacheNs ||
       now_ns < cache.read_ns) {
     WorkQuery work;
-    work.options.now_ns = now_ns;
+    work.now_ns = now_ns;
     work.valve_glob = Parameter(request, "valve").value_or("*");
-    work.since_ns =
-        TimeParameter(request, "since_ms", now_ns - kDays * kNsPerDay);
-    work.top = static_cast<std::size_t>(
-        console::IntegerParameter(request, "top", 10, 1, kMaxRows));
+    work.since_ns = TimeParameter(request, "since_ms",
+                                  now_ns - findings::kPeriodDays * kNsPerDay);
     work.discipline = Parameter(request, "discipline").value_or("");
     work.limits = LimitsOf(request);
+    work.software = api.sources.software;
+    if (!api.sources.plant_history) {
+      work.loops = LoopsOf(api.sources.models);
+    }
+    for (const console::ValveState& valve : api.board.Valves(false)) {
+      if (valve.models && valve.quality == Quality::kLive &&
+          valve.silence == monitor::Silence::kNone) {
+        work.judged_now.push_back(valve.id);
+      }
+    }
     const auto history = api.History();
-    cache.rows = ReadWorkList(*history, api.texts, work);
-    cache.note = storage::TakeNote(*history);
+    cache.document = WorkList(history.get(), api.texts, work);
+    cache.document["note"] = console::TextOrNull(storage::TakeNote(*history));
     cache.query = query;
     cache.read_ns = now_ns;
   }
-  report::Report report = WorkListReport(cache.rows);
-  report.document["note"] = console::TextOrNull(cache.note);
-  return report;
+  return cache.document;
 }
 
 // One array per quantity, as charts need them; all have the same length.
@@ -128,8 +132,8 @@ Json ColumnsJson(const std::vector<HealthHour>& hours,
 Json Health(const Api& api, const httplib::Request& request) {
   const std::string valve_id = request.matches[1];
   const std::int64_t now_ns = api.sources.utc_now_ns();
-  const std::int64_t since_ns =
-      TimeParameter(request, "since_ms", now_ns - kDays * kNsPerDay);
+  const std::int64_t since_ns = TimeParameter(
+      request, "since_ms", now_ns - findings::kPeriodDays * kNsPerDay);
   const bool hourly =
       console::IntegerParameter(request, "hourly", 0, 0, 1) == 1;
   const auto limits = LimitsOf(request);
@@ -143,47 +147,6 @@ Json Health(const Api& api, const httplib::Request& request) {
   return json;
 }
 
-// The last report that was requested.
-struct FleetCache {
-  Mutex mutex;
-  std::int64_t since_ns GUARDED_BY(mutex){
-      -1};  // As asked for; 0: the last week.
-  std::int64_t made_ns GUARDED_BY(mutex){0};
-  report::Report report GUARDED_BY(mutex);
-};
-
-// Without the audit of stored runs, which takes long.
-report::Report ReadFleet(FleetCache& cache, const Api& api,
-                         const httplib::Request& request) {
-  const std::int64_t since_ns = TimeParameter(request, "since_ms", 0);
-  const std::int64_t now_ns = api.sources.utc_now_ns();
-  const MutexLock lock(cache.mutex);
-  if (since_ns != cache.since_ns || now_ns >= cache.made_ns + kCacheNs ||
-      now_ns < cache.made_ns) {
-    FleetQuery query;
-    query.now_ns = now_ns;
-    query.since_ns = since_ns > 0 ? since_ns : now_ns - kWeek;
-    query.software = api.sources.software;
-    if (!api.sources.plant_history) {
-      query.loops = LoopsOf(api.sources.models);
-      query.causes = CausesOf(api.sources.history, query.since_ns);
-    }
-    for (const console::ValveState& valve : api.board.Valves(false)) {
-      if (valve.models && valve.quality == Quality::kLive &&
-          valve.silence == monitor::Silence::kNone) {
-        query.judged_now.push_back(valve.id);
-      }
-    }
-    const auto history = api.History();
-    cache.report = FleetReport(history.get(), api.texts, query);
-    cache.report.document["note"] =
-        console::TextOrNull(storage::TakeNote(*history));
-    cache.since_ns = since_ns;
-    cache.made_ns = now_ns;
-  }
-  return cache.report;
-}
-
 }  // namespace
 
 std::vector<console::Route> ConsoleRoutes(
@@ -192,32 +155,27 @@ std::vector<console::Route> ConsoleRoutes(
   for (const storage::CauseGroup& group : groups) {
     list.push_back({{"name", group.name}, {"valves", group.valve_globs}});
   }
-  const auto fleet = std::make_shared<FleetCache>();
-  const auto cache = std::make_shared<WorkListCache>();
+  const auto cache = std::make_shared<ListCache>();
   return {
       {"/api/v1/groups",
        [answer = Json{{"groups", std::move(list)}}](
            const Api&, const httplib::Request&) { return answer; }},
       {"/api/v1/worklist",
        [cache](const Api& api, const httplib::Request& request) {
-         return ReadReport(*cache, api, request).document;
+         return ReadList(*cache, api, request);
        }},
       {"/api/v1/worklist.csv", nullptr,
        [cache](const Api& api, const httplib::Request& request) {
          std::ostringstream csv;
-         ReadReport(*cache, api, request).PrintCsv(csv);
+         WorkListReport(ReadList(*cache, api, request)).PrintCsv(csv);
          return console::File{"text/csv; charset=utf-8", "worklist.csv",
                               csv.str()};
        }},
-      {"/api/v1/report",
-       [fleet](const Api& api, const httplib::Request& request) {
-         return ReadFleet(*fleet, api, request).document;
-       }},
-      {"/api/v1/report.html", nullptr,
-       [fleet](const Api& api, const httplib::Request& request) {
+      {"/api/v1/worklist.html", nullptr,
+       [cache](const Api& api, const httplib::Request& request) {
          std::ostringstream html;
-         ReadFleet(*fleet, api, request)
-             .PrintHtml(html, kFleetTitle, {true, true});
+         WorkListPage(ReadList(*cache, api, request))
+             .PrintHtml(html, kListTitle, {true, true});
          return console::File{"text/html; charset=utf-8", "", html.str(), true};
        }},
       {"/api/v1/valves/(.+)/health", Health}};

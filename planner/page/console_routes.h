@@ -7,10 +7,9 @@
 
 namespace fdi::planner {
 
-/// /api/v1/groups, worklist, worklist.csv, report, report.html,
-/// valves/ID/health.
-/// Reading months of all valves takes a while, so the last work list and the
-/// last report stay valid for a minute.
+/// /api/v1/groups, worklist, worklist.csv, worklist.html, valves/ID/health.
+/// Reading months of all valves takes a while, so the last work list stays
+/// valid for a minute; it says as of when it is.
 /// @param groups of valves, which the page shows as such.
 std::vector<console::Route> ConsoleRoutes(
     const std::vector<storage::CauseGroup>& groups = {});

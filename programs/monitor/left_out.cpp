@@ -40,8 +40,7 @@ std::vector<console::Route> PlannerRoutes(
         report::LeftOut("what the planner adds to the page", "FDI_PLANNER"));
   };
   return {{"/api/v1/groups", refuse},
-          {"/api/v1/worklist(?:\\.csv)?", refuse},
-          {"/api/v1/report(?:\\.html)?", refuse},
+          {"/api/v1/worklist(?:\\.(?:csv|html))?", refuse},
           {"/api/v1/valves/.+/health", refuse}};
 }
 #endif

@@ -136,8 +136,8 @@ void WarnIfUnknown(const std::string& valve, HistoryReader& reader,
   for (const CoverageTime& time : reader.Coverage()) {
     known.insert(time.valve_id);
   }
-  for (const EpisodeStatistics& s : reader.Statistics()) {
-    known.insert(s.valve_id);
+  for (const auto& [id, figures] : reader.AlarmFigures({}, NowNs()).valves) {
+    known.insert(id);
   }
   if (!known.contains(valve)) {
     const auto meant = Suggest(valve, {known.begin(), known.end()});

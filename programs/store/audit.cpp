@@ -16,7 +16,6 @@
 #include "import/csv.h"
 #include "import/layout.h"
 #include "import/tag_map.h"
-#include "programs/store/loop_audits.h"
 #include "programs/store/verbs.h"
 #include "report/plot/loop_figure.h"
 #include "storage/runs/runs.h"

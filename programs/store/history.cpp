@@ -1,5 +1,5 @@
 // fdi-store history: list, show, export, plot. The other verbs of the group are
-// in figures.cpp and alarms.cpp.
+// in alarms.cpp.
 #include <algorithm>
 
 #include "base/csv_cells.h"
@@ -36,8 +36,7 @@ Tone ToneOf(const Json& row) {
              : Tone::kAlarm;
 }
 
-// Of the list, where no terminal says how wide it is; of a fault's name.
-constexpr std::size_t kWidest = 100;
+// The width to which a fault's name may be cut.
 constexpr std::size_t kLeastName = 15;
 
 // "20 s" from the detection to the time under `key`, or "-" if that has not
@@ -134,7 +133,7 @@ Report ListEpisodes(const HistoryOptions& options, const Context& context) {
     columns.insert(columns.begin() + 1, {{"host", "host", Format::kPlain, 0, 9},
                                          {"monitor", "monitor"}});
   }
-  return report.Table("episodes", columns, "no episode matches", kWidest);
+  return report.Table("episodes", columns, "no episode matches");
 }
 
 // Transitions have faults and a factor; operator actions have a who.
@@ -503,7 +502,14 @@ void AddHistoryVerbs(report::Program& program) {
               "Show an episode, what to check, and its events", ShowEpisode);
   AddEpisode(show, shown.id);
   shown.plant.AddTo(show);
-  AddHistoryFigures(program, group);
+  program.AddRemoved("history", "shadow",
+                     "fdi-trainer compare compares two model sets on recorded "
+                     "runs");
+  program.AddRemoved("history", "stats",
+                     "`fdi-store worklist` has the figures of the alarms "
+                     "(--json, --html)");
+  program.AddRemoved("history", "causes",
+                     "`fdi-store worklist` has common causes (--json, --html)");
   AddAlarmVerbs(program, group);
 
   auto [exporting, exported] =

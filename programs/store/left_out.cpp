@@ -6,7 +6,7 @@ namespace fdi::storage {
 
 #if !FDI_PLANNER
 void AddPlannerVerbs(report::Program& program) {
-  for (const char* verb : {"health", "report", "worklist"}) {
+  for (const char* verb : {"health", "worklist"}) {
     program.AddLeftOut("", verb, "FDI_PLANNER");
   }
 }

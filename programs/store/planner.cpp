@@ -1,12 +1,20 @@
 // fdi-store health show|trend, worklist: for maintenance planners.
 #include <algorithm>
+#include <filesystem>
+#include <memory>
+#include <optional>
 #include <string>
+#include <utility>
 
+#include "base/csv_cells.h"
 #include "base/error.h"
+#include "base/time_units.h"
 #include "planner/health_view.h"
 #include "planner/work_list.h"
+#include "planner/work_report.h"
 #include "programs/store/verbs.h"
 #include "report/fault_texts.h"
+#include "report/findings/finding.h"
 #include "storage/history/history.h"
 
 namespace fdi::storage {
@@ -141,27 +149,84 @@ Report Trend(const HealthOptions& options, const Context& context) {
 
 struct WorkListOptions {
   std::string valve{"*"};
-  std::string since{"90d"};
+  std::string since{std::to_string(findings::kPeriodDays) + "d"};
   std::string discipline;
   std::vector<std::string> limits;
   std::size_t top{10};
   double horizon_days{180.0};
+  int audit_windows{0};
+  std::string html;
   PlantOptions plant;
 };
 
+// The document of the list that was written last; nothing: there is none.
+std::optional<Json> LastList(const std::filesystem::path& file) {
+  if (!std::filesystem::exists(file)) {
+    return std::nullopt;
+  }
+  Json last = Json::parse(ReadTextFile(file), nullptr, false);
+  if (!last.is_object()) {
+    throw DataError(file.string() +
+                    " is no work list of this program; move it away, or name "
+                    "another file");
+  }
+  return last;
+}
+
+// The page, and beside it the document, with which the next one is compared.
+void WritePage(const Json& document, const std::filesystem::path& html,
+               const std::filesystem::path& json, const Context& context) {
+  const Report page = planner::WorkListPage(document);
+  report::WriteOutput(html, [&](std::ostream& out) {
+    page.PrintHtml(out, planner::kListTitle, {context.options.utc, true});
+  });
+  report::WriteOutput(json, [&](std::ostream& out) { page.PrintJson(out); });
+}
+
 Report WorkList(const WorkListOptions& options, const Context& context) {
+  const DataDirectory data = DataOf(context);
   planner::WorkQuery query;
   query.valve_glob = options.valve;
-  query.options.now_ns = NowNs();
-  query.options.horizon_days = options.horizon_days;
+  // Whole seconds, as people read them.
+  query.now_ns = NowNs() / kNsPerSecond * kNsPerSecond;
+  query.horizon_days = options.horizon_days;
   query.since_ns =
-      ParseTimeOrAgo(options.since, context.options.utc, query.options.now_ns);
-  query.top = options.top;
+      ParseTimeOrAgo(options.since, context.options.utc, query.now_ns);
+  if (query.since_ns >= query.now_ns) {
+    throw ConfigError("--since " + options.since +
+                      " is not in the past; try 7d or 2026-10-01");
+  }
   query.discipline = options.discipline;
   query.limits = planner::ParseLimits(options.limits);
-  const auto history = OpenHistory(options.plant, context);
-  return planner::WorkListReport(planner::ReadWorkList(
-      *history, report::LoadFaultTexts(context.options), query));
+  query.software = context.software;
+  const std::filesystem::path html = options.html;
+  auto json = html;
+  json.replace_extension(".json");
+  if (!html.empty()) {
+    query.last = LastList(json);
+    query.last_file = json.string();
+  }
+  // Runs and models are enough for a list. Where there are none either, the
+  // missing history is the mistake to tell.
+  const bool of_plant = options.plant.asked();
+  const bool only_runs = !of_plant &&
+                         !std::filesystem::exists(data.history()) &&
+                         (std::filesystem::exists(data.runs()) ||
+                          std::filesystem::exists(data.models()));
+  std::unique_ptr<History> history;
+  if (!only_runs) {
+    history = OpenHistory(options.plant, context);
+  }
+  if (!of_plant) {
+    query.loops = planner::LoopsOf(data.models());
+    query.audits = AuditStoredRuns(data, query.since_ns, options.audit_windows);
+  }
+  Json document = planner::WorkList(
+      history.get(), report::LoadFaultTexts(context.options), query);
+  if (!html.empty()) {
+    WritePage(document, html, json, context);
+  }
+  return planner::WorkListReport(std::move(document), options.top);
 }
 
 }  // namespace
@@ -196,14 +261,15 @@ void AddPlannerVerbs(report::Program& program) {
       ->required()
       ->type_name("NAME=VALUE");
 
-  auto [list, options] =
-      AddVerb(program, program.root(), "worklist",
-              "The valves to look at at the next stop, and why", WorkList);
-  list.add_option("--top", options.top, "Number of valves to list; 0: all");
+  auto [list, options] = AddVerb(
+      program, program.root(), "worklist",
+      "What is wrong, the worst first, and what to do about it", WorkList);
+  list.add_option("--top", options.top, "Rows of the text; 0: all");
   list.add_option("--valve", options.valve,
-                  "Only valves whose ids match this glob");
+                  "Only rows of valves whose ids match this glob");
   list.add_option("--since", options.since,
-                  "Episodes and trends from this time on: 90d, 2026-10-01");
+                  "Episodes, trends and figures from this time on: 90d, "
+                  "2026-10-01");
   list.add_option("--discipline", options.discipline,
                   "Only work for operator, instrument, air or mechanical");
   list.add_option("--limit", options.limits,
@@ -214,9 +280,19 @@ void AddPlannerVerbs(report::Program& program) {
                   "Leave out trends that reach their limit later than this")
       ->check(CLI::Range(1.0, 36500.0))
       ->type_name("DAYS");
+  list.add_option("--audit-windows", options.audit_windows,
+                  "Windows of two hours to audit of each loop's newest stored "
+                  "run")
+      ->check(CLI::Range(0, 100));
+  list.add_option("--html", options.html,
+                  "Also write the list as a page to print, with what could not "
+                  "be judged, coverage, figures of the alarms, and what has "
+                  "changed since the list in the .json file beside it, which "
+                  "this one replaces")
+      ->type_name("FILE.html");
   options.plant.AddTo(list);
-  program.AllowCsv(list, "CSV, one line per valve");
-  AddFleetVerb(program);
+  program.AllowCsv(list, "CSV, one line per row");
+  program.AddRemoved("", "report", "`fdi-store worklist --html FILE` is it");
 }
 
 }  // namespace fdi::storage

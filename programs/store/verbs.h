@@ -11,6 +11,7 @@
 #include <CLI/CLI.hpp>
 
 #include "base/time_text.h"
+#include "diagnosis/records/loop_audits.h"
 #include "report/output_folder.h"
 #include "report/program.h"
 #include "report/report.h"
@@ -40,14 +41,17 @@ void AddValvesVerbs(report::Program& program);
 void AddTypesVerbs(report::Program& program);
 void AddHistoryVerbs(report::Program& program);  ///< list, show, export, plot
 // Added to the group `history`, which must exist.
-void AddHistoryFigures(report::Program& program, CLI::App& group);
 void AddAlarmVerbs(report::Program& program, CLI::App& group);
 void AddAuditVerb(report::Program& program);
+/// Audits at most `windows` windows of two hours of each loop, spread over its
+/// newest run since `since_ns`. Simulated runs are of no loop of the plant.
+/// Empty without runs.
+LoopAudits AuditStoredRuns(const DataDirectory& data, std::int64_t since_ns,
+                           int windows);
 void AddFaultsVerb(report::Program& program);
 void AddMaintenanceVerbs(report::Program& program);
 // Of optional components; in a build without them, left_out.cpp defines these.
 void AddPlannerVerbs(report::Program& program);  ///< health, worklist
-void AddFleetVerb(report::Program& program);     ///< report
 void AddShipVerb(report::Program& program);
 
 /// Examples for --help and the manual pages.

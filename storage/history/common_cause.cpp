@@ -279,15 +279,13 @@ std::vector<CauseChange> CommonCauseBook::EndFinished() {
 }
 
 std::vector<CommonCause> ReadCommonCauses(Database& database,
-                                          const CauseFilter& filter) {
+                                          std::int64_t since_ns) {
   Statement row = database.Prepare(sql::causes);
-  row.Bind(filter.group_glob, filter.since_ns, filter.until_ns,
-           filter.open_only, filter.limit > 0 ? filter.limit : -1);
+  row.Bind(since_ns);
   std::vector<CommonCause> causes;
   while (row.Step()) {
     causes.push_back(ReadCause(database, row.Text(0)));
   }
-  std::ranges::reverse(causes);
   return causes;
 }
 

@@ -95,18 +95,9 @@ class CommonCauseBook {
   bool at_end_{false};
 };
 
-/// Settings of ReadCommonCauses().
-struct CauseFilter {
-  std::string group_glob{"*"};
-  bool open_only{false};
-  std::int64_t since_ns{std::numeric_limits<std::int64_t>::min()};
-  std::int64_t until_ns{std::numeric_limits<std::int64_t>::max()};
-  std::int64_t limit{0};  ///< Only the newest ones; 0: all.
-};
-
-/// Ordered by opening.
+/// As History::Causes().
 std::vector<CommonCause> ReadCommonCauses(Database& database,
-                                          const CauseFilter& filter = {});
+                                          std::int64_t since_ns);
 
 }  // namespace fdi::storage
 

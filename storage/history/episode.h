@@ -136,21 +136,6 @@ struct EpisodeFilter {
 /// The names that ParseEpisodeState() accepts.
 std::vector<std::string> EpisodeStateNames();
 
-/// Episodes of one valve with one diagnosis.
-struct EpisodeStatistics {
-  std::string valve_id;
-  std::string fault;  ///< As in the view; "" while not isolated.
-  std::int64_t episodes{0};
-  std::int64_t open{0};
-  std::int64_t unacked{0};
-  std::int64_t labelled_true{0};           ///< Label true, or that fault.
-  std::int64_t labelled_false{0};          ///< Label false, or another fault.
-  std::optional<double> mean_isolation_s;  ///< From detection.
-  std::optional<double> mean_duration_s;   ///< Of the ended ones.
-  double peak_factor{0.0};
-  std::int64_t last_detected_ns{0};
-};
-
 /// Time that one valve spent in one quality, over the days of a filter.
 struct CoverageTime {
   std::string valve_id;
@@ -175,9 +160,5 @@ FDI_FIELDS(fdi::storage::Episode, episode_id, valve_id, detected_utc,
 
 FDI_FIELDS(fdi::storage::MonitorSession, session_id, start_ns, alive_ns,
            stop_ns, clean, software, config)
-
-FDI_FIELDS(fdi::storage::EpisodeStatistics, valve_id, fault, episodes, open,
-           unacked, labelled_true, labelled_false, mean_isolation_s,
-           mean_duration_s, peak_factor, last_detected_ns)
 
 FDI_FIELDS(fdi::storage::CoverageTime, valve_id, quality, samples, hours)

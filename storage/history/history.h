@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -52,10 +53,6 @@ class History {
   /// In order of arrival. @throws DataError if stored bytes are damaged.
   virtual std::vector<TracePoint> Trace(std::uint64_t episode_id) = 0;
 
-  /// By valve and fault, over the episodes that List() would return.
-  virtual std::vector<EpisodeStatistics> Statistics(
-      const EpisodeFilter& filter) = 0;
-
   /// Gaps that overlap the filter's time, of its valves and of all valves.
   virtual std::vector<DataGap> Gaps(const EpisodeFilter& filter) = 0;
 
@@ -80,8 +77,12 @@ class History {
   /// Ids of valves that have stored hours, sorted; `glob` is a shell pattern.
   virtual std::vector<std::string> HealthValves(const std::string& glob) = 0;
 
-  /// Common causes that have not ended, ordered by opening.
-  virtual std::vector<CommonCause> OpenCauses() = 0;
+  /// Common causes that have not ended, however old, and those that opened
+  /// since then; ordered by opening.
+  virtual std::vector<CommonCause> Causes(std::int64_t since_ns) = 0;
+  std::vector<CommonCause> OpenCauses() {
+    return Causes(std::numeric_limits<std::int64_t>::max());
+  }
 
   /// Changes whenever something was stored since the last call on this object.
   virtual std::string Version() = 0;

@@ -133,16 +133,6 @@ std::string NewestIds(const EpisodeFilter& filter) {
 
 // SQLite rejects a value for a parameter that the text does not contain: ?5 is
 // bound only where it occurs, or where ?6 follows it.
-void BindFilter(Statement& statement, const EpisodeFilter& filter) {
-  if (filter.state == EpisodeState::kAlarmShelved) {
-    statement.Bind(filter.valve_glob, filter.since_ns, filter.until_ns,
-                   FaultOf(filter), filter.now_ns);
-  } else {
-    statement.Bind(filter.valve_glob, filter.since_ns, filter.until_ns,
-                   FaultOf(filter));
-  }
-}
-
 std::vector<Episode> ReadEpisodes(Statement& rows) {
   auto episodes = ReadRecords<Episode>(rows);
   for (Episode& episode : episodes) {
@@ -179,13 +169,6 @@ std::string ListQuery(const EpisodeFilter& filter) {
          ") ORDER BY e.detected_ns, e.valve_id";
 }
 
-std::string StatisticsQuery(const EpisodeFilter& filter) {
-  return std::string(sql::statistics) + " " + ValveCondition(filter) +
-         StateCondition(filter.state) + " AND " +
-         std::string(FaultCondition(filter)) +
-         " GROUP BY e.valve_id, e.fault ORDER BY e.valve_id, e.fault";
-}
-
 std::string AlarmSpanQuery(const EpisodeFilter& filter) {
   return std::string(sql::alarm_spans) + " " + ValveCondition(filter) +
          " AND " + std::string(FaultCondition(filter)) +
@@ -198,10 +181,9 @@ std::string AlarmListQuery() {
 
 std::vector<AlarmSpan> ReadAlarmSpans(Database& database,
                                       const EpisodeFilter& filter) {
-  EpisodeFilter any_state = filter;
-  any_state.state = EpisodeState::kAny;
-  Statement rows = database.Prepare(AlarmSpanQuery(any_state));
-  BindFilter(rows, any_state);
+  Statement rows = database.Prepare(AlarmSpanQuery(filter));
+  rows.Bind(filter.valve_glob, filter.since_ns, filter.until_ns,
+            FaultOf(filter));
   return ReadRecords<AlarmSpan>(rows);
 }
 
@@ -252,13 +234,6 @@ std::vector<TracePoint> HistoryReader::Trace(std::uint64_t episode_id) {
                  std::make_move_iterator(part.end()));
   }
   return trace;
-}
-
-std::vector<EpisodeStatistics> HistoryReader::Statistics(
-    const EpisodeFilter& filter) {
-  Statement rows = database_.Prepare(StatisticsQuery(filter));
-  BindFilter(rows, filter);
-  return ReadRecords<EpisodeStatistics>(rows);
 }
 
 std::vector<DataGap> HistoryReader::Gaps(const EpisodeFilter& filter) {
@@ -319,9 +294,9 @@ std::vector<Shelf> HistoryReader::Shelves(
   return ReadShelves(database_, not_over_at_ns);
 }
 
-std::vector<CommonCause> HistoryReader::OpenCauses() {
+std::vector<CommonCause> HistoryReader::Causes(std::int64_t since_ns) {
   const Snapshot snapshot(database_);
-  return ReadCommonCauses(database_, {.open_only = true});
+  return ReadCommonCauses(database_, since_ns);
 }
 
 std::vector<HealthHour> HistoryReader::Health(const HealthFilter& filter) {

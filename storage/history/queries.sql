@@ -74,20 +74,6 @@ EXISTS (SELECT 1 FROM shelf s
   WHERE s.valve_id = e.valve_id AND s.until_ns > ?5 AND s.ended_ns IS NULL
     AND (s.planned_ns IS NULL OR s.from_ns <= ?5)
     AND (s.fault IS NULL OR s.fault = e.fault))
--- The columns are kFieldsOf<EpisodeStatistics>. A label is right if it says
--- true or names a fault of the answer.
--- name: statistics
-SELECT e.valve_id, coalesce(e.fault, ''), count(*), sum(e.ended_ns IS NULL),
-  sum(e.acked_by IS NULL),
-  sum(e.label IS NOT NULL AND (e.label = 'true' OR instr(
-    '|' || coalesce(e.fault, '') || '|', '|' || e.label || '|') > 0)),
-  sum(e.label IS NOT NULL AND NOT (e.label = 'true' OR instr(
-    '|' || coalesce(e.fault, '') || '|', '|' || e.label || '|') > 0)),
-  avg((e.isolated_ns - e.detected_ns) * 1e-9),
-  avg((e.ended_ns - e.detected_ns) * 1e-9), max(e.peak_factor),
-  max(e.detected_ns)
-FROM episode e INDEXED BY episode_statistics
-WHERE e.detected_ns >= ?2 AND e.detected_ns < ?3 AND
 -- name: alarm_spans
 SELECT e.valve_id, coalesce(e.fault, ''), e.detected_ns, e.ended_ns, e.label,
   CASE WHEN e.ended_ns IS NULL THEN (
@@ -340,10 +326,8 @@ ORDER BY v.event_id LIMIT ?
 -- name: open_causes
 SELECT cause_id FROM common_cause WHERE ended_ns IS NULL
 -- name: causes
-SELECT cause_id FROM common_cause
-WHERE group_name GLOB ?1 AND opened_ns >= ?2 AND opened_ns < ?3
-  AND (?4 = 0 OR ended_ns IS NULL)
-ORDER BY opened_ns DESC, cause_id LIMIT ?5
+SELECT cause_id FROM common_cause WHERE ended_ns IS NULL OR opened_ns >= ?
+ORDER BY opened_ns, cause_id
 -- name: insert_cause
 INSERT OR IGNORE INTO common_cause (cause_id, group_name, opened_ns)
 VALUES (?, ?, ?)

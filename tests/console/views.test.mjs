@@ -51,7 +51,7 @@ class Monitor {
         'the flow say, for longer than the loop can explain', check: '',
       severity: [], label: false}]},
       causes: {causes: []},
-      valves: {valves}, alarms: {alarms}, worklist: {rows: []},
+      valves: {valves}, alarms: {alarms}, worklist: {...kList, rows: []},
     };
   }
 
@@ -110,7 +110,8 @@ function alarm(episode, valve, fault, more = {}) {
     ended_ms: null, end_reason: null, peak_factor: 0.9, strength: 0.5,
     certainty: fault ? 'likely' : 'not yet',
     label: null, acked_by: null, acked_ms: null, model_set: 'm@1',
-    severity: 'high', discipline: 'instrument', namur: 'failure', name: fault,
+    severity: 'high', score: 4, discipline: 'instrument', namur: 'failure',
+    name: fault,
     check: '', ...more};
 }
 
@@ -590,9 +591,8 @@ test('work on a healthy valve is planned from a later time', async () => {
 test('a narrow screen keeps what to check', async () => {
   monitor.reset([], [alarm('0000000000000001', 'V', 'f19',
       {check: 'Compare it.'})]);
-  monitor.answers.worklist = {rows: [{rank: 1, valve_id: 'V', why: 'w',
-    fault: 'f19', name: 'n', discipline: 'air', check: 'Look here.',
-    episode_id: '0000000000000001'}]};
+  monitor.answers.worklist = {...kList, rows: [{...kWork, valve_id: 'V',
+    check: 'Look here.'}]};
   const page = await openShared(browser, address, '#/alarms',
       {viewport: {width: 390, height: 800}});
   await page.getByText('Compare it.').waitFor();
@@ -608,34 +608,54 @@ test('a narrow screen keeps what to check', async () => {
   await close(page);
 });
 
-const kReport = {
-  made_utc: '2026-11-25T12:00:00Z', since_utc: '2026-11-18T12:00:00Z',
-  coverage: {loops: 3, named_faults: 1, audit: 1, nothing: 1}, others: [],
-  shelved: [],
-  worst: [{rank: 1, valve_ids: [kLongId, 'W'], shares: 'cause: air header',
-    name: '<b>Plug worn', fault: 'f6', severity: 'high',
-    severity_points: 4, grade: 1, grade_factor: 2, certainty: 'likely',
-    confidence: 0.75, score: 6, open: true, check: 'Look at it, and at what ' +
-      'stands beside it; then compare it with another one of its kind.',
-    discipline: 'mechanical|instrument', acked_by: 'anna', label: null,
-    episode_id: '0000000000000001'}],
+const kWork = {rank: 1, valve_id: kLongId, kind: 'episode', fault: 'f6',
+  name: '<b>Plug worn', severity: 'high', severity_points: 4, grade: 1,
+  grade_factor: 2, certainty: 'likely', confidence: 0.75, score: 6, open: true,
+  unconfirmed_utc: null, shares: 'cause: air header',
+  why: 'Plug worn: stands for 3 days, and it grows by 2 % a day',
+  check: 'Look at it, and at what stands beside it; then compare it with ' +
+    'another one of its kind.', discipline: 'mechanical|instrument',
+  acked_by: 'anna', label: null, episode_id: '0000000000000001'};
+
+const kList = {
+  as_of_utc: '2026-11-25T12:00:00Z', since_utc: '2026-08-27T12:00:00Z',
+  coverage: {loops: 3, named_faults: 1, audit: 1, nothing: 1},
+  rows: [kWork, {...kWork, rank: 2, valve_id: 'W', open: false}],
   shared: [{shares: 'cause', group: 'air header', faults: ['f6'],
     since_utc: '2026-11-25T11:00:00Z', ended_utc: null,
     valve_ids: ['V', 'W']}],
-  unjudged: [{valve_id: 'X', judged_share: 0.25, reason: 'no data came'}]};
+  unjudged: [{valve_id: 'X', judged_share: 0.25, reason: 'no data came'}],
+  shelved: []};
 
-test('the report has the worst with their factors, and what nobody judges',
+test('the work list has the order of its document, factors, and what nobody ' +
+  'judges', async () => {
+  monitor.reset();
+  monitor.answers.worklist = kList;
+  const page = await openShared(browser, address, '#/worklist',
+      {viewport: {width: 1900, height: 900}});
+  await page.getByText('<b>Plug worn (f6)').first().waitFor();
+  const text = await page.locator('main').innerText();
+  for (const part of ['As of ', '2 of 3 loops are watched', 'high · 4',
+    '1 · 2.0', 'likely · 0.75', '6.00', 'shares cause: air header',
+    'no data came', '25.0 %', 'mechanical or instrument', 'ended']) {
+    assert.ok(text.includes(part), part);
+  }
+  assert.deepEqual(await page.getByRole('table', {name: 'Work list'})
+      .locator('tbody th').allInnerTexts(), [kLongId, 'W']);
+  await close(page);
+});
+
+test('alarms stand in the order of the work list, and say as of when',
     async () => {
-      monitor.reset();
-      monitor.answers.report = kReport;
-      const page = await openShared(browser, address, '#/report');
-      await page.getByText('<b>Plug worn (f6)').waitFor();
-      const text = await page.locator('main').innerText();
-      for (const part of ['2 of 3 loops are watched', 'high · 4', '1 · 2.0',
-        'likely · 0.75', '6.00', 'anna', 'air header', 'no data came',
-        '25.0 %', 'mechanical or instrument']) {
-        assert.ok(text.includes(part), part);
-      }
+      monitor.reset([], [
+        alarm('0000000000000001', 'Low', 'f6', {score: 1, severity: 'high'}),
+        alarm('0000000000000002', 'Most', 'f19', {score: 8, severity: 'low'}),
+        alarm('0000000000000003', 'Seen', 'f19', {score: 9, isa: 'ACKED'})]);
+      const page = await openShared(browser, address, '#/alarms');
+      await page.locator('tbody tr').first().waitFor();
+      assert.deepEqual(await page.locator('tbody th').allInnerTexts(),
+          ['Most', 'Low', 'Seen']);
+      await page.getByText(/^As of /).waitFor();
       await close(page);
     });
 
@@ -760,8 +780,8 @@ test('every kind of tile can be read, at any size, light and dark',
       tile('LV-5', 'NORMAL')],
       [alarm(episode, 'FV-1', 'f19|f6', {label: 'f6', check: 'Look.'}),
         alarm('0000000000000002', kLongId, 'f19|f6', {label: 'f6',
-          check: kReport.worst[0].check})]);
-      monitor.answers.report = kReport;
+          check: kWork.check})]);
+      monitor.answers.worklist = kList;
       monitor.answers['valves/FV-1/trend'] = trend({state: 'ISOLATED', d0: 0,
         d: [1, 0.4], residual: -76.6});
       Object.assign(monitor.answers.status,
@@ -769,7 +789,7 @@ test('every kind of tile can be read, at any size, light and dark',
       for (const [width, height] of [[1400, 900], [1280, 800], [390, 800]]) {
         const page = await openShared(browser, address, '#/',
             {viewport: {width, height}});
-        for (const hash of ['#/', '#/alarms', '#/valve/FV-1', '#/report']) {
+        for (const hash of ['#/', '#/alarms', '#/valve/FV-1', '#/worklist']) {
           await page.goto(`${address}/${hash}`);
           await page.locator('main :is(.tile, tbody tr, .panel)').first()
               .waitFor();
@@ -800,7 +820,7 @@ test('every other view and dialog can be read, at any size, light and dark',
         certainty: 'one of', lowest: 0.4, highest: 0.6, worst_strength: 0.7,
         discipline: 'mechanical|instrument', acked_by: 'anna', isa: 'ACKED',
         acked_ms: kNowMs, isolated_ms: kNowMs + 60000, layer: 'physics',
-        check: kReport.worst[0].check});
+        check: kWork.check});
       const early = alarm('0000000000000002', 'V', 'unknown', {
         certainty: 'not yet', state: 'CLOSED', isa: 'RTN_UNACK',
         name: 'Fault that ended before it had a name'});
@@ -827,8 +847,7 @@ test('every other view and dialog can be read, at any size, light and dark',
             wrong: 0}],
         labelled: {true: 2, false: 1, none: 9}, most_in_10_min: 4,
         gaps: [{from_ms: kNowMs - 60000, to_ms: kNowMs}]};
-      monitor.answers.worklist = {rows: [{...kReport.worst[0], valve_id: kLongId,
-        why: 'Plug worn (f6) for three days, and it grows by 2 % a day'}]};
+      monitor.answers.worklist = kList;
       monitor.answers[`episodes/${row.episode}`] = {episode: row,
         model_hash: '0123456789abcdef', trace: {...trend({state: 'ISOLATED',
           d0: 0, d: [1, 0.4]}), valve: kLongId},

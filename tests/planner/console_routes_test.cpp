@@ -80,7 +80,9 @@ TEST_F(PlannerRoutesTest, HealthHasTheFiguresAndTheStatusOfEachDay) {
 }
 
 TEST_F(PlannerRoutesTest, WorkListNamesValveAndReason) {
-  const Json rows = Get("/api/v1/worklist")["rows"];
+  const Json list = Get("/api/v1/worklist");
+  EXPECT_EQ(list["as_of_utc"], FormatTime(kDetected + 3600 * kSecond, true));
+  const Json& rows = list["rows"];
   ASSERT_EQ(rows.size(), 1u);
   EXPECT_EQ(rows[0]["valve_id"], "V/1 a");
   EXPECT_EQ(rows[0]["fault"], "f19");
@@ -90,7 +92,7 @@ TEST_F(PlannerRoutesTest, WorkListNamesValveAndReason) {
 }
 
 TEST_F(PlannerRoutesTest, WhatCannotBeIsRefused) {
-  Get("/api/v1/worklist?top=0", 400);
+  Get("/api/v1/worklist?since_ms=soon", 400);
   Get("/api/v1/worklist?discipline=plumber", 400);
   Get("/api/v1/worklist?limit=Q%3D1", 400);
 }
@@ -107,15 +109,16 @@ TEST_F(PlannerRoutesTest, WorkListIsAFileToo) {
   EXPECT_THAT(answer->body, HasSubstr("\n1,V/1 a,"));
 }
 
-TEST_F(PlannerRoutesTest, ReportIsADocumentAndAPage) {
-  const Json report = Get("/api/v1/report");
-  ASSERT_EQ(report["worst"].size(), 1u);
-  EXPECT_EQ(report["worst"][0]["valve_ids"], Json::array({"V/1 a"}));
-  const std::string later = std::to_string(kDetected / 1'000'000 + 3000'000);
-  EXPECT_TRUE(Get("/api/v1/report?since_ms=" + later)["worst"].empty());
-  Get("/api/v1/report?since_ms=soon", 400);
+TEST_F(PlannerRoutesTest, AlarmsHaveTheScoreOfTheWorkList) {
+  EXPECT_DOUBLE_EQ(Get("/api/v1/alarms")["alarms"][0]["score"],
+                   Get("/api/v1/worklist")["rows"][0]["score"]);
+}
 
-  const httplib::Result page = client_->Get("/api/v1/report.html");
+TEST_F(PlannerRoutesTest, WorkListIsAPageToo) {
+  const std::string later = std::to_string(kDetected / 1'000'000 + 3000'000);
+  EXPECT_TRUE(Get("/api/v1/worklist?since_ms=" + later)["rows"].empty());
+
+  const httplib::Result page = client_->Get("/api/v1/worklist.html");
   ASSERT_TRUE(page && page->status == 200);
   EXPECT_THAT(page->get_header_value("Content-Type"), HasSubstr("text/html"));
   // Its style is in it, and nothing else may run or load.

@@ -1,128 +1,75 @@
 #include "planner/work_list.h"
 
+#include <algorithm>
 #include <sstream>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "planner/work_report.h"
 #include "report/shared_files.h"
 #include "storage/history/history_editor.h"
+#include "storage/models/models.h"
+#include "tests/html_check.h"
 #include "tests/storage/history_fixture.h"
 
 namespace fdi::planner {
 namespace {
 
+using report::Json;
+using testing::AllOf;
 using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::Not;
 
 constexpr std::int64_t kDay = 86'400'000'000'000;
-constexpr std::int64_t kNow = 20'000 * kDay;
 
 const report::FaultTexts& Texts() {
   static const report::FaultTexts texts(report::SharedFile("faults.toml"));
   return texts;
 }
 
-WorkOptions Options() {
-  WorkOptions options;
-  options.now_ns = kNow;
-  return options;
-}
-
-FaultReason Reason(const std::string& fault, double strength,
-                   std::optional<double> ended_days_ago = std::nullopt) {
-  FaultReason reason;
-  reason.fault = fault;
-  reason.words = Texts().Words(fault, strength);
-  reason.strength = strength;
-  reason.factor = 1.0;
-  reason.episodes = 1;
-  reason.detected_ns = kNow - 100 * kDay;
-  if (ended_days_ago) {
-    reason.ended_ns =
-        kNow - static_cast<std::int64_t>(*ended_days_ago * 86'400e9);
-  }
-  return reason;
-}
-
-ValveWork Valve(const std::string& id, std::vector<FaultReason> faults) {
-  ValveWork work;
-  work.valve_id = id;
-  work.faults = std::move(faults);
-  return work;
-}
-
-TEST(WorkListTest, WeightIsSeverityConfidenceUrgencyAndRepetition) {
-  FaultReason reason = Reason("f19", 0.5);  // high: 4
-  EXPECT_DOUBLE_EQ(WeightOf(reason, Options()), 4.0);
-  reason.factor = 0.5;
-  EXPECT_DOUBLE_EQ(WeightOf(reason, Options()), 2.0);
-  reason.trust = 0.5;
-  EXPECT_DOUBLE_EQ(WeightOf(reason, Options()), 1.0);
-  reason.confirmed = true;
-  EXPECT_DOUBLE_EQ(WeightOf(reason, Options()), 4.0);
-  reason.episodes = 6;
-  EXPECT_DOUBLE_EQ(WeightOf(reason, Options()), 6.0);
-  reason.episodes = 100;
-  EXPECT_DOUBLE_EQ(WeightOf(reason, Options()), 8.0);
-  EXPECT_DOUBLE_EQ(WeightOf(Reason("f19", 0.5, 30.0), Options()), 2.0);
-}
-
-TEST(WorkListTest, TrendsWeighTheMoreTheNearerTheirLimit) {
-  LimitTrend reason;
-  reason.forecast.answer = HealthForecast::Answer::kTime;
-  reason.forecast.time = TimeToLimit{45.0, 30.0, 60.0};
-  EXPECT_DOUBLE_EQ(WeightOf(reason, Options()), 3.0);
-  reason.forecast.time->days = 400.0;
-  EXPECT_DOUBLE_EQ(WeightOf(reason, Options()), 0.0);
-  reason.forecast.answer = HealthForecast::Answer::kReached;
-  EXPECT_DOUBLE_EQ(WeightOf(reason, Options()), 4.0);
-  reason.forecast.answer = HealthForecast::Answer::kNoTrend;
-  EXPECT_DOUBLE_EQ(WeightOf(reason, Options()), 0.0);
-}
-
-TEST(WorkListTest, GravestStandsFirstAndReasonsAddUp) {
-  const auto rows =
-      RankWork({Valve("V1", {Reason("f2", 0.5)}),
-                Valve("V2", {Reason("f10", 0.8)}), Valve("V3", {}),
-                Valve("V4", {Reason("f2", 0.5, 10.0), Reason("f15", 0.2)})},
-               Options());
-  ASSERT_EQ(rows.size(), 3u);
-  EXPECT_EQ(rows[0].work.valve_id, "V2");
-  EXPECT_EQ(rows[0].rank, 1);
-  EXPECT_EQ(rows[1].work.valve_id, "V4");
-  EXPECT_EQ(rows[1].work.faults[0].fault, "f15");
-  EXPECT_EQ(rows[2].work.valve_id, "V1");
-}
-
-TEST(WorkListTest, WhySaysItInTheWordsOfTheCatalogue) {
-  FaultReason reason = Reason("f19", -0.5);
-  reason.episodes = 3;
-  const std::string why = ReasonText(Valve("V1", {reason}), Options());
-  EXPECT_EQ(why,
-            "Flow transmitter wrong: stands for 100 days, severity high, "
-            "strength -50 %, 3 episodes");
-}
-
-// Three valves with an episode each, as the history keeps them.
-class ReadWorkTest : public storage::HistoryFixture {
+class WorkListTest : public storage::HistoryFixture {
  protected:
-  ReadWorkTest() : writer_(directory_.path() / "history.db") {
-    RecordEpisode(writer_, 4, "V1");  // f19
-    RecordEpisode(writer_, 1, "V2");  // f1
-    RecordEpisode(writer_, 4, "V3");
-    query_.options.now_ns = kDetected + kDay;
+  WorkListTest() : writer_(path_) {
+    query_.now_ns = kDetected + kDay;
     query_.since_ns = kDetected - kDay;
     query_.limits = DefaultLimits();
+    query_.software = "1.0";
   }
 
-  std::vector<WorkRow> Read() {
-    storage::HistoryReader reader(directory_.path() / "history.db");
-    return ReadWorkList(reader, Texts(), query_);
+  Json List() {
+    storage::HistoryReader reader(path_);
+    return WorkList(&reader, Texts(), query_);
+  }
+  Json Rows() { return List()["rows"]; }
+  std::string Html() {
+    std::ostringstream html;
+    WorkListPage(List()).PrintHtml(html, kListTitle, {true, true});
+    return html.str();
   }
   void Label(const std::string& valve, const std::string& label) {
-    storage::HistoryEditor(directory_.path() / "history.db")
-        .Label(storage::EpisodeIdText(Id(valve)), label,
-               By("anna", kDetected + kSecond));
+    storage::HistoryEditor(path_).Label(storage::EpisodeIdText(Id(valve)),
+                                        label, By("anna", kDetected + kSecond));
+  }
+  // A fault that stands.
+  void RecordOpen(const std::string& valve, FaultSet faults) {
+    writer_.Record(
+        Event(TransitionKind::kDetected, 0, 0, 0.3, EndReason::kNone, valve),
+        kDetected);
+    writer_.Record(Event(TransitionKind::kIsolated, 20, faults, 0.8,
+                         EndReason::kNone, valve),
+                   kDetected);
+  }
+  // A day with `live_h` hours judged and `other_h` in another quality.
+  void Judge(const std::string& valve, int live_h, int other_h = 0,
+             Quality other = Quality::kUncovered) {
+    CoverageDay day{valve, kDetected / kDay, 1.0, {}};
+    day.samples.Add(Quality::kLive, 3600 * live_h);
+    day.samples.Add(other, 3600 * other_h);
+    Checkpoint checkpoint;
+    checkpoint.coverage = {day};
+    writer_.CommitCheckpoint(checkpoint);
   }
   // Days whose flow falls by 0.1 % of what is expected a day.
   void AddHealth(const std::string& valve, int days) {
@@ -148,81 +95,142 @@ class ReadWorkTest : public storage::HistoryFixture {
   WorkQuery query_;
 };
 
-TEST_F(ReadWorkTest, EpisodesBecomeReasonsInPlainWords) {
-  const auto rows = Read();
-  ASSERT_EQ(rows.size(), 3u);
-  EXPECT_THAT(rows[0].why, HasSubstr(Texts().Of(19).name));
-  EXPECT_THAT(rows[1].why, HasSubstr(Texts().Of(1).name));
+TEST_F(WorkListTest, EmptyHistoryIsSaidToBeEmpty) {
+  const Json list = List();
+  EXPECT_EQ(list["as_of_utc"], "2026-11-21T14:56:11Z");
+  EXPECT_EQ(list["coverage"]["loops"], 0);
+  EXPECT_TRUE(list["rows"].empty());
+  EXPECT_TRUE(list["changes"].is_null());
+  EXPECT_THAT(Html(),
+              AllOf(HasSubstr("No loop is known"), HasSubstr("Nothing to do."),
+                    HasSubstr("There is no earlier list")));
 }
 
-TEST_F(ReadWorkTest, FalseAlarmsAreNoWorkAndCostTrust) {
-  const double before = Read()[1].score;
+TEST_F(WorkListTest, ARowHasItsFactorsAndWhoSawIt) {
+  RecordEpisode(writer_, 0b100, "FV-1");  // f19
+  storage::HistoryEditor(path_).Acknowledge("last", By("anna", kDetected));
+  const Json rows = Rows();
+  ASSERT_EQ(rows.size(), 1u);
+  const Json& row = rows[0];
+  EXPECT_EQ(row["rank"], 1);
+  EXPECT_EQ(row["kind"], "episode");
+  EXPECT_EQ(row["valve_id"], "FV-1");
+  EXPECT_EQ(row["fault"], "f19");
+  EXPECT_EQ(row["name"], "Flow transmitter wrong");
+  EXPECT_EQ(row["severity"], "high");
+  EXPECT_EQ(row["severity_points"], 4.0);
+  EXPECT_EQ(row["grade"], nullptr);
+  EXPECT_EQ(row["certainty"], "likely");
+  EXPECT_NEAR(row["score"].get<double>(), 4.0 * row["confidence"].get<double>(),
+              1e-5);
+  EXPECT_EQ(row["acked_by"], "anna");
+  EXPECT_EQ(row["open"], false);
+  EXPECT_THAT(row["check"].get<std::string>(), Not(IsEmpty()));
+  EXPECT_THAT(
+      row["why"].get<std::string>(),
+      AllOf(testing::StartsWith("Flow transmitter wrong: ended 24 h ago"),
+            HasSubstr("severity high")));
+}
+
+TEST_F(WorkListTest, WhatStandsIsAboveWhatHasEnded) {
+  RecordEpisode(writer_, 0b100, "A");  // high
+  AddHealth("C", 60);
+  query_.since_ns = kDetected - 90 * kDay;
+  const Json rows = Rows();
+  ASSERT_GE(rows.size(), 2u);
+  EXPECT_EQ(rows[0]["valve_id"], "C");
+  EXPECT_EQ(rows.back()["valve_id"], "A");
+  EXPECT_GT(rows.back()["score"].get<double>(), rows[0]["score"].get<double>());
+}
+
+TEST_F(WorkListTest, GradeMovesALoopUpOrDown) {
+  for (const char* valve : {"A", "B", "C"}) {
+    RecordEpisode(writer_, 0b100, valve);
+  }
+  query_.loops = {{"A", 3}, {"C", 1}};
+  const Json rows = Rows();
+  EXPECT_EQ(rows[0]["valve_id"], "C");
+  EXPECT_EQ(rows[1]["valve_id"], "B");
+  EXPECT_EQ(rows[2]["valve_id"], "A");
+  EXPECT_DOUBLE_EQ(rows[0]["score"].get<double>(),
+                   4.0 * rows[2]["score"].get<double>());
+}
+
+TEST_F(WorkListTest, FalseAlarmsAreNoRowsAndCostTrust) {
+  RecordEpisode(writer_, 0b100, "V1");
+  RecordEpisode(writer_, 0b100, "V3");
+  const double before = Rows()[1]["score"];
   Label("V1", "false");
-  const auto rows = Read();
-  ASSERT_EQ(rows.size(), 2u);
-  EXPECT_EQ(rows[1].work.valve_id, "V3");
-  EXPECT_NEAR(rows[1].score, before / 2.0, 1e-9);
+  const Json rows = Rows();
+  ASSERT_EQ(rows.size(), 1u);
+  EXPECT_EQ(rows[0]["valve_id"], "V3");
+  EXPECT_NEAR(rows[0]["score"].get<double>(), before / 2.0, 1e-5);
+  EXPECT_THAT(rows[0]["why"].get<std::string>(),
+              HasSubstr("labels called this answer wrong before"));
 }
 
-TEST_F(ReadWorkTest, WhereOnlyTheDataEndedTheFaultStands) {
-  const auto none = EndReason::kNone;
-  writer_.Record(Event(TransitionKind::kDetected, 0, 0, 0.3, none, "V4"),
-                 kDetected);
-  writer_.Record(Event(TransitionKind::kIsolated, 20, 4, 0.8, none, "V4"),
-                 kDetected);
+TEST_F(WorkListTest, WhereOnlyTheDataEndedTheFaultStands) {
+  RecordOpen("V4", 4);
   writer_.Record(
       Event(TransitionKind::kClosed, 60, 4, 0.8, EndReason::kStreamEnded, "V4"),
       kDetected);
-  query_.valve_glob = "V4";
-
-  const auto rows = Read();
+  const Json rows = Rows();
   ASSERT_EQ(rows.size(), 1u);
-  EXPECT_FALSE(rows[0].work.faults[0].ended_ns);
-  EXPECT_THAT(rows[0].why,
+  EXPECT_EQ(rows[0]["open"], true);
+  EXPECT_EQ(rows[0]["unconfirmed_utc"], "2026-11-20T14:57:11Z");
+  EXPECT_THAT(rows[0]["why"].get<std::string>(),
               HasSubstr("stands for 24 h, not confirmed for 24 h"));
-  query_.options.now_ns = kDetected + 80 * kSecond;
+  query_.now_ns = kDetected + 80 * kSecond;
   EXPECT_THAT(
-      Read()[0].why,
+      Rows()[0]["why"].get<std::string>(),
       HasSubstr("stands for 1 min, not confirmed for less than a minute"));
 }
 
 // What is only detected is not "unlike any known fault", nor of strength 0.
-TEST_F(ReadWorkTest, WhatHasNoNameYetIsSaidSo) {
+TEST_F(WorkListTest, WhatHasNoNameYetIsSaidSo) {
   writer_.Record(
       Event(TransitionKind::kDetected, 0, 0, 0.3, EndReason::kNone, "V4"),
       kDetected);
-  query_.valve_glob = "V4";
-
-  const auto rows = Read();
+  const Json rows = Rows();
   ASSERT_EQ(rows.size(), 1u);
-  EXPECT_THAT(rows[0].why, testing::StartsWith("Fault without a name yet: "));
-  const report::Json row = WorkListReport(rows).document["rows"][0];
-  EXPECT_TRUE(row["fault"].is_null());
-  EXPECT_TRUE(row["strength"].is_null());
+  EXPECT_THAT(rows[0]["why"].get<std::string>(),
+              testing::StartsWith("Fault without a name yet: "));
+  EXPECT_TRUE(rows[0]["fault"].is_null());
+  EXPECT_TRUE(rows[0]["strength"].is_null());
 }
 
-TEST_F(ReadWorkTest, ALabelSaysWhatItReallyWas) {
+TEST_F(WorkListTest, ALabelSaysWhatItReallyWas) {
+  RecordEpisode(writer_, 0b100, "V1");
   Label("V1", "f13");
-  for (const WorkRow& row : Read()) {
-    if (row.work.valve_id == "V1") {
-      EXPECT_EQ(row.work.faults.at(0).fault, "f13");
-      EXPECT_TRUE(row.work.faults[0].confirmed);
-    }
-  }
+  const Json row = Rows().at(0);
+  EXPECT_EQ(row["fault"], "f13");
+  EXPECT_EQ(row["name"], Texts().Of(13).name);
+  EXPECT_EQ(row["confirmed"], true);
+  EXPECT_EQ(row["confidence"], 1.0);
 }
 
-TEST_F(ReadWorkTest, ATrendIsAReasonOfItsOwn) {
+TEST_F(WorkListTest, ATrendIsARowOfItsOwn) {
+  RecordOpen("V9", 0b100);
   AddHealth("V9", 60);
   query_.since_ns = kDetected - 90 * kDay;
-  query_.valve_glob = "V9";
-  const auto rows = Read();
-  ASSERT_EQ(rows.size(), 1u);
-  EXPECT_THAT(rows[0].why, HasSubstr("limit F=-10%: limit in 4"));
-  EXPECT_NEAR(rows[0].work.travel_strokes, 60 * 24 * 10.0, 1e-6);
-  EXPECT_NEAR(rows[0].work.service_hours, 60 * 24.0, 1e-6);
+  const Json rows = Rows();
+  const auto is_limit = [](const Json& each) {
+    return each["kind"] == "limit";
+  };
+  ASSERT_EQ(std::ranges::count_if(rows, is_limit), 1);
+  ASSERT_GE(rows.size(), 2u);  // The episode is one, too.
+  const Json& row = *std::ranges::find_if(rows, is_limit);
+  EXPECT_EQ(row["kind"], "limit");
+  EXPECT_THAT(row["why"].get<std::string>(),
+              HasSubstr("limit F=-10%: limit in 4"));
+  EXPECT_EQ(row["trend"]["answer"], "time");
+  EXPECT_NEAR(row["confidence"].get<double>(),
+              1.0 - row["trend"]["days"].get<double>() / 180.0, 1e-4);
+  EXPECT_NEAR(row["travel_strokes"].get<double>(), 60 * 24 * 10.0, 1e-6);
+  EXPECT_NEAR(row["service_hours"].get<double>(), 60 * 24.0, 1e-6);
 }
 
-TEST_F(ReadWorkTest, AFigureBeyondItsLimitIsAReason) {
+TEST_F(WorkListTest, AFigureBeyondItsLimitIsARow) {
   HealthHour hour;
   hour.valve_id = "V9";
   hour.hour = kDetected / (kDay / 24);
@@ -234,49 +242,227 @@ TEST_F(ReadWorkTest, AFigureBeyondItsLimitIsAReason) {
   Checkpoint checkpoint;
   checkpoint.health = {hour};
   writer_.CommitCheckpoint(checkpoint);
-  query_.valve_glob = "V9";
+  query_.now_ns = kDetected + kDay / 2;
 
-  const auto rows = Read();
-
+  const Json rows = Rows();
   ASSERT_EQ(rows.size(), 1u);
-  EXPECT_EQ(rows[0].why,
+  EXPECT_EQ(rows[0]["why"],
             "Dead band of the valve: 1.40 % of travel over the last day, "
             "accepted up to 1.00");
-  const auto json = WorkListReport(rows).document["rows"][0];
-  EXPECT_EQ(json["namur"], "maintenance required");
-  EXPECT_EQ(json["discipline"], "mechanical");
-  EXPECT_TRUE(json["fault"].is_null());
+  EXPECT_EQ(rows[0]["namur"], "maintenance required");
+  EXPECT_EQ(rows[0]["discipline"], "mechanical");
+  EXPECT_TRUE(rows[0]["fault"].is_null());
+  query_.now_ns = kDetected + 5 * kDay;
+  EXPECT_THAT(Rows()[0]["why"].get<std::string>(),
+              HasSubstr(", not confirmed for 5 days"));
   query_.discipline = "mechanical";
-  EXPECT_EQ(Read().size(), 1u);
+  EXPECT_EQ(Rows().size(), 1u);
   query_.discipline = "air";
-  EXPECT_TRUE(Read().empty());
+  EXPECT_TRUE(Rows().empty());
+  query_.discipline = "plumber";
+  EXPECT_THROW(Rows(), ConfigError);
 }
 
-TEST_F(ReadWorkTest, WhatIsShelvedIsLeftOutUntilTheShelfEnds) {
-  storage::HistoryEditor(directory_.path() / "history.db")
-      .Shelve("V1", std::nullopt, query_.options.now_ns + kDay,
-              By("anna", query_.options.now_ns));
-  EXPECT_EQ(Read().size(), 2u);
-  query_.options.now_ns += 2 * kDay;
-  EXPECT_EQ(Read().size(), 3u);
+TEST_F(WorkListTest, WhatIsShelvedIsLeftOutUntilTheShelfEnds) {
+  RecordEpisode(writer_, 0b100, "A");
+  storage::HistoryEditor(path_).Shelve("A", std::nullopt, query_.now_ns + kDay,
+                                       By("bo", query_.now_ns, "ordered"));
+  const Json list = List();
+  EXPECT_TRUE(list["rows"].empty());
+  ASSERT_EQ(list["shelved"].size(), 1u);
+  EXPECT_EQ(list["shelved"][0]["who"], "bo");
+  query_.now_ns += 2 * kDay;
+  EXPECT_EQ(Rows().size(), 1u);
 }
 
-TEST_F(ReadWorkTest, TopAndDisciplineNarrowIt) {
-  query_.top = 1;
-  EXPECT_EQ(Read().size(), 1u);
-  query_.top = 0;
-  query_.discipline = "instrument";
-  EXPECT_EQ(Read().size(), 2u);
-  query_.discipline = "air";
-  EXPECT_TRUE(Read().empty());
+TEST_F(WorkListTest, LoopsOfOneCauseSayWhatTheyShare) {
+  for (const char* valve : {"A", "B", "C"}) {
+    RecordOpen(valve, 0b010);
+  }
+  storage::Transaction transaction(writer_.database());
+  writer_.database().Run(
+      "INSERT INTO common_cause VALUES ('000000000000000c', 'air header', ?, "
+      "NULL)",
+      kDetected);
+  for (const char* valve : {"A", "B"}) {
+    writer_.database().Run(
+        "INSERT INTO common_cause_member VALUES ('000000000000000c', ?, ?, "
+        "'f7', ?)",
+        storage::EpisodeIdText(Id(valve)), std::string(valve), kDetected);
+  }
+  transaction.Commit();
+  const Json list = List();
+  ASSERT_EQ(list["rows"].size(), 3u);
+  EXPECT_EQ(list["rows"][0]["shares"], "cause: air header");
+  EXPECT_EQ(list["rows"][1]["shares"], "cause: air header");
+  EXPECT_EQ(list["rows"][2]["shares"], nullptr);
+  EXPECT_EQ(list["shared"][0]["faults"], Json::array({"f7"}));
+  EXPECT_EQ(list["shared"][0]["valve_ids"], Json::array({"A", "B"}));
 }
 
-TEST_F(ReadWorkTest, CsvQuotesWhatNeedsIt) {
+TEST_F(WorkListTest, AuditsAreRowsAndShareAPeriod) {
+  query_.audits.windows = {
+      {"L1", "stiction", true, "two witnesses", 2.5, kDetected},
+      {"L2", "external", false, "a sine", {}, kDetected},
+      {"L3", "undetermined", false, "nothing", {}, kDetected},
+      {"L4", "tuning", false, "regular", {}, kDetected}};
+  query_.audits.periods = {{42.0, {"L1", "L2"}}};
+  const Json list = List();
+  ASSERT_EQ(list["rows"].size(), 3u);
+  EXPECT_EQ(list["rows"][0]["valve_id"], "L1");
+  EXPECT_EQ(list["rows"][0]["shares"], "period: 42 s");
+  EXPECT_EQ(list["rows"][0]["fault"], "stiction");
+  EXPECT_DOUBLE_EQ(list["rows"][0]["score"].get<double>(), 2.0 * 0.9);
+  EXPECT_EQ(list["coverage"]["audit"], 4);
+}
+
+TEST_F(WorkListTest, WhatIsNotJudgedIsListedWithItsReason) {
+  Judge("A", 20);
+  Judge("B", 2, 20, Quality::kInhibited);
+  Judge("C", 0, 5, Quality::kUnassigned);
+  query_.loops = {{"D"}, {"E", {}, "PV is constant"}};
+  query_.audits.skipped = {{"C", "too short"}};
+  const Json list = List();
+  EXPECT_EQ(
+      list["coverage"],
+      Json({{"loops", 5}, {"named_faults", 2}, {"audit", 0}, {"nothing", 3}}));
+  const Json& unjudged = list["unjudged"];
+  ASSERT_EQ(unjudged.size(), 4u);
+  EXPECT_EQ(unjudged[0]["valve_id"], "B");
+  EXPECT_EQ(unjudged[0]["reason"], "its loop was not in automatic");
+  EXPECT_NEAR(unjudged[0]["judged_share"].get<double>(), 2.0 / 22.0, 1e-5);
+  EXPECT_EQ(unjudged[1]["reason"],
+            "it has no model set, and no window of its loop was judged; "
+            "audit: too short");
+  EXPECT_EQ(unjudged[2]["reason"], "no data came");
+  EXPECT_EQ(unjudged[3]["reason"], "PV is constant");
+}
+
+// Of the whole period, a week without data would hardly show.
+TEST_F(WorkListTest, JudgedIsSaidOfTheLastWeek) {
+  Judge("A", 20);
+  query_.now_ns = kDetected + 30 * kDay;
+  const Json list = List();
+  EXPECT_EQ(list["judged_since_utc"], "2026-12-13T14:56:11Z");
+  EXPECT_EQ(list["coverage"]["named_faults"], 0);
+}
+
+// The time judged is stored once a minute.
+TEST_F(WorkListTest, WhatIsJudgedNowOrHasAnEpisodeIsWatchedFromTheBeginning) {
+  RecordEpisode(writer_, 0b100, "A");
+  query_.judged_now = {"B"};
+  query_.loops = {{"C"}};
+  const Json list = List();
+  EXPECT_EQ(list["coverage"]["named_faults"], 2);
+  ASSERT_EQ(list["unjudged"].size(), 1u);
+  EXPECT_EQ(list["unjudged"][0]["valve_id"], "C");
+}
+
+TEST_F(WorkListTest, ChangesAreThoseSinceTheLastDocument) {
+  RecordOpen("A", 0b100);
+  Judge("A", 20);
+  query_.last = List();
+  query_.last_file = "last.json";
+  EXPECT_TRUE(List()["changes"]["valves"].empty());
+
+  Label("A", "false");
+  RecordOpen("B", 0b100);
+  query_.loops = {{"D"}};
+  const Json changes = List()["changes"];
+  EXPECT_EQ(changes["last_utc"], (*query_.last)["as_of_utc"]);
+  EXPECT_EQ(changes["coverage"]["loops"], 1);
+  ASSERT_EQ(changes["valves"].size(), 3u);
+  EXPECT_EQ(changes["valves"][0]["valve_id"], "A");
+  EXPECT_EQ(changes["valves"][0]["change"], "gone");
+  EXPECT_EQ(changes["valves"][0]["before"], "Flow transmitter wrong, high");
+  EXPECT_EQ(changes["valves"][1]["valve_id"], "B");
+  EXPECT_EQ(changes["valves"][1]["change"], "new");
+  EXPECT_EQ(changes["valves"][2]["valve_id"], "D");
+  EXPECT_EQ(changes["valves"][2]["change"], "no longer judged");
+
+  (*query_.last)["rows"][0]["severity_points"] = "many";
+  EXPECT_THROW(List(), DataError);
+  query_.last = {{"rows", 1}};
+  EXPECT_THROW(List(), DataError);
+}
+
+TEST_F(WorkListTest, AlarmsHaveTheirFigures) {
+  RecordEpisode(writer_, 0b100, "A");
+  writer_.AddGap({"", kDetected, kDetected + 10 * kSecond, "monitor_down"});
+  writer_.Commit(kDetected);
+  Label("A", "f19");
+  const Json alarms = List()["alarms"];
+  EXPECT_EQ(alarms["valves"][0]["episodes"], 1);
+  EXPECT_EQ(alarms["faults"][0]["right"], 1);
+  EXPECT_EQ(alarms["labelled"]["true"], 1);
+  EXPECT_EQ(alarms["days"][0]["day_utc"], "2026-11-20");
+  EXPECT_EQ(alarms["gaps"], 1);
+  EXPECT_EQ(alarms["gaps_s"], 10.0);
+  EXPECT_THAT(Html(), HasSubstr("1 labelled as a fault"));
+}
+
+TEST_F(WorkListTest, PageIsWellFormedWhateverPeopleWrote) {
+  const std::string bad = "<script>alert('&\")</script>";
+  RecordEpisode(writer_, 0b100, bad);
+  storage::HistoryEditor editor(path_);
+  editor.Acknowledge("last", By("<b>anna", kDetected));
+  editor.Shelve(bad, "f7", query_.now_ns + kDay,
+                By("bo", kDetected, "</table><img src=x onerror=y>"));
+  query_.audits.skipped = {{"<i>", "</td>"}};
+  const std::string html = Html();
+  EXPECT_THAT(html,
+              AllOf(Not(HasSubstr("<script")), Not(HasSubstr("<img")),
+                    Not(HasSubstr("<b>")), HasSubstr("&lt;script&gt;"),
+                    HasSubstr("size:A4 landscape"), HasSubstr("@media print"),
+                    HasSubstr("prefers-color-scheme:dark")));
+  EXPECT_THAT(MalformedTags(html), IsEmpty());
+}
+
+TEST_F(WorkListTest, WithoutHistoryTheAuditAndThePlantRemain) {
+  query_.loops = {{"D", 2}};
+  query_.audits.windows = {
+      {"L1", "no_response", false, "winds up", {}, kDetected}};
+  const Json list = WorkList(nullptr, Texts(), query_);
+  EXPECT_EQ(
+      list["coverage"],
+      Json({{"loops", 2}, {"named_faults", 0}, {"audit", 1}, {"nothing", 1}}));
+  EXPECT_EQ(list["rows"][0]["severity"], "high");
+}
+
+TEST_F(WorkListTest, ValvesWithAnEntryOughtToBeThere) {
+  const auto file = directory_.path() / "models.db";
+  EXPECT_TRUE(LoopsOf(file).empty());
+  {
+    storage::ModelStore store(file, storage::Access::kOccasionalWriter);
+    storage::ValveEntry entry;
+    for (const char* pattern : {"FV-1", "FV-2*"}) {
+      entry.pattern = pattern;
+      store.PutValve(entry);
+    }
+  }
+  const auto loops = LoopsOf(file);
+  ASSERT_EQ(loops.size(), 1u);
+  EXPECT_EQ(loops[0].valve_id, "FV-1");
+}
+
+TEST_F(WorkListTest, TextHasTheFirstRowsAndCsvAll) {
+  RecordEpisode(writer_, 0b001, "V1");
+  RecordEpisode(writer_, 0b100, "V2");
+  const report::Report report = WorkListReport(List(), 1);
+  std::ostringstream text;
+  report::ReportStyle style;
+  style.utc = true;
+  report.PrintText(text, style);
+  EXPECT_THAT(
+      text.str(),
+      AllOf(HasSubstr("as of"), HasSubstr("\n1. V"), HasSubstr("because "),
+            HasSubstr("and 1 more (--top 0)"), Not(HasSubstr("\n2. "))));
   std::ostringstream csv;
-  WorkListReport(Read()).PrintCsv(csv);
-  EXPECT_THAT(csv.str(), HasSubstr("rank,valve_id,score,severity"));
-  EXPECT_THAT(csv.str(),
-              HasSubstr(",\"Valve does not close, travel blocked: "));
+  report.PrintCsv(csv);
+  EXPECT_THAT(csv.str(), AllOf(HasSubstr("rank,valve_id,kind,fault,name"),
+                               HasSubstr("\n2,V"),
+                               HasSubstr(",\"Valve does not close, travel "
+                                         "blocked: ")));
 }
 
 }  // namespace

@@ -50,7 +50,7 @@ class CommonCauseTest : public HistoryFixture {
     return book_->Read();
   }
   std::vector<CommonCause> Causes() {
-    return ReadCommonCauses(writer_->database());
+    return ReadCommonCauses(writer_->database(), 0);
   }
 
   std::vector<CauseGroup> groups_;
@@ -138,16 +138,17 @@ TEST_F(CommonCauseTest, ToldTwiceIsToldOnce) {
   EXPECT_EQ(Causes().at(0).members.size(), 3u);
 }
 
-TEST_F(CommonCauseTest, FilterNarrows) {
+TEST_F(CommonCauseTest, OpenOnesCountHoweverOldTheyAre) {
   Isolate("A-1", 10);
   Isolate("A-2", 11);
   Isolate("A-3", 12);
-  CauseFilter filter;
-  filter.group_glob = "header*";
-  filter.open_only = true;
-  EXPECT_EQ(ReadCommonCauses(writer_->database(), filter).size(), 1u);
-  filter.until_ns = kDetected;
-  EXPECT_TRUE(ReadCommonCauses(writer_->database(), filter).empty());
+  const std::int64_t later = kDetected + 100 * kSecond;
+  EXPECT_EQ(ReadCommonCauses(writer_->database(), later).size(), 1u);
+  Transaction transaction(writer_->database());
+  writer_->database().Run("UPDATE common_cause SET ended_ns = ?", later);
+  transaction.Commit();
+  EXPECT_TRUE(ReadCommonCauses(writer_->database(), later).empty());
+  EXPECT_EQ(ReadCommonCauses(writer_->database(), kDetected).size(), 1u);
 }
 
 }  // namespace

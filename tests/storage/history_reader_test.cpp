@@ -142,27 +142,6 @@ TEST_F(HistoryReaderTest, UnknownLabelChangesNothing) {
   EXPECT_EQ(Sql("SELECT count(*) FROM episode WHERE label IS NOT NULL"), "0");
 }
 
-TEST_F(HistoryReaderTest, StatisticsCountByValveAndAnswer) {
-  HistoryEditor editor(path_);
-  editor.Label(EpisodeIdText(Id("LV-1")), "f7", By("a", 1));
-  editor.Label(EpisodeIdText(Id("LV-2")), "false", By("a", 1));
-
-  const auto statistics = HistoryReader(path_).Statistics();
-
-  ASSERT_EQ(statistics.size(), 4U);
-  EXPECT_EQ(statistics[0].fault, "f7");
-  EXPECT_EQ(statistics[0].labelled_true, 1);
-  EXPECT_EQ(statistics[0].labelled_false, 0);
-  EXPECT_NEAR(statistics[0].mean_isolation_s.value_or(0.0), 20.0, 1e-6);
-  EXPECT_NEAR(statistics[0].mean_duration_s.value_or(0.0), 91.0, 1e-6);
-  EXPECT_EQ(statistics[1].fault, "f1|f19");
-  EXPECT_EQ(statistics[1].labelled_false, 1);
-  EXPECT_EQ(statistics[2].fault, "unknown");
-  EXPECT_EQ(statistics[2].mean_isolation_s, std::nullopt);
-  EXPECT_EQ(statistics[3].fault, "");
-  EXPECT_EQ(statistics[3].open, 1);
-}
-
 TEST_F(HistoryReaderTest, GapsOfAllValvesShowForEachValve) {
   writer_.AddGap({"", kDetected, kDetected + 10, "monitor_down"});
   writer_.AddGap({"PV-1", kDetected + 20, kDetected + 30, "stale"});

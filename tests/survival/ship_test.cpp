@@ -609,10 +609,18 @@ TEST_F(ShipTest, TheVerbsReadThePlant) {
     const auto without_names = [](nlohmann::json& episode) {
       episode.erase("host");
       episode.erase("monitor");
-      episode.erase("score");  // It sinks with the time that passes.
+      episode.erase("as_of_utc");
+      episode.erase("since_utc");
+      episode.erase("judged_since_utc");
     };
     for (auto* document : {&expected, &found}) {
       without_names(*document);
+      // An open episode is in alarm until now.
+      for (const char* list : {"days", "valves"}) {
+        for (auto& row : (*document)["alarms"][list]) {
+          row.erase("alarm_s");
+        }
+      }
       for (const char* list : {"episodes", "hours", "rows"}) {
         for (auto& row : (*document)[list]) {
           without_names(row);
@@ -629,7 +637,6 @@ TEST_F(ShipTest, TheVerbsReadThePlant) {
         "--state unacked", "--state rtn_unack", "--state shelved",
         "--state isolated --limit 3", "--since 2026-01-01 --utc"}) {
     same(std::string("history list ") + filter);
-    same(std::string("history stats --until 2026-11-21 --utc ") + filter);
   }
   same("history show last");
   same("history show " + EpisodeIdText(Id("LV-1")));
@@ -961,8 +968,6 @@ TEST_F(ShipTest, ABadRowHidesNoGoodOne) {
   EXPECT_THAT(reader.TakeNote(), HasSubstr("flow_unit 'gpm' is unknown"));
   EXPECT_EQ(reader.AlarmList(kDetected + kSecond, 10).size(), 2U);
   reader.TakeNote();
-  EXPECT_EQ(reader.Statistics({}).size(), 2U);
-  note("1 row could not be read: episode: a number is out of its range");
   EXPECT_EQ(reader.Coverage({}).size(), 0U);
   note("2 rows could not be read: hours by quality");
   EXPECT_EQ(reader.Gaps({}).size(), 1U);
@@ -1177,7 +1182,7 @@ TEST_F(ShipTest, APoolerMayGiveEachTransactionAnotherSession) {
     PlantReader first(pooled);
     PlantReader second(pooled);
     EXPECT_EQ(first.List({}).size(), static_cast<std::size_t>(i + 1));
-    EXPECT_EQ(second.Statistics({}).size(), static_cast<std::size_t>(i + 1));
+    EXPECT_EQ(second.List({}).size(), static_cast<std::size_t>(i + 1));
   }
   ExpectEqual("a");
   pid_t pid = 0;

@@ -81,10 +81,10 @@ export function groupName(row) {
   return groups.find((group) => group.key === key)?.name ?? 'Normal';
 }
 
-/** Worst first: by group, priority, then the newest. */
+/** Worst first: by group, then in the order of the work list. */
 export function compareAlarms(a, b) {
   const group = (row) => groups.findIndex((g) => g.key === groupOf(row));
-  return group(a) - group(b) || priorityOf(a) - priorityOf(b) ||
+  return group(a) - group(b) || b.score - a.score ||
       b.detected_ms - a.detected_ms || (a.episode < b.episode ? -1 : 1);
 }
 

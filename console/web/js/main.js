@@ -10,7 +10,6 @@ import {alarmsView} from './views/alarms.js';
 import {episodeView} from './views/episode.js';
 import {historyView} from './views/history.js';
 import {plantView} from './views/plant.js';
-import {reportView} from './views/report.js';
 import {valveView} from './views/valve.js';
 import {worklistView} from './views/worklist.js';
 
@@ -18,7 +17,7 @@ import {worklistView} from './views/worklist.js';
 const kViews = new Map([
   ['', plantView], ['valve', valveView], ['alarms', alarmsView],
   ['episode', episodeView], ['history', historyView],
-  ['worklist', worklistView], ['report', reportView],
+  ['worklist', worklistView],
 ]);
 
 const main = document.getElementById('main');

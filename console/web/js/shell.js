@@ -16,7 +16,6 @@ const kEntries = [
   {name: 'alarms', text: 'Alarms', key: '2'},
   {name: 'history', text: 'History', key: '3'},
   {name: 'worklist', text: 'Work list', key: '4'},
-  {name: 'report', text: 'Report', key: '5'},
 ];
 const kPauseMs = 1000;  // In which new alarms are counted, not named.
 const kGraceMs = 2000;  // A change of view reconnects; that is no news.

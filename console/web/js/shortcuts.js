@@ -45,7 +45,6 @@ export function startShortcuts() {
   onKey('2', 'Alarms', go('#/alarms'));
   onKey('3', 'History', go('#/history'));
   onKey('4', 'Work list', go('#/worklist'));
-  onKey('5', 'Report', go('#/report'));
   onKey('t', 'Theme: as the system, light, dark', nextTheme);
   onKey('u', 'Local time or UTC', () =>
     settings.set('utc', !settings.get('utc')));

@@ -23,6 +23,16 @@ class FdiStoreHistoryTest : public FdiStoreTest {
     writer.Record(Event(TransitionKind::kIsolated, 20, 0b010, 0.8), kDetected);
     writer.EndSession(kDetected, true);
   }
+
+  // What a terminal with these variables shows of `history list`.
+  std::string ListOnTerminal(const std::string& environment) const {
+    const std::string out = (directory_.path() / "terminal.txt").string();
+    const std::string command =
+        environment + " script -qec '\"" + FDI_STORE_PROGRAM + "\" --data " +
+        directory_.path().string() + " history list' /dev/null >" + out;
+    EXPECT_EQ(std::system(command.c_str()), 0);
+    return Slurp(out);
+  }
 };
 
 TEST_F(FdiStoreHistoryTest, WhatCameOnTopIsInEveryList) {
@@ -55,17 +65,18 @@ TEST_F(FdiStoreHistoryTest, ListedEpisodesHaveTheColumnsOfTheView) {
   EXPECT_TRUE(episode["cleared_utc"].is_null());
 }
 
-// Whatever the ids and names.
-TEST_F(FdiStoreHistoryTest, TheListFitsAHundredColumns) {
+// Whatever the ids and names. A file or a pipe gets all columns.
+TEST_F(FdiStoreHistoryTest, TheListFitsATerminalOfAHundredColumns) {
   {
     HistoryWriter writer(path_);
     for (const char* valve : {"UNIT-300/AREA-2/FV-10123A", "LV-2"}) {
       RecordEpisode(writer, 0b111, valve);
     }
   }
-  std::istringstream list(Store("history list").out);
+  std::istringstream list(ListOnTerminal("COLUMNS=100 NO_COLOR=1"));
   std::string all;
   for (std::string line; std::getline(list, line);) {
+    std::erase(line, '\r');
     all += line + '\n';
     if (line.find("too narrow") == std::string::npos) {
       EXPECT_LE(std::ranges::count_if(
@@ -78,11 +89,17 @@ TEST_F(FdiStoreHistoryTest, TheListFitsAHundredColumns) {
                             "2026-11-20 ", "Flashing"}) {
     EXPECT_THAT(all, HasSubstr(shown));
   }
+  const std::string piped = Store("history list").out;
+  for (const char* column :
+       {"isolated after", "label", "acked by", "model set", "demo@3"}) {
+    EXPECT_THAT(piped, HasSubstr(column));
+  }
+  EXPECT_THAT(piped, testing::Not(HasSubstr("too narrow")));
 }
 
 // How bad it is now, and what it is, before what only experts read.
 TEST_F(FdiStoreHistoryTest, AHundredColumnsSayHowBadItIsInPlainWords) {
-  const std::string list = Store("history list").out;
+  const std::string list = ListOnTerminal("COLUMNS=100 NO_COLOR=1");
   const std::string left_out =
       list.substr(std::min(list.find("(too narrow"), list.size()));
 
@@ -154,35 +171,7 @@ TEST_F(FdiStoreHistoryTest, AcknowledgedAndLabelledEpisodeSaysSo) {
                                      "worn\n"));
   EXPECT_EQ(shown["events"].back()["kind"], "LABEL");
   EXPECT_EQ(shown["trace_instants"], 100);
-  {
-    HistoryWriter writer(path_);
-    CoverageDay count{"LV-1", 20'000, 1.0, {}};
-    count.samples.Add(Quality::kLive, 7200);
-    Checkpoint checkpoint;
-    checkpoint.coverage = {count};
-    writer.CommitCheckpoint(checkpoint);
-  }
-  EXPECT_EQ(StoreJson("history stats")["hours"]["LV-1"]["LIVE"], 2.0);
-  EXPECT_THAT(Store("history stats").out,
-              testing::ContainsRegex("LV-1 +LIVE +2.00 +7200"));
-  const json statistics = StoreJson("history stats")["statistics"];
-  EXPECT_EQ(statistics[0]["labelled_false"], 1);
   EXPECT_EQ(Store("history label last perhaps").code, 2);
-}
-
-TEST_F(FdiStoreHistoryTest, OfAGapOnlyThePartInTheTimeCounts) {
-  {
-    HistoryWriter writer(path_);
-    writer.AddGap({"", kDetected - 86'400 * kSecond,
-                   kDetected + 86'400 * kSecond, "monitor_down"});
-    writer.Commit(kDetected);
-  }
-  EXPECT_EQ(StoreJson("history stats")["gaps_s"], 172'800.0);
-  const json minute = StoreJson(
-      "history stats --since 2026-11-20T14:56:00Z "
-      "--until 2026-11-20T14:57:00Z");
-  EXPECT_EQ(minute["gaps"], 1);
-  EXPECT_DOUBLE_EQ(minute["gaps_s"], 60.0);
 }
 
 TEST_F(FdiStoreHistoryTest, AGrowingFaultSaysWhenItWillBeFull) {
@@ -381,43 +370,20 @@ TEST_F(FdiStoreHistoryTest, ListIsCsvIfAskedForAndTextWithoutColour) {
 }
 
 TEST_F(FdiStoreHistoryTest, ColourIsForTerminalsThatWantIt) {
-  const std::string list = directory_.path().string() + " history list";
-  const auto on_terminal = [&](const std::string& environment) {
-    const std::string out = (directory_.path() / "terminal.txt").string();
-    const std::string command = environment + " script -qec '\"" +
-                                FDI_STORE_PROGRAM + "\" --data " + list +
-                                "' /dev/null >" + out;
-    EXPECT_EQ(std::system(command.c_str()), 0);
-    return Slurp(out);
-  };
-
-  EXPECT_THAT(on_terminal("TERM=xterm NO_COLOR="),
+  EXPECT_THAT(ListOnTerminal("TERM=xterm NO_COLOR="),
               HasSubstr("\x1b[1;31mUNACK"));
-  EXPECT_THAT(on_terminal("TERM=xterm NO_COLOR=1"),
+  EXPECT_THAT(ListOnTerminal("TERM=xterm NO_COLOR=1"),
               testing::Not(HasSubstr("\x1b")));
-  EXPECT_THAT(on_terminal("TERM=dumb"), testing::Not(HasSubstr("\x1b")));
-  EXPECT_THAT(on_terminal("TERM=xterm COLUMNS=80"), HasSubstr("too narrow"));
+  EXPECT_THAT(ListOnTerminal("TERM=dumb"), testing::Not(HasSubstr("\x1b")));
+  EXPECT_THAT(ListOnTerminal("TERM=xterm COLUMNS=80"), HasSubstr("too narrow"));
 }
 
-TEST_F(FdiStoreHistoryTest, StatisticsHaveDaysValvesFaultsAndLabels) {
-  {
-    HistoryWriter writer(path_);
-    RecordEpisode(writer, 0b001, "PV-1");
+TEST_F(FdiStoreHistoryTest, WhatTheWorkListTookOverNamesIt) {
+  for (const char* verb : {"history stats", "history causes"}) {
+    const Outcome outcome = Store(verb);
+    EXPECT_EQ(outcome.code, 2) << verb;
+    EXPECT_THAT(outcome.err, HasSubstr("is gone: `fdi-store worklist`"));
   }
-  Store("history label last false");
-
-  const json stats = StoreJson("history stats");
-
-  EXPECT_EQ(stats["days"][0]["day_utc"], "2026-11-20");
-  EXPECT_EQ(stats["days"][0]["episodes"], 2);
-  EXPECT_EQ(stats["valves"][1]["valve_id"], "PV-1");
-  EXPECT_EQ(stats["valves"][1]["alarm_s"], 91.0);
-  EXPECT_EQ(stats["faults"][0]["fault"], "f1");
-  EXPECT_EQ(stats["faults"][0]["wrong"], 1);
-  EXPECT_EQ(stats["labelled"]["false"], 1);
-  EXPECT_EQ(stats["labelled"]["none"], 1);
-  EXPECT_EQ(stats["most_in_10_min"], 2);
-  EXPECT_THAT(Store("history stats").out, HasSubstr("1 false alarms"));
 }
 
 TEST_F(FdiStoreHistoryTest, TraceIsExportedWithAColumnPerChannelAndFault) {

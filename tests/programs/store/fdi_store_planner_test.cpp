@@ -90,16 +90,18 @@ TEST_F(FdiStorePlannerTest, StatusIsThatOfTheGravestFigureBeyondItsLimit) {
               HasSubstr("out of specification: at_limit, dead_band"));
 }
 
-TEST_F(FdiStorePlannerTest, WorkListAndCausesOfAnEmptyHistoryAreEmpty) {
+TEST_F(FdiStorePlannerTest, WorkListOfAnEmptyHistoryIsEmpty) {
   { const HistoryWriter writer(path_); }
   EXPECT_TRUE(StoreJson("worklist")["rows"].empty());
-  EXPECT_TRUE(StoreJson("history causes")["causes"].empty());
-  EXPECT_EQ(Store("worklist").out, "Nothing to do.\n");
+  EXPECT_THAT(Store("worklist").out, HasSubstr("Nothing to do.\n"));
   EXPECT_EQ(Store("worklist --discipline plumber").code, 2);
+  const Outcome report = Store("report --output .");
+  EXPECT_EQ(report.code, 2);
+  EXPECT_THAT(report.err, HasSubstr("report is gone: `fdi-store worklist"));
 }
 
 // A day of which 20 h were judged, and a fault.
-TEST_F(FdiStorePlannerTest, ReportIsWrittenAndCompared) {
+TEST_F(FdiStorePlannerTest, WorkListIsWrittenAsAPageAndCompared) {
   {
     HistoryWriter writer(path_);
     CoverageDay day{"LV-1", kDetected / (86'400 * kSecond), 1.0, {}};
@@ -108,43 +110,42 @@ TEST_F(FdiStorePlannerTest, ReportIsWrittenAndCompared) {
     checkpoint.coverage = {day};
     writer.CommitCheckpoint(checkpoint);
   }
-  const std::string since = "report --since 2026-11-01 --utc";
-  EXPECT_EQ(Store(since + " --output out").code, 0);
-  const json first = json::parse(Slurp(directory_.path() / "out/report.json"));
-  EXPECT_EQ(first["coverage"]["named_faults"], 1);
+  const std::string verb = "worklist --since 2026-11-01 --utc --html week.html";
+  EXPECT_EQ(Store(verb).code, 0);
+  const json first = json::parse(Slurp(directory_.path() / "week.json"));
   EXPECT_TRUE(first["changes"].is_null());
   {
     HistoryWriter writer(path_);
-    RecordEpisode(writer, 0b100);
+    writer.Record(Event(TransitionKind::kDetected, 0, 0, 0.3), kDetected);
+    writer.Record(Event(TransitionKind::kIsolated, 20, 0b100, 0.8), kDetected);
   }
-  const json second = StoreJson(since + " --output out");
-  EXPECT_EQ(second["changes"]["last_utc"], first["made_utc"]);
-  EXPECT_EQ(second["changes"]["loops"][0]["change"], "new");
-  EXPECT_EQ(json::parse(Slurp(directory_.path() / "out/report.json")), second);
-  const std::string html = Slurp(directory_.path() / "out/report.html");
+  const json second = StoreJson(verb);
+  EXPECT_EQ(second["changes"]["last_utc"], first["as_of_utc"]);
+  EXPECT_EQ(second["changes"]["valves"][0]["change"], "new");
+  EXPECT_EQ(json::parse(Slurp(directory_.path() / "week.json")), second);
+  const std::string html = Slurp(directory_.path() / "week.html");
   EXPECT_THAT(html, HasSubstr("Flow transmitter wrong (f19)"));
   EXPECT_THAT(MalformedTags(html), testing::IsEmpty());
-  EXPECT_THAT(Store(since + " --csv").out, HasSubstr("\n1,LV-1,f19,"));
+  EXPECT_THAT(Store(verb + " --csv").out,
+              HasSubstr("\n1,LV-1,episode,f19,Flow transmitter wrong,high,4"));
 }
 
-TEST_F(FdiStorePlannerTest, ReportRefusesWhatItCannotUse) {
-  EXPECT_EQ(Store("report").code, 3);  // There is nothing at all.
+TEST_F(FdiStorePlannerTest, WorkListRefusesWhatItCannotUse) {
+  EXPECT_EQ(Store("worklist").code, 3);  // There is nothing at all.
   { const HistoryWriter writer(path_); }
-  EXPECT_EQ(Store("report").code, 0);
-  EXPECT_EQ(Store("report --since 2100-01-01").code, 2);
-  EXPECT_EQ(Store("report --since soon").code, 2);
-  EXPECT_EQ(Store("report --top 0").code, 2);
-  EXPECT_EQ(Store("report --output no/such/folder").code, 3);
-  std::filesystem::create_directory(directory_.path() / "out");
-  Write("out/report.json", "[1]");
-  const Outcome foreign = Store("report --output out");
+  EXPECT_EQ(Store("worklist").code, 0);
+  EXPECT_EQ(Store("worklist --since 2100-01-01").code, 2);
+  EXPECT_EQ(Store("worklist --since soon").code, 2);
+  EXPECT_EQ(Store("worklist --html no/such/week.html").code, 3);
+  Write("week.json", "[1]");
+  const Outcome foreign = Store("worklist --html week.html");
   EXPECT_EQ(foreign.code, 3);
-  EXPECT_THAT(foreign.err, HasSubstr("report.json is no report"));
-  EXPECT_EQ(Slurp(directory_.path() / "out/report.json"), "[1]");
+  EXPECT_THAT(foreign.err, HasSubstr("week.json is no work list"));
+  EXPECT_EQ(Slurp(directory_.path() / "week.json"), "[1]");
 }
 
 // A sticky loop without a model set or a history: X follows CV through a play.
-TEST_F(FdiStorePlannerTest, ReportAuditsStoredRuns) {
+TEST_F(FdiStorePlannerTest, WorkListAuditsStoredRunsIfAskedTo) {
   std::string rows = header_;
   double x = 50.0;
   for (int t = 0; t < 900; ++t) {
@@ -155,14 +156,12 @@ TEST_F(FdiStorePlannerTest, ReportAuditsStoredRuns) {
   }
   Write("a.csv", rows);
   ASSERT_EQ(Store("runs import a.csv --valve FV-1").code, 0);
-  const json report = StoreJson("report --since 2000-01-01");
-  EXPECT_EQ(report["coverage"]["audit"], 1);
-  ASSERT_EQ(report["worst"].size(), 1u) << report.dump(1);
-  EXPECT_EQ(report["worst"][0]["fault"], "stiction");
-  EXPECT_EQ(
-      StoreJson(
-          "report --since 2000-01-01 --audit-windows 0")["coverage"]["audit"],
-      0);
+  const std::string verb = "worklist --since 2000-01-01";
+  const json list = StoreJson(verb + " --audit-windows 3");
+  EXPECT_EQ(list["coverage"]["audit"], 1);
+  ASSERT_EQ(list["rows"].size(), 1u) << list.dump(1);
+  EXPECT_EQ(list["rows"][0]["fault"], "stiction");
+  EXPECT_EQ(StoreJson(verb)["coverage"]["audit"], 0);
 
   // Training data of the simulator are of no loop of the plant.
   {
@@ -172,7 +171,7 @@ TEST_F(FdiStorePlannerTest, ReportAuditsStoredRuns) {
     database.Prepare("UPDATE run SET origin = 'simulated'").Run();
     transaction.Commit();
   }
-  EXPECT_EQ(StoreJson("report --since 2000-01-01")["coverage"]["loops"], 0);
+  EXPECT_EQ(StoreJson(verb + " --audit-windows 3")["coverage"]["loops"], 0);
 }
 
 }  // namespace

@@ -343,26 +343,25 @@ TEST_F(JsonDocumentsTest, ProgramsAndPageHaveTheSameKeys) {
   Printed(page, "history shelve", "LV-1 --for 1h --comment ordered");
   Printed(page, "history shelf");
   if (FDI_PLANNER) {
-    Printed(page, "report", "--since 2020-01-01 --output weekly");
+    Printed(page, "worklist", "--since 2020-01-01 --html week.html");
   }
   Printed(page, "history list");
   Printed(page, "history ack", "last");
   Printed(page, "history label", "last f7 --comment seen");
   Printed(page, "history show", "last");
-  Printed(page, "history stats");
-  Printed(page, "history causes");
   Printed(page, "history unshelve", "--valve LV-1");
   Printed(page, "faults");
   if (FDI_PLANNER) {
     Printed(page, "health show", "--valve LV-1");
     Printed(page, "health trend", "--valve LV-1 --limit X=3");
-    Printed(page, "worklist", "--since 2020-01-01 --limit X=0.01");
     // A valve that nothing judges, and one that is shelved no longer.
     Printed(page, "valves add", "NV-9");
-    Printed(page, "report", "--since 2020-01-01 --output weekly");
+    Printed(page, "worklist",
+            "--since 2020-01-01 --limit X=0.01 --audit-windows 3 "
+            "--html week.html");
   } else {
     called_.insert({"fdi-store health show", "fdi-store health trend",
-                    "fdi-store worklist", "fdi-store report"});
+                    "fdi-store worklist"});
   }
   Printed(page, "doctor");
   Printed(page, "backup", "copy");

@@ -37,6 +37,7 @@ class Alarms extends View {
   #chips = new Map();
   #causes = h('div', {role: 'status'});
   #shownCauses = '[]';  // What is made anew is read out anew.
+  #asOf = h('p', {class: 'number'});
   #nothing = h('p', {class: 'nothing', hidden: true});
   #table = dataTable('Alarms, worst first', kColumns, [],
       {layout: 'cards', head: this.#head, body: this.#body});
@@ -49,7 +50,7 @@ class Alarms extends View {
     this.#group = query.get('group') ?? '';
     this.element = h('section', {class: 'live'},
         h('div', {class: 'controls'}, h('h1', {}, 'Alarms'), this.#makeChips(),
-            this.#bulk), this.#readOnly, this.#causes, this.#nothing,
+            this.#bulk), this.#asOf, this.#readOnly, this.#causes, this.#nothing,
         this.#table);
     // A flood of alarms costs one table a frame.
     const showSoon = oncePerFrame(this, () => this.#show());
@@ -154,6 +155,9 @@ class Alarms extends View {
 
   // Only the times run on; the rows stay as they are.
   #showLasted() {
+    const {connected, heardMs} = store.stream;
+    const asOf = connected ? store.nowMs() : heardMs;
+    setText(this.#asOf, asOf ? `As of ${timeText(asOf)}` : '');
     for (const node of this.#body.rows) {
       const row = store.alarms.get(node.dataset.episode);
       if (!row || row.ended_ms !== null) continue;

@@ -1,27 +1,80 @@
-// Which valves to open at the next stop, and why: the planner's first page.
+// The one list of what is wrong, with what loops share, what nothing judges and
+// what is shelved.
 
 import {get, url} from '../api.js';
 import {button, errorNote, h, replace} from '../dom.js';
-import {faultTitle} from '../faults.js';
+import {timeText} from '../format.js';
 import {link} from '../route.js';
-import {columns, dataTable, forText, valveCell} from './table.js';
+import {columns, dataTable, forText, timeCell, valveCell, valveLink}
+  from './table.js';
 import {View} from './view.js';
 
-const kColumns = [
+const number = (value, digits) => Number(value).toFixed(digits);
+
+const utcCell = (text) => timeCell(text && Date.parse(text));
+
+const utcText = (text) => timeText(Date.parse(text));
+
+function findingCell({name, fault, episode_id: id}) {
+  const text = fault && fault !== 'unknown' ? `${name} (${fault})` : name;
+  return id ? h('a', {href: link('episode', id)}, text) : text;
+}
+
+const stateText = ({open, unconfirmed_utc: since}) => !open ? 'ended' :
+  since ? `not confirmed since ${utcText(since)}` : 'stands';
+
+const kRows = [
   {text: 'Rank', class: 'num', cell: (row) => String(row.rank)},
   columns.priority,
-  {text: 'Valve', header: true, cell: (row) =>
-    valveCell(row.valve_id, row)},
-  {text: 'Why', class: 'remark', cell: (row) => row.why},
-  {text: 'Probable fault', cell: (row) => {
-    const name = row.fault ? faultTitle(row.fault) : row.name ?? '–';
-    return row.episode_id ?
-      h('a', {href: link('episode', row.episode_id)}, name) : name;
-  }},
-  {text: 'For', cell: (row) => forText(row.discipline)},
+  {text: 'Valve', header: true, cell: (row) => valveCell(row.valve_id, row)},
+  {text: 'Finding', class: 'fault', cell: findingCell},
+  {text: 'Why', class: 'remark', cell: ({why, shares}) =>
+    shares ? `${why}; shares ${shares}` : why},
+  {text: 'State', cell: stateText},
+  {text: 'Severity', class: 'wide', cell: (row) =>
+    `${row.severity} · ${number(row.severity_points, 0)}`},
+  {text: 'How sure', class: 'wide', cell: (row) =>
+    `${row.certainty ?? '–'} · ${number(row.confidence, 2)}`},
+  {text: 'Grade', class: 'wider', cell: (row) =>
+    `${row.grade ?? '–'} · ${number(row.grade_factor, 1)}`},
+  {text: 'Score', class: 'num wider', cell: (row) => number(row.score, 2)},
+  {text: 'For', class: 'wider', cell: (row) => forText(row.discipline)},
   {text: 'What to check', class: 'remark check', cell: (row) =>
     row.check ?? '–'},
 ];
+
+const kShared = [
+  {text: 'Share', header: true, cell: (row) => row.shares},
+  {text: 'Group', cell: (row) => row.group ?? '–'},
+  {text: 'Faults', cell: (row) => row.faults.join(', ') || '–'},
+  {text: 'Since', cell: (row) => utcCell(row.since_utc)},
+  {text: 'Ended', cell: (row) => utcCell(row.ended_utc)},
+  {text: 'Loops', cell: (row) => row.valve_ids.map((valve, i) =>
+    [i > 0 ? ', ' : null, valveLink(valve)])},
+];
+
+const kUnjudged = [
+  {text: 'Loop', header: true, cell: (row) => valveLink(row.valve_id)},
+  {text: 'Judged', class: 'num', cell: (row) =>
+    `${number(100 * row.judged_share, 1)} %`},
+  {text: 'Mostly because', class: 'remark', cell: (row) => row.reason},
+];
+
+const kShelved = [
+  {text: 'Valve', header: true, cell: (row) => valveLink(row.valve_id)},
+  {text: 'Fault', cell: (row) => row.fault ?? 'any'},
+  {text: 'Until', cell: (row) => utcCell(row.until_utc)},
+  {text: 'By', cell: (row) => row.who},
+  {text: 'Comment', class: 'remark', cell: (row) => row.comment ?? '–'},
+];
+
+const part = (title, list, rows) => rows.length === 0 ? null :
+  [h('h2', {}, title), dataTable(title, list, rows, {layout: 'cards'})];
+
+function coverageText({loops: all, named_faults: named, audit, nothing}) {
+  return `${all - nothing} of ${all} loops are watched: ${named} for named ` +
+      `faults, ${audit} by the audit only, ${nothing} by nothing.`;
+}
 
 class Worklist extends View {
   title = 'Work list';
@@ -31,23 +84,35 @@ class Worklist extends View {
     super();
     this.element = h('section', {},
         h('div', {class: 'controls'}, h('h1', {}, 'Work list'),
+            h('a', {class: 'button', href: url('/worklist.html'),
+              target: '_blank', rel: 'noopener'}, 'Page to print'),
             h('a', {class: 'button', href: url('/worklist.csv'),
               download: 'worklist.csv'}, 'Save as CSV'),
-            button('Print', () => print())), this.#list);
+            button('Refresh', () => this.#load())), this.#list);
     this.#load();
   }
 
   async #load() {
     try {
-      const {rows} = await get('/worklist');
-      replace(this.#list, rows.length === 0 ?
-        h('p', {class: 'nothing'}, 'Nothing to do: no valve stands out.') :
-        dataTable('Work list, most urgent first', kColumns, rows,
-            {layout: 'cards'}));
+      this.#show(await get('/worklist'));
     } catch (error) {
       replace(this.#list, errorNote(error));
     }
   }
+
+  #show(list) {
+    replace(this.#list,
+        h('p', {}, `As of ${utcText(list.as_of_utc)}, since ` +
+            `${utcText(list.since_utc)}. ` + coverageText(list.coverage)),
+        list.rows.length === 0 ?
+          h('p', {class: 'nothing'}, 'Nothing to do: no valve stands out.') :
+          dataTable('Work list, the worst first', kRows, list.rows,
+              {layout: 'cards'}),
+        part('Loops that share a cause', kShared, list.shared),
+        part('What could not be judged, and why', kUnjudged, list.unjudged),
+        part('Shelved, and therefore not in the list', kShelved,
+            list.shelved));
+  }
 }
 
-export const worklistView = (route) => new Worklist(route);
+export const worklistView = () => new Worklist();

@@ -1,0 +1,445 @@
+#include "planner/work_rows.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <set>
+#include <string_view>
+
+#include "base/error.h"
+#include "base/text.h"
+#include "base/time_text.h"
+#include "base/time_units.h"
+#include "diagnosis/model/fault_catalogue.h"
+#include "report/text_table.h"
+#include "storage/history/health.h"
+
+namespace fdi::planner {
+namespace {
+
+using findings::Finding;
+using findings::RankFacts;
+using storage::Episode;
+
+// An audit has no decision factor: these are the confidence of its verdicts.
+constexpr double kSureAudit = 0.9;
+constexpr double kLikelyAudit = 0.5;
+
+// "less than a minute", "40 min", "5 h", "3 days"
+std::string SpanText(std::int64_t span_ns) {
+  const double hours = std::max(0.0, static_cast<double>(span_ns)) / kNsPerHour;
+  const std::int64_t minutes = std::lround(hours * 60.0);
+  if (minutes == 0) {
+    return "less than a minute";
+  }
+  if (hours < 1.0) {
+    return std::to_string(minutes) + " min";
+  }
+  if (hours < 2.0 * 24.0) {
+    return std::to_string(std::lround(hours)) + " h";
+  }
+  return std::to_string(std::lround(hours / 24.0)) + " days";
+}
+
+// "stands for 3 h, not confirmed for 1 h, severity high, strength -50 %"
+std::string EpisodeText(const Finding& finding, std::int64_t now_ns) {
+  // A monitor's clock may be ahead of this one. Spans up to an earlier time
+  // than the newest evidence would be too short.
+  now_ns = std::max(now_ns, finding.last_ns);
+  std::string text =
+      finding.words.name + ": " +
+      (finding.ended_ns
+           ? "ended " + SpanText(now_ns - *finding.ended_ns) + " ago"
+           : "stands for " + SpanText(now_ns - *finding.since_ns));
+  if (finding.unconfirmed_ns) {
+    text += ", not confirmed for " + SpanText(now_ns - *finding.unconfirmed_ns);
+  }
+  text += ", severity " + std::string(SeverityName(finding.words.severity));
+  if (const double percent = std::round(100.0 * finding.strength.value_or(0.0));
+      percent != 0.0) {
+    text += ", strength " + report::FormatNumber(percent, 0) + " %";
+  }
+  if (finding.episodes > 1) {
+    text += ", " + std::to_string(finding.episodes) + " episodes";
+  }
+  if (finding.confirmed) {
+    text += ", confirmed by a label";
+  }
+  return text;
+}
+
+std::string TrendText(const LimitTrend& trend) {
+  const HealthLimit& limit = trend.limit;
+  const std::string unit = HealthUnit(limit, trend.flow_unit);
+  const std::string name = limit.kind == HealthLimit::Kind::kStrength
+                               ? FaultName(limit.fault) + " strength"
+                           : limit.kind == HealthLimit::Kind::kTravel ? "travel"
+                           : limit.kind == HealthLimit::Kind::kReversals
+                               ? "reversals"
+                               : std::string(SignalName(limit.signal));
+  std::string text = name;
+  if (trend.forecast.now) {
+    text += " at " + report::FormatNumber(*trend.forecast.now, 2) +
+            (unit.empty() ? "" : " " + unit);
+  }
+  return text + ", limit " + HealthLimitText(limit) + ": " +
+         ForecastText(trend.forecast);
+}
+
+// "Dead band of the valve: 1.40 % of travel over the last day, accepted up to
+// 1.00"
+std::string FigureText(const report::FigureText& text, double value) {
+  const bool low = text.lowest && value < *text.lowest;
+  return text.name + ": " + report::FormatNumber(value, 2) +
+         (text.unit.empty() ? "" : " " + text.unit) +
+         " over the last day, accepted " +
+         (low ? "from " + report::FormatNumber(*text.lowest, 2)
+              : "up to " + report::FormatNumber(*text.highest, 2));
+}
+
+// The number of events that a figure is the mean of; a share of the time needs
+// none.
+std::int64_t EventsOf(loop::Figure figure, const loop::ValveCounts& counts) {
+  switch (figure) {
+    case loop::Figure::kAtLimit:
+      return std::numeric_limits<std::int64_t>::max();
+    case loop::Figure::kSlipJump:
+      return counts.slips;
+    case loop::Figure::kDeadBand:
+      return counts.turns;
+    case loop::Figure::kErrorBand:
+      return std::min(counts.opening, counts.closing);
+    case loop::Figure::kDelay:
+    case loop::Figure::kT63:
+    case loop::Figure::kT86:
+    case loop::Figure::kOvershoot:
+    case loop::Figure::kTravelGain:
+      break;
+  }
+  return counts.steps;
+}
+
+// The fault of an episode according to its label, or else its diagnosis.
+std::string FaultOf(const Episode& episode) {
+  const std::string label = episode.label.value_or("");
+  return ParseFault(label) ? label : episode.fault.value_or("unknown");
+}
+
+// The episodes of one valve with one fault; the newest one is shown.
+struct SameFault {
+  const Episode* newest{nullptr};
+  int episodes{0};
+  bool confirmed{false};  // Any of them, by a label.
+};
+
+// Makes the rows of all valves.
+class RowReader {
+ public:
+  RowReader(const report::FaultTexts& texts, const WorkQuery& query,
+            const RankFacts& facts)
+      : texts_(texts), query_(query), facts_(facts) {}
+
+  void AddEpisodes(storage::History& history);
+  void AddHealth(const std::string& valve, const std::vector<HealthHour>& hours,
+                 std::map<std::string, ValveLife>& lives);
+  void AddAudits();
+  std::vector<WorkRow> Ranked() &&;
+
+ private:
+  void AddFault(const SameFault& same);
+  void AddFigures(const Finding& of, const std::vector<HealthHour>& hours);
+  Finding Low(const Finding& of, const char* kind,
+              const report::FigureText& text) const;
+  std::optional<int> GradeOf(const std::string& valve) const;
+
+  const report::FaultTexts& texts_;
+  const WorkQuery& query_;
+  const RankFacts& facts_;
+  std::vector<WorkRow> rows_;
+};
+
+std::optional<int> RowReader::GradeOf(const std::string& valve) const {
+  const auto grade = facts_.grades.find(valve);
+  return grade == facts_.grades.end() ? std::nullopt
+                                      : std::optional(grade->second);
+}
+
+void RowReader::AddFault(const SameFault& same) {
+  const Episode& episode = *same.newest;
+  Finding finding = findings::FindingOf(episode, texts_, facts_);
+  finding.episodes = same.episodes;
+  if (same.confirmed) {
+    finding.confirmed = true;
+    finding.confidence = 1.0;
+  }
+  // A label that names another fault has no stored priority.
+  if (const std::string fault = FaultOf(episode);
+      fault != episode.fault.value_or("unknown")) {
+    finding.fault = fault;
+    finding.words = texts_.Words(fault, episode.strength);
+  }
+  std::string why = EpisodeText(finding, query_.now_ns);
+  if (const auto labels = facts_.labels.find(episode.fault.value_or(""));
+      !finding.confirmed && labels != facts_.labels.end() &&
+      labels->second.wrong > labels->second.right) {
+    why += ", labels called this answer wrong before";
+  }
+  rows_.push_back({std::move(finding), std::move(why)});
+}
+
+void RowReader::AddEpisodes(storage::History& history) {
+  // Open episodes count however old they are. Those detected before the period
+  // come first, so that all are in order of detection.
+  storage::EpisodeFilter filter;
+  filter.valve_glob = query_.valve_glob;
+  filter.until_ns = query_.since_ns;
+  filter.state = storage::EpisodeState::kOpen;
+  std::vector<Episode> episodes = history.List(filter);
+  filter.since_ns = query_.since_ns;
+  filter.until_ns = std::numeric_limits<std::int64_t>::max();
+  filter.state = storage::EpisodeState::kAny;
+  for (Episode& episode : history.List(filter)) {
+    episodes.push_back(std::move(episode));
+  }
+  // What is shelved has been put aside by somebody who knows of it.
+  const auto shelves = history.Shelves(query_.now_ns);
+  const auto shelved = [&](const Episode& episode) {
+    return std::ranges::any_of(shelves, [&](const storage::Shelf& shelf) {
+      return IsActive(shelf, query_.now_ns) && Covers(shelf, episode);
+    });
+  };
+  std::map<std::pair<std::string, std::string>, SameFault> faults;
+  std::set<std::string>
+      seen;  // The plant has one that moved with its valve twice.
+  for (const Episode& episode : episodes) {
+    if (!seen.insert(episode.episode_id).second || episode.label == "false" ||
+        shelved(episode)) {
+      continue;
+    }
+    SameFault& same = faults[{episode.valve_id, FaultOf(episode)}];
+    same.newest = &episode;
+    ++same.episodes;
+    same.confirmed = same.confirmed || episode.label.has_value();
+  }
+  for (const auto& [key, same] : faults) {
+    AddFault(same);
+  }
+}
+
+Finding RowReader::Low(const Finding& of, const char* kind,
+                       const report::FigureText& text) const {
+  Finding finding = of;
+  finding.kind = kind;
+  finding.words.name = text.name;
+  finding.words.check = text.check;
+  finding.words.discipline = DisciplineName(text.discipline);
+  finding.words.namur = text.namur;
+  finding.words.severity = Severity::kLow;
+  return finding;
+}
+
+// The figures beyond their limits in the last day with this equipment. One
+// event may be chance.
+void RowReader::AddFigures(const Finding& of,
+                           const std::vector<HealthHour>& hours) {
+  constexpr std::int64_t kDayHours = 24;
+  constexpr std::int64_t kFewest = 5;
+  loop::ValveCounts counts;
+  std::int64_t seen_ms = 0;
+  for (const HealthHour& hour : hours) {
+    if (hour.epoch == hours.back().epoch &&
+        hour.hour > hours.back().hour - kDayHours) {
+      counts.Add(hour.counts);
+      seen_ms += hour.seen_ms;
+    }
+  }
+  for (std::size_t i = 0; i < loop::kFigureCount; ++i) {
+    const auto figure = static_cast<loop::Figure>(i);
+    const auto value = loop::FigureOf(figure, counts, seen_ms);
+    const report::FigureText& text = texts_.Of(figure);
+    if (value && EventsOf(figure, counts) >= kFewest && text.Exceeded(*value)) {
+      rows_.push_back({Low(of, "figure", text), FigureText(text, *value)});
+    }
+  }
+}
+
+void RowReader::AddHealth(const std::string& valve,
+                          const std::vector<HealthHour>& hours,
+                          std::map<std::string, ValveLife>& lives) {
+  if (hours.empty()) {
+    return;
+  }
+  ValveLife& life = lives[valve];
+  double live = 0.0;
+  // Earlier epochs belong to parts that are gone.
+  for (const HealthHour& hour : hours) {
+    if (hour.epoch == hours.back().epoch) {
+      life.travel_strokes += static_cast<double>(hour.travel) *
+                             HealthHour::kTravel / HealthHour::kFullStroke;
+      life.service_hours += static_cast<double>(hour.seen_ms) / kMsPerHour;
+      live += static_cast<double>(hour.live_ms) / kMsPerHour;
+    }
+  }
+  life.live_share = life.service_hours > 0.0 ? live / life.service_hours : 0.0;
+  life.last_ns = hours.back().hour * kNsPerHour;
+
+  Finding of;
+  of.valve_id = valve;
+  of.host = hours.back().host;
+  of.monitor = hours.back().monitor;
+  of.grade = GradeOf(valve);
+  of.last_ns = life.last_ns;
+  // These say what the last day with data was like.
+  if (query_.now_ns - of.last_ns > kNsPerDay) {
+    of.unconfirmed_ns = of.last_ns;
+  }
+  const std::string unconfirmed =
+      of.unconfirmed_ns ? ", not confirmed for " +
+                              SpanText(query_.now_ns - *of.unconfirmed_ns)
+                        : "";
+  const std::size_t first = rows_.size();
+  for (LimitTrend& trend : TrendsOf(hours, query_.limits)) {
+    Finding finding = of;
+    finding.kind = "limit";
+    finding.words.name = "Limit " + HealthLimitText(trend.limit);
+    finding.words.severity = Severity::kHigh;
+    finding.confidence =
+        trend.forecast.answer == HealthForecast::Answer::kReached ? 1.0
+        : trend.forecast.answer != HealthForecast::Answer::kTime
+            ? 0.0
+            : std::max(0.0,
+                       1.0 - trend.forecast.time->days / query_.horizon_days);
+    if (finding.confidence > 0.0) {
+      const std::string why = TrendText(trend);
+      rows_.push_back({std::move(finding), why, std::move(trend)});
+    }
+  }
+  for (const ChannelDrift& drift : DriftsOf(hours)) {
+    Finding finding = of;
+    finding.kind = "drift";
+    finding.words.name = "Drift of " + std::string(SignalName(drift.signal));
+    finding.since_ns = drift.since_ns;
+    rows_.push_back({std::move(finding), DriftText(drift)});
+  }
+  AddFigures(of, hours);
+  for (auto row = rows_.begin() + static_cast<std::ptrdiff_t>(first);
+       row != rows_.end(); ++row) {
+    row->why += unconfirmed;
+  }
+}
+
+// The finding of the fault catalogue that a verdict of the audit is, by its
+// name; empty: nothing to do.
+std::string CatalogueName(const std::string& verdict) {
+  constexpr std::array<std::pair<std::string_view, const char*>, 6> kNames{{
+      {"no_response", "no_response"},
+      {"stiction", "stiction"},
+      {"frozen", "reading_frozen"},
+      {"saturated", "output_saturated"},
+      {"tuning", "oscillation_tuning"},
+      {"external", "oscillation_external"},
+  }};
+  for (const auto& [name, finding] : kNames) {
+    if (verdict == name) {
+      return finding;
+    }
+  }
+  return "";
+}
+
+// The catalogue has no finding for it: it is a matter of the historian.
+constexpr const char* kQuantised = "quantised";
+report::FaultWords QuantisedWords() {
+  report::FaultWords words;
+  words.name = "PV has too few values";
+  words.check =
+      "Check the range of the transmitter and the compression of the "
+      "historian.";
+  words.discipline = "instrument";
+  return words;
+}
+
+// A loop may have been audited in several windows; its worst verdict counts.
+void RowReader::AddAudits() {
+  std::map<std::string, WorkRow> by_loop;
+  for (const LoopAudits::Window& audit : query_.audits.windows) {
+    const std::string name = CatalogueName(audit.verdict);
+    if (name.empty() && audit.verdict != kQuantised) {
+      continue;
+    }
+    Finding finding;
+    finding.valve_id = audit.loop;
+    finding.kind = "audit";
+    finding.fault = audit.verdict;
+    finding.words =
+        name.empty() ? QuantisedWords()
+                     : texts_.Words(name, audit.band_pct.value_or(0.0) / 100.0);
+    finding.certainty = audit.sure ? Certainty::kSure : Certainty::kLikely;
+    finding.confidence = audit.sure ? kSureAudit : kLikelyAudit;
+    finding.grade = GradeOf(audit.loop);
+    finding.since_ns = finding.last_ns = audit.start_ns;
+    std::string why = finding.words.name + ": " + audit.reason;
+    if (audit.band_pct) {
+      why +=
+          "; band of " + report::FormatNumber(*audit.band_pct, 1) + " % of OP";
+    }
+    const auto [place, is_new] =
+        by_loop.try_emplace(audit.loop, WorkRow{finding, why});
+    if (!is_new && IsWorse(finding, place->second.finding)) {
+      place->second = {finding, why};
+    }
+  }
+  for (auto& [loop, row] : by_loop) {
+    rows_.push_back(std::move(row));
+  }
+}
+
+std::vector<WorkRow> RowReader::Ranked() && {
+  if (!query_.discipline.empty()) {
+    std::erase_if(rows_, [this](const WorkRow& row) {
+      // A limit or a drift belongs to no discipline.
+      return row.finding.words.discipline.find(query_.discipline) ==
+             std::string::npos;
+    });
+  }
+  std::ranges::stable_sort(rows_, [](const WorkRow& a, const WorkRow& b) {
+    return IsWorse(a.finding, b.finding);
+  });
+  return std::move(rows_);
+}
+
+void RequireDiscipline(const std::string& discipline) {
+  std::string accepted;
+  for (const auto d :
+       {report::Discipline::kOperator, report::Discipline::kInstrument,
+        report::Discipline::kAir, report::Discipline::kMechanical}) {
+    if (discipline == DisciplineName(d)) {
+      return;
+    }
+    accepted.append(" ").append(DisciplineName(d));
+  }
+  throw ConfigError("discipline '" + discipline + "' is none of" + accepted);
+}
+
+}  // namespace
+
+std::vector<WorkRow> ReadRows(storage::History* history,
+                              const report::FaultTexts& texts,
+                              const WorkQuery& query, const RankFacts& facts,
+                              std::map<std::string, ValveLife>& lives) {
+  if (!query.discipline.empty()) {
+    RequireDiscipline(query.discipline);
+  }
+  RowReader rows(texts, query, facts);
+  if (history != nullptr) {
+    rows.AddEpisodes(*history);
+    for (const std::string& valve : history->HealthValves(query.valve_glob)) {
+      rows.AddHealth(valve, history->Health({valve, query.since_ns}), lives);
+    }
+  }
+  rows.AddAudits();
+  return std::move(rows).Ranked();
+}
+
+}  // namespace fdi::planner

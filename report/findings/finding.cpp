@@ -1,0 +1,113 @@
+#include "report/findings/finding.h"
+
+#include <algorithm>
+#include <cmath>
+#include <tuple>
+
+#include "base/time_units.h"
+#include "storage/history/certainty.h"
+#include "storage/models/models.h"
+#include "storage/models/plant_loops.h"
+
+namespace fdi::findings {
+namespace {
+
+double TrustIn(const std::string& answer, const RankFacts& facts) {
+  const auto found = facts.labels.find(answer);
+  if (found == facts.labels.end()) {
+    return 1.0;
+  }
+  const auto right = static_cast<double>(found->second.right);
+  const auto wrong = static_cast<double>(found->second.wrong);
+  return (right + 1.0) / (right + wrong + 1.0);
+}
+
+}  // namespace
+
+double SeverityPoints(Severity severity) {
+  return std::ldexp(1.0, static_cast<int>(severity));
+}
+
+double GradeFactor(std::optional<int> grade) {
+  return grade == 1 ? 2.0 : grade == 3 ? 0.5 : 1.0;
+}
+
+double Finding::score() const {
+  return SeverityPoints(words.severity) * GradeFactor(grade) * confidence;
+}
+
+bool IsWorse(const Finding& a, const Finding& b) {
+  if (a.stands() != b.stands()) {
+    return a.stands();
+  }
+  if (a.score() != b.score()) {
+    return a.score() > b.score();
+  }
+  if (a.since_ns != b.since_ns) {
+    return a.since_ns > b.since_ns;  // Nothing is older than any time.
+  }
+  return std::tie(a.valve_id, a.episode_id) <
+         std::tie(b.valve_id, b.episode_id);
+}
+
+RankFacts ReadRankFacts(storage::History& history,
+                        const std::filesystem::path& models,
+                        std::int64_t now_ns) {
+  storage::EpisodeFilter filter;
+  filter.since_ns = now_ns - kPeriodDays * kNsPerDay;
+  RankFacts facts;
+  facts.labels = history.AlarmFigures(filter, now_ns).faults;
+  if (std::filesystem::exists(models)) {
+    for (const storage::PlantLoop& loop : storage::ModelStore(models).Loops()) {
+      if (loop.grade) {
+        facts.grades[loop.name] = *loop.grade;
+      }
+    }
+  }
+  return facts;
+}
+
+Finding FindingOf(const storage::Episode& episode,
+                  const report::FaultTexts& texts, const RankFacts& facts) {
+  Finding finding;
+  finding.valve_id = episode.valve_id;
+  finding.host = episode.host;
+  finding.monitor = episode.monitor;
+  finding.kind = "episode";
+  finding.fault = episode.fault;
+  finding.words = texts.Words(episode.fault.value_or("unknown"),
+                              episode.strength, episode.priority);
+  if (const auto no_name = storage::NoNameText(episode); !no_name.empty()) {
+    finding.words.name = no_name;
+  }
+  finding.layer = episode.layer;
+  finding.certainty = storage::CertaintyOf(episode);
+  finding.look_alikes = storage::LookAlikesOf(episode);
+  if (IsNamed(episode)) {
+    finding.strength = episode.strength;
+  }
+  if (const auto grade = facts.grades.find(episode.valve_id);
+      grade != facts.grades.end()) {
+    finding.grade = grade->second;
+  }
+  finding.since_ns = episode.detected_ns;
+  // The end of the data is no return to normal.
+  finding.unconfirmed_ns = episode.unconfirmed_ns;
+  if (!episode.unconfirmed_ns) {
+    finding.ended_ns =
+        episode.cleared_ns ? episode.cleared_ns : episode.ended_ns;
+  }
+  finding.last_ns = episode.trace_end_ns.value_or(episode.detected_ns);
+  finding.episode_id = episode.episode_id;
+  finding.episodes = 1;
+  finding.acked_by = episode.acked_by;
+  finding.label = episode.label;
+  finding.confirmed = episode.label && *episode.label != "false";
+  finding.confidence = finding.confirmed
+                           ? 1.0
+                           : std::clamp(episode.peak_factor, 0.0, 1.0) *
+                                 TrustIn(episode.fault.value_or(""), facts);
+  return finding;
+}
+
+}  // namespace fdi::findings
