@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "diagnosis/records/certainty.h"
+#include "diagnosis/decision/certainty.h"
 #include "report/fault_texts.h"
 #include "storage/history/alarm.h"
 #include "storage/history/episode.h"
