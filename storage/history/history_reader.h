@@ -71,12 +71,8 @@ EpisodeCondition ConditionOf(const EpisodeFilter& filter);
 /// id, fault, open, unacknowledged, time.
 std::string ListQuery(const EpisodeFilter& filter);
 
-/// SQL for the columns of EpisodeStatistics, by valve and fault, from a
-/// covering index.
-std::string StatisticsQuery(const EpisodeFilter& filter);
-
-/// SQL for the columns of AlarmSpan, ordered by detection, from the same index:
-/// the episodes that overlap the filter's time.
+/// SQL for the columns of AlarmSpan, ordered by detection, from a covering
+/// index: the episodes that overlap the filter's time.
 std::string AlarmSpanQuery(const EpisodeFilter& filter);
 
 /// SQL for kFieldsOf<Episode> of open and of ended unacknowledged episodes,

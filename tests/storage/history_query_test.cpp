@@ -93,15 +93,6 @@ TEST_F(HistoryQueryTest, TheViewUsesTheIndexesOfItsColumns) {
               HasSubstr("episode_by_utc"));
 }
 
-TEST_F(HistoryQueryTest, StatisticsReadOneIndexAndNoTable) {
-  for (const char* valve : {"*", "LV-1", "LV-*"}) {
-    EpisodeFilter filter;
-    filter.valve_glob = valve;
-    EXPECT_THAT(PlanOf(StatisticsQuery(filter)),
-                HasSubstr("COVERING INDEX episode_statistics"));
-  }
-}
-
 TEST_F(HistoryQueryTest, AlarmsAndTheirFiguresWalkIndexes) {
   EXPECT_THAT(PlanOf(AlarmSpanQuery({})),
               HasSubstr("COVERING INDEX episode_statistics"));
