@@ -76,9 +76,9 @@ TEST_F(KeyFolderTest, AKeyHasItsNameAndTimes) {
 
 TEST_F(KeyFolderTest, AnExpiredKeyIsNamedWithItsEnd) {
   EXPECT_EQ(Refusal(key_, NowNs() + 9 * kDayNs), "");
-  EXPECT_THAT(Refusal(key_, NowNs() + 11 * kDayNs),
-              AllOf(HasSubstr("cert.pem: expired at 20"),
-                    HasSubstr("fdi-keys renew")));
+  EXPECT_THAT(
+      Refusal(key_, NowNs() + 11 * kDayNs),
+      AllOf(HasSubstr("cert.pem: expired at 20"), HasSubstr("fdi-keys renew")));
   // The clock of a host that boots may be set a moment later.
   EXPECT_THAT([&] { CheckKey(key_, NowNs() - 3 * kDayNs); },
               testing::ThrowsMessage<PassingError>(
