@@ -19,8 +19,7 @@ namespace fdi {
 /// very class. Of a sample, in this order:
 ///
 /// 1. the engine judges it, with the name and the suspicion of the sample
-/// before
-///    (ValveEngine);
+///    before it (ValveEngine);
 /// 2. the looks that are due at it are noted (ValveLooks);
 /// 3. its episode is named, and the strengths are followed (EpisodeName,
 ///    EpisodeStrengths).

@@ -257,7 +257,8 @@ void AddAlarmVerbs(report::Program& program, CLI::App& group) {
   auto [unshelve, ended] = AddVerb(program, group, "unshelve",
                                    "Take alarms off the shelf early", Unshelve);
   unshelve.add_option("id", ended.ids, "Ids that history shelf shows");
-  unshelve.add_option("--valve", ended.valve, "All of this valve");
+  unshelve.add_option("--valve", ended.valve, "All of this valve")
+      ->type_name("ID");
   ended.note.AddTo(unshelve);
 
   auto [shelf, listed] = AddVerb(

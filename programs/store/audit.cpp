@@ -801,7 +801,8 @@ void AddAuditVerb(report::Program& program) {
   verb.add_option("file", options.files, "CSV files, one loop each");
   verb.add_option("--runs", options.runs, "Stored runs: ID, ID@from:to");
   verb.add_option("--valve", options.valve,
-                  "All stored runs of these valves: 'FV-1*'");
+                  "All stored runs of these valves: 'FV-1*'")
+      ->type_name("GLOB");
   verb.add_option("--op", options.op, "Column of the controller output [%]");
   verb.add_option("--pv", options.pv, "Column of the controlled variable");
   verb.add_option("--sp", options.sp, "Column of the set point [as PV]");

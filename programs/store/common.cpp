@@ -31,7 +31,8 @@ ModelStore WritableModels(const Context& context) {
 }
 
 void EpisodeOptions::AddTo(CLI::App& verb) {
-  verb.add_option("--valve", valve, "Glob over valve ids: 'FV-1*'");
+  verb.add_option("--valve", valve, "Glob over valve ids: 'FV-1*'")
+      ->type_name("GLOB");
   verb.add_option("--fault", fault,
                   std::string(kFaultNames) + ", paper1..paper5 or unknown");
   window.AddTo(verb);

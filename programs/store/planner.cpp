@@ -246,7 +246,9 @@ void AddPlannerVerbs(report::Program& program) {
               "is a significant trend",
               Trend);
   for (auto [verb, options] : {std::pair(&show, &shown), {&trend, &limits}}) {
-    verb->add_option("--valve", options->valve, "Id of the valve")->required();
+    verb->add_option("--valve", options->valve, "Id of the valve")
+        ->required()
+        ->type_name("ID");
     options->window.AddTo(*verb);
     options->plant.AddTo(*verb);
   }
@@ -266,7 +268,8 @@ void AddPlannerVerbs(report::Program& program) {
       "What is wrong, the worst first, and what to do about it", WorkList);
   list.add_option("--top", options.top, "Rows of the text; 0: all");
   list.add_option("--valve", options.valve,
-                  "Only rows of valves whose ids match this glob");
+                  "Only rows of valves whose ids match this glob")
+      ->type_name("GLOB");
   list.add_option("--since", options.since,
                   "Episodes, trends and figures from this time on: 90d, "
                   "2026-10-01");

@@ -322,7 +322,9 @@ void AddImport(report::Program& program, CLI::App& group) {
       AddVerb(program, group, "import",
               "Store a CSV file as a run; all of it or nothing", ImportRuns);
   verb.add_option("file", options.file, "CSV file, or - for stdin")->required();
-  verb.add_option("--valve", options.valve, "Id of the valve")->required();
+  verb.add_option("--valve", options.valve, "Id of the valve")
+      ->required()
+      ->type_name("ID");
   options.table.AddTo(verb);
   verb.add_option("--start", options.start,
                   "Time of t = 0, if times have no date (default: now)");
@@ -344,7 +346,8 @@ void AddRunsVerbs(report::Program& program) {
   CLI::App& group = program.AddGroup("runs", "Stored runs");
   auto [list, list_options] =
       AddVerb(program, group, "list", "List the runs", ListRuns);
-  list.add_option("--valve", list_options.valve, "Glob over valve ids");
+  list.add_option("--valve", list_options.valve, "Glob over valve ids")
+      ->type_name("GLOB");
   list.add_option("--origin", list_options.origin,
                   "simulated, imported or recorded");
   list_options.window.AddTo(list);

@@ -424,7 +424,7 @@ TEST_F(ShipTest, RefusalsHaveAReasonAndCode3) {
   EXPECT_EQ(Store("history list --from '" + Url("screen") + "'").code, 0);
   owner.Run("UPDATE fdi.plant SET version = version + 1");
   refused(Ship("a"),
-          "schema fdi has version 9, this program needs 8: update "
+          "schema fdi has version 10, this program needs 9: update "
           "this program");
   refused(Store("ship --data " + Folder("a").string() +
                 " --to 'postgresql://x:secret@/plant?host=/nowhere'"),
