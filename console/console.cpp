@@ -89,7 +89,9 @@ void Console::Start(ConsoleSources sources) {
         return std::make_unique<storage::HistoryReader>(path);
       },
       texts_, sources.models);
-  // With `new`: the places of an Api can be neither moved nor copied.
+  // An Api can be neither moved nor copied, and Clang 14 does not initialise an
+  // aggregate in make_unique().
+  // NOLINTNEXTLINE(modernize-make-unique)
   api_.reset(new Api{std::move(sources), board_, stream_, *alarms_, *models_,
                      texts_, access_, NewInstance(), stopping_.get_token()});
   SetDefaultResponses();

@@ -303,7 +303,8 @@ void Service::StartParts() {
   if (options_.parts.empty()) {
     return;
   }
-  PartContext part{data_, context_.software, started_ns_, context_.log};
+  PartContext part{
+      data_, context_.software, started_ns_, context_.log, {}, {}, {}, {}};
   part.facts = [this] {
     const idl::MonitorStatusMessage status = StatusOf(Facts());
     return MonitorFacts{idl::HealthName(status.health), status.counters,

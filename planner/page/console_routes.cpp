@@ -3,6 +3,7 @@
 
 #include <map>
 #include <memory>
+#include <optional>
 #include <sstream>
 #include <string>
 
@@ -39,7 +40,7 @@ struct ListCache {
   Mutex mutex;
   std::string query GUARDED_BY(mutex);
   std::int64_t read_ns GUARDED_BY(mutex){0};
-  Json document GUARDED_BY(mutex);
+  std::optional<Json> document GUARDED_BY(mutex);
 };
 
 // Without the audit of stored runs, which takes long.
@@ -51,8 +52,8 @@ Json ReadList(ListCache& cache, const Api& api,
   }
   const std::int64_t now_ns = api.sources.utc_now_ns();
   const MutexLock lock(cache.mutex);
-  if (query != cache.query || now_ns >= cache.read_ns + kCacheNs ||
-      now_ns < cache.read_ns) {
+  if (!cache.document || query != cache.query ||
+      now_ns >= cache.read_ns + kCacheNs || now_ns < cache.read_ns) {
     WorkQuery work;
     work.now_ns = now_ns;
     work.valve_glob = Parameter(request, "valve").value_or("*");
@@ -71,12 +72,13 @@ Json ReadList(ListCache& cache, const Api& api,
       }
     }
     const auto history = api.History();
-    cache.document = WorkList(history.get(), api.texts, work);
-    cache.document["note"] = console::TextOrNull(storage::TakeNote(*history));
+    Json list = WorkList(history.get(), api.texts, work);
+    list["note"] = console::TextOrNull(storage::TakeNote(*history));
+    cache.document = std::move(list);
     cache.query = query;
     cache.read_ns = now_ns;
   }
-  return cache.document;
+  return *cache.document;
 }
 
 // One array per quantity, as charts need them; all have the same length.

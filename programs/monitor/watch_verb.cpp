@@ -112,6 +112,14 @@ class TableOutput {
   Clock::time_point shown_{Clock::now()};
 };
 
+// Whether the table is drawn again in its place. What is limited is for a file,
+// even if it is shown on a terminal.
+bool IsInPlace(const WatchOptions& options, bool json) {
+  return options.table && !json && options.for_s == 0.0 &&
+         options.idle_s == 0.0 && options.expect == 0 &&
+         isatty(STDOUT_FILENO) != 0;
+}
+
 int RunWatch(const WatchOptions& given, const report::Context& context) {
   WatchOptions options = given;
   if (options.events_only) {
@@ -123,10 +131,7 @@ int RunWatch(const WatchOptions& given, const report::Context& context) {
   // Whoever reads the output may have stopped reading.
   signals.EndWithin(kStopPatience);
   const bool json = context.options.json;
-  // What is limited is for a file, even if it is shown on a terminal.
-  const bool in_place = options.table && !json && options.for_s == 0.0 &&
-                        options.idle_s == 0.0 && options.expect == 0 &&
-                        isatty(STDOUT_FILENO) != 0;
+  const bool in_place = IsInPlace(options, json);
   // Log lines would garble the screen.
   BusView bus(options.bus, context, in_place ? LogSink() : context.log);
   if (!in_place) {
