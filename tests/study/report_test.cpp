@@ -22,45 +22,8 @@ using testing::Not;
 
 constexpr std::size_t kBytesPerRun = 100'000;
 
-class StudyReportTest : public StudyProgram {
+class StudyReportTest : public StudyOfRuns {
  protected:
-  void SetUp() override {
-    Write("c.toml", Quick() + TwoConditions());
-    ASSERT_EQ(Run("train --campaign c.toml").code, 0) << Read("err.txt");
-  }
-  std::filesystem::path Runs() const { return Path("data") / "runs.db"; }
-  storage::StoredRun NormalRun() const {
-    storage::RunStore store(Runs());
-    for (const storage::RunInfo& run : store.List()) {
-      if (run.samples == 900) {
-        return store.Load(run.id);
-      }
-    }
-    throw std::runtime_error("no normal run");
-  }
-  // `copies` of the normal run, one after another; in the last 300 samples the
-  // flow sensor reads half.
-  std::vector<LabelledSample> FaultySamples(std::size_t copies = 1) const {
-    const storage::StoredRun normal = NormalRun();
-    std::vector<LabelledSample> samples;
-    for (std::size_t k = 0; k < copies * normal.samples.size(); ++k) {
-      LabelledSample labelled{normal.samples[k % normal.samples.size()].sample,
-                              FaultTruth{}};
-      labelled.sample.seq = k;
-      labelled.sample.stamp_ns = static_cast<std::int64_t>(k) * 1'000'000'000;
-      if (k + 300 >= copies * normal.samples.size()) {
-        labelled.truth = FaultTruth{19, 0.5};
-        labelled.sample.Set(Signal::kF, 0.5 * labelled.sample[Signal::kF]);
-      }
-      samples.push_back(labelled);
-    }
-    return samples;
-  }
-  void WriteFile(const std::string& name,
-                 const std::vector<LabelledSample>& samples) const {
-    std::ofstream file(Path(name));
-    importer::WriteCsv(file, samples, FlowUnit::kM3PerHour, 0);
-  }
   // The model set again, with an f1 that looks like f19.
   void AddTwin() const {
     storage::ModelStore store(Path("data") / "models.db",
@@ -107,8 +70,8 @@ TEST_F(StudyReportTest, GroupsOfTheSetAreJudgedBesideFaults) {
 TEST_F(StudyReportTest, ReportStandsAloneAndShowsEveryRun) {
   WriteFile("a&b.csv", FaultySamples());
   const Outcome outcome =
-      Study("evaluate --model-set quick --file 'a&b.csv' --runs " +
-            NormalRun().info.id + " --report out");
+      Study("evaluate --model-set quick --file 'a&b.csv' --runs " + RunOf(900) +
+            " --report out");
 
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   const std::string page = Read("out/index.html");

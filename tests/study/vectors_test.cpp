@@ -17,47 +17,7 @@
 namespace fdi::trainer::study {
 namespace {
 
-class StudyVectorsTest : public StudyProgram {
- protected:
-  void SetUp() override {
-    Write("c.toml", Quick() + TwoConditions());
-    ASSERT_EQ(Run("train --campaign c.toml").code, 0) << Read("err.txt");
-  }
-  std::filesystem::path Runs() const { return Path("data") / "runs.db"; }
-  // The run of the training campaign that lasts so long.
-  std::string RunOf(std::int64_t samples) const {
-    for (const storage::RunInfo& run : storage::RunStore(Runs()).List()) {
-      if (run.samples == samples) {
-        return run.id;
-      }
-    }
-    return {};
-  }
-  // A run in which the flow sensor reads half from 600 s on.
-  std::string FaultyRun() const {
-    storage::StoredRun normal = storage::RunStore(Runs()).Load(RunOf(900));
-    storage::RunRecorder recorder(Runs());
-    const auto key = recorder.Begin(normal.info.run);
-    const std::string id = recorder.Id(key);
-    for (storage::StoredSample& stored : normal.samples) {
-      if (stored.sample.seq >= 600) {
-        stored.sample.Set(Signal::kF, 0.5 * stored.sample[Signal::kF]);
-        stored.truth = FaultTruth{19, 0.5};
-      }
-      recorder.Append(key, stored);
-    }
-    recorder.Close();
-    return id;
-  }
-  std::vector<std::string> Lines(const std::string& name) const {
-    std::istringstream text(Read(name));
-    std::vector<std::string> lines;
-    for (std::string line; std::getline(text, line);) {
-      lines.push_back(line);
-    }
-    return lines;
-  }
-};
+class StudyVectorsTest : public StudyOfRuns {};
 
 // What the live engine said, as `--vectors` writes it, from its own loop.
 std::string LineOf(const std::string& run, const Verdict& v) {

@@ -2,34 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/trainer/indications.h"
+
 namespace fdi::trainer {
 namespace {
-
-// 1000 s, settled at 30 s, f6 growing from 700 s on.
-std::vector<Indication> Quiet() {
-  std::vector<Indication> all(1000);
-  for (std::size_t k = 0; k < all.size(); ++k) {
-    all[k].time_s = static_cast<double>(k);
-    all[k].settled = k >= 30;
-    if (k >= 700) {
-      all[k].truth = {6, 0.001 * static_cast<double>(k - 699)};
-    }
-  }
-  return all;
-}
-
-void Detect(std::vector<Indication>& all, std::size_t from, std::size_t to) {
-  for (std::size_t k = from; k < to; ++k) {
-    all[k].detected = true;
-  }
-}
-
-void Isolate(std::vector<Indication>& all, std::size_t from, std::size_t to,
-             const std::vector<int>& set) {
-  for (std::size_t k = from; k < to; ++k) {
-    all[k].isolated = set;
-  }
-}
 
 TEST(IndicesTest, NothingIndicatedMeansMinusOne) {
   const RunIndices r = ComputeIndices(Quiet());

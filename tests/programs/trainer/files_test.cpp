@@ -7,7 +7,7 @@
 
 #include "import/csv.h"
 #include "storage/runs/runs.h"
-#include "tests/programs/trainer/fixture.h"
+#include "tests/programs/trainer/trained_runs.h"
 
 namespace fdi::trainer {
 namespace {
@@ -16,46 +16,7 @@ using nlohmann::json;
 using testing::AllOf;
 using testing::HasSubstr;
 
-class AppFilesTest : public TrainerProgram {
- protected:
-  void SetUp() override {
-    Write("c.toml", Quick() + TwoConditions());
-    ASSERT_EQ(Run("train --campaign c.toml").code, 0) << Read("err.txt");
-  }
-  std::filesystem::path Runs() const { return Path("data") / "runs.db"; }
-  storage::StoredRun NormalRun() const {
-    storage::RunStore store(Runs());
-    for (const storage::RunInfo& run : store.List()) {
-      if (run.samples == 900) {
-        return store.Load(run.id);
-      }
-    }
-    throw std::runtime_error("no normal run");
-  }
-  // `copies` of the normal run, one after another; in the last 300 samples the
-  // flow sensor reads half.
-  std::vector<LabelledSample> FaultySamples(std::size_t copies = 1) const {
-    const storage::StoredRun normal = NormalRun();
-    std::vector<LabelledSample> samples;
-    for (std::size_t k = 0; k < copies * normal.samples.size(); ++k) {
-      LabelledSample labelled{normal.samples[k % normal.samples.size()].sample,
-                              FaultTruth{}};
-      labelled.sample.seq = k;
-      labelled.sample.stamp_ns = static_cast<std::int64_t>(k) * 1'000'000'000;
-      if (k + 300 >= copies * normal.samples.size()) {
-        labelled.truth = FaultTruth{19, 0.5};
-        labelled.sample.Set(Signal::kF, 0.5 * labelled.sample[Signal::kF]);
-      }
-      samples.push_back(labelled);
-    }
-    return samples;
-  }
-  void WriteFile(const std::string& name,
-                 const std::vector<LabelledSample>& samples) const {
-    std::ofstream file(Path(name));
-    importer::WriteCsv(file, samples, FlowUnit::kM3PerHour, 0);
-  }
-};
+class AppFilesTest : public TrainedRuns {};
 
 TEST_F(AppFilesTest, FileIsScoredAsTheSameRunWouldBeOnceStored) {
   WriteFile("f.csv", FaultySamples());
