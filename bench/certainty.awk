@@ -1,6 +1,6 @@
-# Of lines of `fdi-study evaluate --csv` with the faults of a set joined by
-# bars (FDI_RUNS of set_calibration.sh and untrained.sh): answers of each
-# certainty, and how many of them hold the fault. A catalogue's look-alike that
+# Counts the answers of each certainty, and how many of them hold the fault, in
+# lines of `fdi-study evaluate --csv` whose sets are joined by bars (FDI_RUNS of
+# set_calibration.sh and untrained.sh). A catalogue's look-alike that
 # the set does not know stands beside a single name that is called "one of".
 #
 #     awk -F, -f bench/certainty.awk RUNS

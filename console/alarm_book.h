@@ -45,7 +45,8 @@ class AlarmBook {
 
   /// By valve id, as of the last Refresh(). Thread safe.
   std::shared_ptr<const ByValveMap> ByValve() const;
-  /// What weighs in the rank of alarms, at most a minute old. Thread safe.
+  /// The facts that weigh in the rank of alarms, at most a minute old. Thread
+  /// safe.
   std::shared_ptr<const findings::RankFacts> Facts() const;
   /// Adds an event heard on the bus: its episode counts as an alarm until the
   /// history contains it or it closes. @returns false if the history already

@@ -25,8 +25,8 @@ std::string NewInstance() {
   return text;
 }
 
-// Of the streams, one more that tells further clients that all places are
-// taken, of the requests for which Api has places, and of all others.
+// One for each stream and one that tells further clients that all places are
+// taken; the requests for which Api has places; and all others.
 constexpr std::size_t kThreads =
     StreamOptions{}.max_clients + 1 + kHistoryPlaces + kPicturePlaces + 6;
 

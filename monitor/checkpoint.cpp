@@ -60,7 +60,7 @@ Checkpoint Merged(Checkpoint older, Checkpoint newer) {
         old.Add(fresh);
         return true;
       });
-  // Of two accumulators of a valve the newer one is kept.
+  // The newer of two accumulators of a valve is kept.
   Merge(
       older.accumulators, std::move(newer.accumulators),
       [](const Accumulator& a) { return a.valve_id; },

@@ -147,7 +147,7 @@ std::vector<PlannedLoop> LoopsOf(const std::filesystem::path& models) {
     PlannedLoop& loop = loops.emplace_back();
     loop.valve_id = row.name;
     loop.grade = row.grade;
-    // Of other rows the finding is a verdict, or how the set was made.
+    // The finding of other rows is a verdict, or how the set was made.
     if (row.state == storage::LoopState::kRefused ||
         row.finding.starts_with("not judged")) {
       loop.finding = row.finding;

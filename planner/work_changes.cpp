@@ -11,7 +11,7 @@ namespace {
 
 using report::Json;
 
-// What a list says about one valve.
+// One valve in one list.
 struct Said {
   std::string name;  // Empty: nothing is wrong with it.
   std::string severity;

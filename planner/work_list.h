@@ -26,8 +26,9 @@ struct PlannedLoop {
   std::string finding{};       ///< Why its record could not be used, if known.
 };
 
-/// What a list is about. The history has episodes, shelves, health and the time
-/// for which each valve was judged; the rest is known to the caller.
+/// The question that a list answers. The history has episodes, shelves, health
+/// and the time for which each valve was judged; the rest is known to the
+/// caller.
 struct WorkQuery {
   std::string valve_glob{"*"};  ///< Of the rows.
   std::int64_t now_ns{0};       ///< The list is as of then; must be set.

@@ -202,7 +202,7 @@ void RowReader::AddEpisodes(storage::History& history) {
   for (Episode& episode : history.List(filter)) {
     episodes.push_back(std::move(episode));
   }
-  // What is shelved has been put aside by somebody who knows of it.
+  // Somebody who knows of a shelved alarm has put it aside.
   const auto shelves = history.Shelves(query_.now_ns);
   const auto shelved = [&](const Episode& episode) {
     return std::ranges::any_of(shelves, [&](const storage::Shelf& shelf) {

@@ -30,11 +30,11 @@ struct ValveLife {
   std::int64_t last_ns{0};  ///< Its newest hour.
 };
 
-/// What is wrong, by findings::IsWorse(): the faults of a valve, each once with
-/// all its episodes; limits that a trend has reached or will reach within the
-/// horizon (high; confidence 1 - days / horizon); drifts and figures beyond
+/// The rows, ranked by findings::IsWorse(): the faults of a valve, each once
+/// with all its episodes; limits that a trend has reached or will reach within
+/// the horizon (high; confidence 1 - days / horizon); drifts and figures beyond
 /// their limit (low); verdicts of audits (confidence 0.9 if sure, else 0.5).
-/// Left out is what a label calls false and what is shelved now.
+/// Episodes that a label calls false, and those that are shelved, are left out.
 /// @param history null: there is none yet.
 /// @param[out] lives of the valves that have hours of health.
 /// @throws ConfigError for an unknown discipline, naming the accepted ones.

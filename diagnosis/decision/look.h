@@ -11,9 +11,9 @@
 #include "diagnosis/model/record_row.h"
 #include "diagnosis/model/sample.h"
 
-/// What passes between the decision and a simulation of the valve: the window
-/// that is to be looked at, and how each fault explains it. The simulation
-/// itself is not known here (LookSimulation).
+/// The messages between the decision and a simulation of the valve: the window
+/// to look at, and how well each fault explains it. The simulation itself is
+/// not known here (LookSimulation).
 namespace fdi {
 
 /// Ages of an episode at which looks are due; then at twice the age each.
@@ -144,11 +144,11 @@ struct LookAnswer {
   /// lacks X or a pressure; none where it has them.
   std::vector<Explanation> beside{};
   double misfit{0.0};
-  /// Of an early look: its set is wider, it does not overrule the observers,
-  /// and no later look is measured by it. It is there for faults that are over
-  /// before the others.
+  /// An early look has a wider set, does not overrule the observers, and no
+  /// later look is measured by it. It serves faults that are over before the
+  /// others come.
   bool early{false};
-  /// Of a late look. The alarm has lasted, so the faults that explain its
+  /// The look is late. The alarm has lasted, so the faults that explain its
   /// window name the episode even where a constant shift would explain it, too.
   bool late{false};
   /// The valve's answer under the best explanation, a row each.

@@ -23,7 +23,7 @@ constexpr double kAlike = 0.06;
 // Healthy windows have about 1.
 constexpr double kGoodMisfit = 2.0;
 
-// Whether `e` is to stand beside a fault of the set that it looks like.
+// True if `e` joins the set beside a fault that it looks like.
 bool IsAlike(Alike alike, const SecondLook& look, const Explanation& e,
              double nothing) {
   switch (alike) {
@@ -42,9 +42,9 @@ bool IsAlike(Alike alike, const SecondLook& look, const Explanation& e,
   return false;
 }
 
-// Whether the best fault would have to be larger than there is, and leaves more
-// than a healthy valve does: the window shows something else. A stop and a lack
-// of force are complete at that strength.
+// True if the best fault would have to exceed its full strength and still
+// leaves more unexplained than a healthy valve does: the window shows something
+// else. A stop and a lack of force are complete at that strength.
 bool IsExhausted(const SecondLook& look) {
   constexpr double kLargest = 0.99;
   const Explanation& best = look.ranked.front();

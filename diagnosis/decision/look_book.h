@@ -42,7 +42,7 @@ class LookBook {
     std::int64_t from_ns;
     LookAnswer answer;
   };
-  // Whether a look that comes so late is heard.
+  // True if a look that comes so late still counts.
   bool AcceptsLate(const LookAnswer& answer);
 
   std::vector<Entry> entries_;

@@ -8,7 +8,7 @@
 
 namespace fdi {
 
-/// What the audit says about the loops that have stored runs.
+/// The audit of the loops that have stored runs.
 struct LoopAudits {
   struct Window {
     std::string loop;

@@ -196,7 +196,7 @@ void Service::AttachListeners() {
   }
 }
 
-// What becomes of an event, in this order.
+// The steps that an event takes, in this order.
 void Service::ListAfterCommit() {
   for (const auto& part : options_.parts) {
     after_commit_.Add(std::string(part->name()),

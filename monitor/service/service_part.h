@@ -22,7 +22,8 @@ struct MonitorFacts {
   std::uint64_t open_episodes{0};
 };
 
-/// What the service lends to its parts, and outlives them. Thread safe.
+/// The means that the service lends to its parts. They outlive the parts.
+/// Thread safe.
 struct PartContext {
   storage::DataDirectory data;
   std::string software;

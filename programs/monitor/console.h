@@ -7,8 +7,8 @@
 #include "monitor/service/service_part.h"
 #include "report/program.h"
 
-/// What the console adds to the verbs of this program, or left_out.cpp if the
-/// build has no console.
+/// The console's part in the verbs of this program; left_out.cpp stands in for
+/// it if the build has no console.
 namespace fdi::monitor {
 
 struct PageOptions {

@@ -8,8 +8,8 @@
 
 namespace fdi::monitor {
 
-/// What the planner adds to the page, or left_out.cpp if the build has no
-/// planner. `groups` as for FollowCauses().
+/// The planner's routes of the page; left_out.cpp stands in for them if the
+/// build has no planner. `groups` as for FollowCauses().
 std::vector<console::Route> PlannerRoutes(const std::filesystem::path& groups,
                                           const report::Context& context);
 

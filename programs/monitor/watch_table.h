@@ -49,7 +49,7 @@ class WatchTable {
     report::Json event;        // The last one; null: none was heard.
     std::int64_t stamp_ns{0};  // Of the vector.
     Clock::time_point at;      // Its arrival.
-    // Of the last event, if its alarm ended with its data.
+    // Stamp of the last event, if its alarm ended with its data.
     std::int64_t ended_ns{std::numeric_limits<std::int64_t>::min()};
     // A later vector followed the first one, or the end.
     bool goes_on{false};

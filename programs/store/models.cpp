@@ -217,7 +217,7 @@ struct ModelImportOptions {
   bool activate{false};
 };
 
-// What another data directory has of a plant: valves, sets, types, loops.
+// Imports valves, sets, types and loops from another data directory.
 Report ImportPlant(const std::string& folder, ModelStore& store) {
   const DataDirectory part{folder};
   if (!std::filesystem::exists(part.models())) {

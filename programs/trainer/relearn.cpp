@@ -103,7 +103,7 @@ RelearnRequest RequestOf(const RelearnOptions& options,
 
 importer::CsvOptions FormOf(const RelearnOptions& options,
                             const report::Context& context) {
-  // What else the set reads is asked of its channels: not every valve has it.
+  // Further signals are asked of the channels: not every valve has them.
   return {.map = options.table.Read(context.options.utc),
           .required = MaskOf(Signal::kCv),
           .log = context.log};
@@ -318,7 +318,7 @@ Json LeftOutJson(const Relearning& learnt) {
   return rows;
 }
 
-// What the rod may deviate by; null without a floor.
+// The deviation that the floor allows the rod; null without a floor.
 Json FloorJson(const ModelSet& models) {
   return models.floor ? Json(models.floor->deviation) : Json();
 }

@@ -18,7 +18,7 @@ namespace fdi::findings {
 /// The period of every list unless somebody states another one.
 inline constexpr int kPeriodDays = 90;
 
-/// What a plant knows beside an episode, and what weighs in its rank.
+/// The facts of a plant that weigh in the rank of an episode.
 struct RankFacts {
   /// How much the plant depends on a loop, by valve: 1 most, 3 least.
   std::map<std::string, int> grades{};

@@ -54,7 +54,7 @@ std::optional<FoundType> TypeOf(const PlantJob& job, storage::ModelStore* store,
   }
 }
 
-// What the models of a row rest on beside its record.
+// The type and parameters that the models of a row rest on.
 std::string BasisText(const std::optional<FoundType>& type,
                       const OnboardingOptions& options) {
   return type ? TypeText(type->type) + type->set_hash +
@@ -82,7 +82,8 @@ std::string FindingOf(const Onboarding& onboarding) {
   return text;
 }
 
-// Whether the failure is of the row, not of the store or the user.
+// A failure of the row is that row's answer; one of the store, or an
+// interruption, ends the run.
 void RethrowUnlessOfRow(const std::exception& error) {
   if (dynamic_cast<const Interrupted*>(&error) != nullptr ||
       dynamic_cast<const storage::SqliteError*>(&error) != nullptr ||

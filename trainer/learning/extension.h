@@ -15,7 +15,8 @@ namespace fdi::trainer {
 struct FormerRecord {
   ValveType type;         ///< As it was fitted: where the fit starts.
   SignalMask signals{0};  ///< That the valve measures.
-  /// Of runs.db, ID[@from:to]; with those that hold episodes labelled false.
+  /// Runs in runs.db, ID[@from:to], also those that hold episodes labelled
+  /// false.
   std::vector<std::string> runs;
   std::vector<std::string> files;  ///< FILE[@from:to]
 };

@@ -214,7 +214,7 @@ void PlanRuns(const std::vector<std::string>& more,
   }
 }
 
-// Whether the label asks for other models: one that calls an alarm of an
+// True if the label asks for other models. One that calls an alarm of an
 // onboarded valve false asks for other limits, unless it taught a fault before.
 bool AsksForModels(const LabelledEpisode& episode, const LabelPlan& plan) {
   return !IsOnboarded(*plan.parent) || episode.meaning.fault != 0 ||

@@ -34,7 +34,7 @@ std::string SettingsText(const TrainingOptions& options);
 /// its limits were set later or labels have taught it more.
 ModelSet FirstSet(const ModelSet& models, storage::ModelStore& store);
 
-/// What is known of a valve since its set was made, as the user names it.
+/// The labels and healthy hours to learn from, as the user names them.
 struct RelearnRequest {
   std::string valve;  ///< Its id. Of a set that several valves share: a glob.
   std::optional<std::int64_t> from_ns{};  ///< Of recorded samples and episodes.
@@ -46,7 +46,8 @@ struct RelearnRequest {
   GivenStrengths strengths{};
 };
 
-/// What labels teach, and on what to build. Making a plan stores nothing.
+/// The lessons of labels, and the set to build on. Making a plan stores
+/// nothing.
 ///
 /// A set of `train` is trained anew, on its own runs and on the episodes. A set
 /// of onboarding learns each label by itself: episodes labelled false are
@@ -55,7 +56,7 @@ struct LabelPlan {
   std::shared_ptr<const ModelSet> parent;
   storage::Lineage lineage;  ///< Of the parent.
   TrainingOptions training;  ///< As the parent was trained.
-  /// Of the valve, labelled or not, by detection.
+  /// All episodes of the valve, labelled or not, by detection.
   std::vector<storage::Episode> episodes;
   /// Recorded samples before do not count.
   std::int64_t since_ns{0};

@@ -160,7 +160,7 @@ std::vector<storage::StoredRun> EvidenceOf(const LabelPlan& labels,
       evidence.push_back(EvidenceOf(episode, *labels.parent));
     }
   }
-  // What is read now is not among the runs of the plan.
+  // These runs are read here and are not among those of the plan.
   for (const storage::TrainingEpisode& before : labels.lineage.episodes) {
     if (before.fault == 0 && HasRun(labels.runs, before.run)) {
       evidence.push_back(storage::RunStore(runs).Load(before.run));

@@ -16,8 +16,8 @@
 
 namespace fdi::trainer {
 
-/// What both sets make of an episode that was learnt from: the faults that they
-/// name; of one labelled false "alarm" or "no alarm".
+/// The answers of both sets to an episode that was learnt from: the faults that
+/// they name; of one labelled false "alarm" or "no alarm".
 struct EpisodeAnswers {
   std::string before;
   std::string after;
@@ -32,8 +32,8 @@ struct ParentComparison {
   std::vector<std::string> worse;  ///< What the new set does worse; sentences.
 };
 
-/// What becomes of the set of a valve. Nothing is stored before
-/// StoreRelearned().
+/// The next version of a set, and how it compares with the one in use. Nothing
+/// is stored before StoreRelearned().
 struct Relearning {
   LabelPlan labels;
   ModelSet models;  ///< At first the parent, then what each step makes of it.
