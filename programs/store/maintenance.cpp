@@ -402,7 +402,8 @@ void AddMaintenanceVerbs(report::Program& program) {
       .add_option("folder", target,
                   "Folder to copy to; made if it does not exist")
       ->required();
-  program.AddRemoved("", "migrate", "doctor brings the databases up to date");
+  program.AddRemoved("", "migrate",
+                     "fdi-store doctor brings the databases up to date");
   AddPrune(program);
 }
 
