@@ -2,7 +2,9 @@
 
 #include <string>
 
-#include "tests/programs/trainer/trained_runs.h"
+#include <nlohmann/json.hpp>
+
+#include "tests/programs/trainer/fixture.h"
 
 namespace fdi::trainer::study {
 
@@ -19,6 +21,5 @@ class WithStudy : public Trainer {
 };
 
 using StudyProgram = WithStudy<TrainerProgram>;
-using StudyOfRuns = WithStudy<TrainedRuns>;
 
 }  // namespace fdi::trainer::study

@@ -10,6 +10,7 @@
 #include "report/fault_texts.h"
 #include "storage/models/models.h"
 #include "storage/runs/runs.h"
+#include "tests/programs/trainer/trained_runs.h"
 #include "tests/study/fixture.h"
 
 namespace fdi::trainer::study {
@@ -22,7 +23,7 @@ using testing::Not;
 
 constexpr std::size_t kBytesPerRun = 100'000;
 
-class StudyReportTest : public StudyOfRuns {
+class StudyReportTest : public WithStudy<TrainedRuns> {
  protected:
   // The model set again, with an f1 that looks like f19.
   void AddTwin() const {

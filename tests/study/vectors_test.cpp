@@ -12,12 +12,13 @@
 #include "storage/models/models.h"
 #include "storage/runs/run_recorder.h"
 #include "storage/runs/runs.h"
+#include "tests/programs/trainer/trained_runs.h"
 #include "tests/study/fixture.h"
 
 namespace fdi::trainer::study {
 namespace {
 
-class StudyVectorsTest : public StudyOfRuns {};
+class StudyVectorsTest : public WithStudy<TrainedRuns> {};
 
 // What the live engine said, as `--vectors` writes it, from its own loop.
 std::string LineOf(const std::string& run, const Verdict& v) {
