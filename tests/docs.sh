@@ -2,7 +2,8 @@
 # What the sources log and the documents explain must be the same: every log id
 # stands in docs/errors.md and docs/troubleshooting.md, every event that warns
 # in the latter, and no id there is one that nothing logs. Links between
-# documents lead somewhere.
+# documents lead somewhere, each page is in one part of docs/README.md, README.md
+# and docs/results.md keep their lengths, and docs/faults.md is up to date.
 set -u
 cd "$(dirname "$0")/.."
 failed=0
@@ -39,10 +40,44 @@ for event in $events; do
     complain "docs/troubleshooting.md lacks $event"
 done
 
-for document in README.md docs/*.md docs/examples/*/README.md; do
-  for link in $(grep -oE '\]\([^)#:]+\)' "$document" | tr -d ']()'); do
+documents=$(git ls-files README.md CONTRIBUTING.md 'docs/*.md')
+for document in $documents; do
+  for link in $(grep -oE '\]\([^)#:]+(#[^)]*)?\)' "$document" |
+    sed -E 's/^..//; s/#.*//; s/\)$//'); do
     [ -e "$(dirname "$document")/$link" ] ||
       complain "$document links to $link, which is not there"
   done
 done
+
+words=$(wc -w <README.md)
+[ "$words" -le 700 ] || complain "README.md has $words words, at most 700"
+lines=$(wc -l <docs/results.md)
+[ "$lines" -le 120 ] || complain "docs/results.md has $lines lines, at most 120"
+tests/faults_page.sh --check || failed=1
+
+# Pages below a folder that the table names belong to its part.
+part=
+declare -A part_words part_of
+while IFS='|' read -r _ name page _; do
+  [[ $page == *']('* ]] || continue
+  name=$(tr -d '*' <<<"$name" | sed 's/^ *//; s/ *$//')
+  part=${name:-$part}
+  page=$(sed -E 's/.*\]\(([^)]*)\).*/\1/' <<<"$page")
+  for file in $(cd docs && git ls-files "$page" | grep '\.md$'); do
+    [ -z "${part_of[$file]:-}" ] || complain "$file is in two parts"
+    part_of[$file]=$part
+    part_words[$part]=$((${part_words[$part]:-0} + $(wc -w <"docs/$file")))
+  done
+done <docs/README.md
+for file in $(cd docs && git ls-files '*.md' | grep -vE '^(README|examples/)'); do
+  [ -n "${part_of[$file]:-}" ] ||
+    complain "docs/README.md does not name $file in one of its parts"
+done
+total=0
+for part in Start Do 'Look up' Admin Why Evidence; do
+  [ -n "${part_words[$part]:-}" ] || complain "docs/README.md has no part $part"
+  echo "docs: $part ${part_words[$part]:-0} words"
+  total=$((total + ${part_words[$part]:-0}))
+done
+echo "docs: all parts $total words"
 exit $failed
