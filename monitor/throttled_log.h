@@ -14,7 +14,7 @@
 namespace fdi::monitor {
 
 /// Repeating log events of a monitor: the numbers are the log ids in
-/// docs/errors.md, M101 and so on.
+/// docs/troubleshooting.md, M101 and so on.
 enum class LogId : std::uint8_t {
   kBadQuality = 101,     ///< sample_rejected reason=bad_quality
   kNotFinite = 102,      ///< sample_rejected reason=not_finite
