@@ -165,7 +165,7 @@ TsModel FitRows(const ChannelPlan& plan,
     const TsModel model =
         MakeModel(rules, data, regressors, plan.output, plan.parallel);
     // The error in plain runs does not show whether a model forgets its past
-    // (docs/onboarding.md, 2). NaN: no stretch is long enough to tell.
+    // (docs/design/onboarding.md, 2). NaN: no stretch is long enough to tell.
     if (plan.from_any_past && IsFreeRunning(model)) {
       const double error = FreeRunError(model, condition.validation);
       if (!std::isnan(error)) {

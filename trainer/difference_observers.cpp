@@ -184,9 +184,9 @@ NormalChannel ChooseNormal(const ChannelPlan& plan, const Condition& normal,
   // A candidate has to beat the model of the inputs on plain validation error.
   // Among those that do, the one that forgets its past best is taken: a model
   // fitted one step ahead can rest for half a minute where no valve would, and
-  // its plain error over some hours does not show that (docs/onboarding.md,
-  // "How it works", 2). One that may stay at a limit of its predictions is
-  // none. An error of NaN compares false and never wins.
+  // its plain error over some hours does not show that
+  // (docs/design/onboarding.md, 2). One that may stay at a limit of its
+  // predictions is none. An error of NaN compares false and never wins.
   double least = std::numeric_limits<double>::infinity();
   for (const std::vector<Regressor>& regressors : plan.own_past) {
     const ChannelPlan own_plan = OwnPastPlan(plan, regressors);

@@ -4,7 +4,7 @@
 # The record is that of the plant in FDI_REFERENCE_DATA; the fault is put onto
 # the last sixth of it.
 # Usage: exports.sh FOLDER-OF-PROGRAMS [all|FORM...]
-#   by default the spreadsheet alone; all prints the table of docs/results.md
+#   by default the spreadsheet alone; all prints the table of docs/results/onboarding.md
 #   77 without the record
 set -euo pipefail
 [ -n "${FDI_REFERENCE_DATA:-}" ] || {

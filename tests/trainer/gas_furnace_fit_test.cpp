@@ -129,7 +129,7 @@ class GasFurnaceSearch {
 };
 
 // Settings are chosen by the inner blocks alone. The last third is unlike the
-// first two: no figure of it is asserted, docs/results.md tells why.
+// first two: no figure of it is asserted, docs/results/identification.md says.
 TEST_F(ReferenceDataFitTest, GasFurnaceRulesValidateBetterThanALinearArx) {
   const GasFurnaceSearch search(Read("identification/gas_furnace.csv"));
   TakagiSugenoOptions linear;
