@@ -12,7 +12,7 @@
 #include "report/json_output.h"
 #include "storage/history/alarm.h"
 
-/// JSON of the console's responses; the keys are those of docs/console.md.
+/// JSON of the console's responses; the keys are those of docs/api.md.
 namespace fdi::console {
 
 using report::Json;

@@ -33,14 +33,41 @@ for event in $events; do
     complain "docs/troubleshooting.md lacks $event"
 done
 
-documents=$(git ls-files README.md CONTRIBUTING.md 'docs/*.md')
-for document in $documents; do
-  for link in $(grep -oE '\]\([^)#:]+(#[^)]*)?\)' "$document" |
-    sed -E 's/^..//; s/#.*//; s/\)$//'); do
-    [ -e "$(dirname "$document")/$link" ] ||
-      complain "$document links to $link, which is not there"
-  done
-done
+# Links lead to a file, and what follows a # to a heading or an id in it.
+documents=$(git ls-files README.md CONTRIBUTING.md 'docs/*.md' '*/README.md')
+while read -r complaint; do complain "$complaint"; done < <(perl -e '
+  use utf8;
+  use open qw(:std :encoding(UTF-8));
+  my %anchors;
+  sub anchors {
+    my $page = $_[0];
+    return $anchors{$page} if $anchors{$page};
+    my %found;
+    open(my $in, "<", $page) or return {};
+    while (<$in>) {
+      $found{$1} = 1 while /<a id="([^"]+)"/g;
+      next unless /^#+ (.*?)\s*$/;
+      (my $slug = lc $1) =~ s/[^\w\- ]//g;
+      $slug =~ tr/ /-/;
+      $found{$slug} = 1;
+    }
+    return $anchors{$page} = \%found;
+  }
+  for my $page (@ARGV) {
+    (my $folder = $page) =~ s{[^/]*$}{};
+    open(my $in, "<", $page) or next;
+    while (<$in>) {
+      while (/\]\(([^)\s:]+)\)/g) {
+        my ($file, $anchor) = split /#/, $1;
+        my $target = $file eq "" ? $page : $folder . $file;
+        if (!-e $target) {
+          print "$page links to $file, which is not there\n";
+        } elsif (defined $anchor && !anchors($target)->{$anchor}) {
+          print "$page links to $1, a heading that is not there\n";
+        }
+      }
+    }
+  }' $documents)
 
 words=$(wc -w <README.md)
 [ "$words" -le 700 ] || complain "README.md has $words words, at most 700"
