@@ -14,7 +14,7 @@
 // The words of the fault catalogue, faults.toml: the shipped file has all keys
 // of all faults, and the file of the data directory and that of
 // `--fault-catalogue` then override those that they state (docs/planner.md,
-// "Words for faults: the catalogue").
+// "Your own words and limits").
 namespace fdi::report {
 namespace {
 
