@@ -1,14 +1,16 @@
 #!/usr/bin/env bash
-# Runs the commands of docs/tutorial.md, or of another page, as they stand
+# Runs the commands of docs/tutorial.md, README.md or another page, as they stand
 # there, in an empty directory: blocks `sh` one after the other, a block
 # `sh service` in the background until the end, `sh long` with
 # FDI_TUTORIAL_LONG=1, not `sh admin`. Every command has to succeed, and the
 # story has to come out as told.
-# Usage: tutorial.sh BIN_DIRECTORY [tutorial|plant]
+# Usage: tutorial.sh BIN_DIRECTORY [tutorial|plant|README]
 set -euo pipefail
 bin=$(cd "$1" && pwd)
 page=${2:-tutorial}
 tree=$(cd "$(dirname "$0")/.." && pwd)
+text=$tree/docs/$page.md
+[ "$page" != README ] || text=$tree/README.md
 source "$tree/tests/domain.sh"
 out=$(mktemp -d)
 finish() {
@@ -27,17 +29,19 @@ fail() {
 adapt() {
   sed -e "s#/usr/share/fdi/campaigns#$out/campaigns#g" \
     -e 's#=127\.0\.0\.1:8080#=127.0.0.1:0#' \
+    -e 's#--console$#--console=127.0.0.1:0#' \
     -e "s#^\(fdi-monitor\|fdi-simulator\) #&--domain $domain #"
 }
 # A file for each block, in order: 01.sh, 02.service, 03.admin, ...
 awk -v out="$out" '/^```sh/ {kind = $2 == "" ? "sh" : $2; ++n; next}
   /^```/ {kind = ""} kind != "" {print > sprintf("%s/%02d.%s", out, n, kind)}' \
-  "$tree/docs/$page.md"
+  "$text"
 
 unset FDI_DATA
 export PATH=$bin:$PATH
 mkdir "$out/home"
 ln -s "$tree/campaigns" "$out/campaigns"  # A path without blanks.
+ln -s "$tree/campaigns" "$out/home/campaigns"
 cd "$out/home"
 for block in "$out"/[0-9][0-9].*; do
   adapt <"$block" >"$out/block"
@@ -73,7 +77,13 @@ head -n 1 <&3 | grep >/dev/null ' 200 ' || fail "the page does not answer"
 kill -TERM "$service"
 wait "$service" || fail "the monitor ended with $?"
 service=
-# What the tutorial and docs/plant.md tell.
+# What the pages tell.
+check_README() {
+  fdi-store history list | grep >/dev/null 'f19 *Flow transmitter wrong *sure' ||
+    fail "the history is not as README shows it"
+  fdi-store worklist | grep >/dev/null '^1. FV-101 ' ||
+    fail "the work list is not as README shows it"
+}
 check_tutorial() {
   found=$(fdi-store history list --json)
   grep -q '"fault": "f19"' <<<"$found" || fail "no f19 in the history: $found"
