@@ -371,7 +371,7 @@ TEST_F(FdiStoreTest, DoctorBringsDatabasesUpToDate) {
 
   const Outcome gone = Store("migrate");
   EXPECT_EQ(gone.code, 2);
-  EXPECT_THAT(gone.err, HasSubstr("migrate is gone: doctor"));
+  EXPECT_THAT(gone.err, HasSubstr("migrate is gone: fdi-store doctor"));
 }
 
 TEST_F(FdiStoreTest, LabelsAreShownAndRemoved) {
