@@ -1,14 +1,14 @@
 #!/usr/bin/env bash
-# Counts what a user meets: verbs, their options, the options that one --help
-# shows, and names that mean two things. Reads the help texts, so it counts what
-# is there and not what is declared. Fails beyond the limits below, which are to
+# Counts what a user meets: verbs, their options (--help-all), the options that
+# one --help shows, and names that mean two things. Reads the help texts, so it
+# counts what is there and not what is declared. Fails beyond the limits below, which are to
 # be lowered when something goes.
 # Usage: surface.sh FOLDER_OF_THE_PROGRAMS
 set -euo pipefail
 bin=${1:?folder of the programs}
 max_verbs=53
 max_options=288
-max_shown=22
+max_shown=12
 
 # The placeholders that a name may have, wherever it occurs.
 meanings='
@@ -18,8 +18,16 @@ meanings='
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 
+# options TEXT: a line "OPTION|PLACEHOLDER" for each option of a help text.
+options() {
+  # An option that is wider than its column stands in a line of its own.
+  sed -nE 's/^  (-[a-zA-Z], ?)?(--[a-z][a-z0-9-]*)( ([^ ]+))?.*/\2|\4/p' \
+    <<<"$1" | grep -v '^--help' || true
+}
+
 # walk PROGRAM [WORD...]: a line "PROGRAM WORDS|OPTION|PLACEHOLDER" for each
-# option of each verb, and "PROGRAM WORDS||" for the verb itself.
+# option of each verb, and "PROGRAM WORDS||NUMBER" for the verb itself, with
+# the number of options that its --help shows.
 walk() {
   local text verbs
   text=$("$bin/$1" "${@:2}" --help)
@@ -28,23 +36,21 @@ walk() {
     for verb in $verbs; do walk "$@" "$verb"; done
     return
   fi
-  echo "$*||"
-  # An option that is wider than its column stands in a line of its own.
-  sed -nE 's/^  (-[a-zA-Z], ?)?(--[a-z][a-z0-9-]*)( ([^ ]+))?.*/\2|\4/p' \
-    <<<"$text" | grep -v '^--help' | sed "s/^/$*|/" || true
+  echo "$*||$(options "$text" | wc -l)"
+  options "$("$bin/$1" "${@:2}" --help-all)" | sed "s/^/$*|/"
 }
 
 for program in fdi-store fdi-trainer fdi-monitor fdi-simulator; do
   walk "$program"
 done >"$folder/surface"
 
-verbs=$(grep -c '||$' "$folder/surface")
-options=$(grep -vc '||$' "$folder/surface")
-names=$(grep -v '||$' "$folder/surface" | cut -d'|' -f2 | sort -u | wc -l)
-shown=$(grep -v '||$' "$folder/surface" | cut -d'|' -f1 | uniq -c | sort -rn |
+verbs=$(grep -c '||' "$folder/surface")
+options=$(grep -vc '||' "$folder/surface")
+names=$(grep -v '||' "$folder/surface" | cut -d'|' -f2 | sort -u | wc -l)
+shown=$(sed -n 's/\(.*\)||\(.*\)/\2 \1/p' "$folder/surface" | sort -rn |
   head -1)
 echo "$verbs verbs, $options options under $names names;" \
-  "most in one help:$(sed 's/^ */ /' <<<"$shown")"
+  "most in one help: $shown"
 
 failed=0
 refuse() {
@@ -55,7 +61,7 @@ refuse() {
 [ "$options" -le "$max_options" ] ||
   refuse "$options options, at most $max_options"
 [ "$(awk '{ print $1 }' <<<"$shown")" -le "$max_shown" ] ||
-  refuse "more than $max_shown options in the help of:$shown"
+  refuse "more than $max_shown options in the help of: $shown"
 awk -F'|' -v meanings="$meanings" '
   BEGIN {
     n = split(meanings, line, "\n")

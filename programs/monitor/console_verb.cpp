@@ -143,7 +143,7 @@ void AddConsoleVerb(report::Program& program) {
                   "free one")
       ->capture_default_str()
       ->type_name("ADDRESS:PORT");
-  AddPageFiles(program, console, options.page);
+  AddPageFiles(console, options.page);
   console.add_option("--valves", options.bus.valves,
                      "Only ids that match GLOB");
   console

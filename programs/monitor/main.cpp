@@ -51,12 +51,7 @@ int main(int argc, char** argv) {
   program.MapError<fdi::idl::TransportError>(fdi::report::kExitTransport);
   fdi::monitor::AddRunVerb(program);
   fdi::monitor::AddWatchVerb(program);
-  program.AddRemoved("", "top", "fdi-monitor watch --table shows the valves");
   fdi::monitor::AddConsoleVerb(program);
-  program.AddRemoved("", "console-user",
-                     "users are in a file of nginx, which htpasswd makes, and "
-                     "their roles in a second one (docs/console.md, The page "
-                     "beyond this host)");
   program.AddExamples(Examples());
   return program.Run(argc, argv);
 }

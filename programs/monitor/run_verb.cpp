@@ -12,6 +12,7 @@
 #include "programs/monitor/http_option.h"
 #include "programs/monitor/planner.h"
 #include "programs/monitor/verbs.h"
+#include "report/help.h"
 #include "report/program.h"
 #include "report/stop_signals.h"
 
@@ -153,24 +154,14 @@ void AddRunVerb(report::Program& program) {
   AddHttpOption(run, "--http", arguments.http, "127.0.0.1:9464",
                 "Serve /metrics, /healthz and /readyz; port 0: any free one");
   AddPageOptions(program, run, arguments.page);
-  program.AddRemoved("run", "--allow-host",
-                     "nginx answers under other names (docs/console.md, The "
-                     "page beyond this host)");
-  for (const char* option : {"--shadow", "--shadow-valves"}) {
-    program.AddRemoved("run", option,
-                       "record with --record, then compare the two sets with "
-                       "fdi-trainer compare SET@1 SET@2 --runs ID,...");
-  }
-  for (const char* gone : {"--pair", "--rank", "--pair-patience"}) {
-    program.AddRemoved("run", gone,
-                       "let a cluster manager start the monitor on another "
-                       "host with a copy of its data folder: "
-                       "docs/operations.md, Another host takes over");
-  }
   run.add_option("--status-period", service.status_period_s,
                  "Time between status lines in the log [s]")
       ->check(CLI::Range(1.0, 86400.0))
       ->capture_default_str();
+  report::ShowInHelpAll(
+      run, {"--lossless-decisions", "--best-effort", "--audit-all-loops",
+            "--trace-before", "--on-event-rate", "--on-event-timeout",
+            "--console-files", "--status-period"});
 }
 
 }  // namespace fdi::monitor

@@ -13,6 +13,7 @@
 #include "programs/simulator/delivery.h"
 #include "programs/simulator/recorded_feed.h"
 #include "programs/simulator/verbs.h"
+#include "report/help.h"
 #include "simulator/second_look/valve_physics.h"
 #include "simulator/valve_equations.h"
 #include "storage/database/data_directory.h"
@@ -223,6 +224,8 @@ void AddReplayVerb(report::Program& program) {
       ->check(CLI::Range(1e-3, 3600.0))
       ->default_str("")
       ->type_name("S");
+  report::ShowInHelpAll(verb, {"--resample", "--decimal", "--date", "--skip",
+                               "--wait-reader", "--keep-alive"});
 }
 
 }  // namespace fdi::simulator

@@ -12,6 +12,7 @@
 #include "base/time_text.h"
 #include "programs/simulator/delivery.h"
 #include "programs/simulator/verbs.h"
+#include "report/help.h"
 #include "simulator/scenario/scenario_toml.h"
 
 namespace fdi::simulator {
@@ -260,6 +261,8 @@ void AddRunVerb(report::Program& program) {
                 "Simulate only, as fast as possible");
   verb.add_option("--export", options.export_file, "Write the run as CSV")
       ->type_name("FILE.csv");
+  report::ShowInHelpAll(verb, {"--cold-start", "--start", "--end-now",
+                               "--wait-reader", "--keep-alive", "--export"});
 }
 
 }  // namespace fdi::simulator

@@ -17,6 +17,7 @@
 #include "import/layout.h"
 #include "import/tag_map.h"
 #include "programs/store/verbs.h"
+#include "report/help.h"
 #include "report/plot/loop_figure.h"
 #include "storage/runs/runs.h"
 
@@ -807,9 +808,6 @@ void AddAuditVerb(report::Program& program) {
   verb.add_option("--pv", options.pv, "Column of the controlled variable");
   verb.add_option("--sp", options.sp, "Column of the set point [as PV]");
   verb.add_option("--x", options.x, "Column of the position [%]");
-  program.AddRemoved("audit", "--ps",
-                     "stroke tests are no longer evaluated; fdi-store health "
-                     "show has dead time, T63 and T86 of ordinary steps");
   verb.add_option("--mode", options.mode,
                   "Column of the mode (MODE, or auto with 1 and 0)");
   verb.add_flag("--ignore-x", options.ignore_x,
@@ -830,6 +828,8 @@ void AddAuditVerb(report::Program& program) {
       "FILE-2.png, ... by rank");
   options.table.AddTo(verb);
   program.AllowCsv(verb, "One line per window");
+  report::ShowInHelpAll(verb, {"--ignore-x", "--service", "--window",
+                               "--resample", "--decimal", "--date", "--skip"});
 }
 
 }  // namespace fdi::storage

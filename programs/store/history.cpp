@@ -502,14 +502,6 @@ void AddHistoryVerbs(report::Program& program) {
               "Show an episode, what to check, and its events", ShowEpisode);
   AddEpisode(show, shown.id);
   shown.plant.AddTo(show);
-  program.AddRemoved("history", "shadow",
-                     "fdi-trainer compare compares two model sets on recorded "
-                     "runs");
-  program.AddRemoved("history", "stats",
-                     "`fdi-store worklist` has the figures of the alarms "
-                     "(--json, --html)");
-  program.AddRemoved("history", "causes",
-                     "`fdi-store worklist` has common causes (--json, --html)");
   AddAlarmVerbs(program, group);
 
   auto [exporting, exported] =
@@ -531,11 +523,6 @@ void AddHistoryVerbs(report::Program& program) {
                   "Start of the picture in s after detection");
   plot.add_option("--to", plotted.figure.to_s,
                   "End of the picture in s after detection");
-
-  program.AddRemoved("history", "report",
-                     "print the episode on the page of the monitor; "
-                     "fdi-store history show says the same in text, and "
-                     "history plot draws its picture");
 }
 
 }  // namespace fdi::storage

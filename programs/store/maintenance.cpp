@@ -380,8 +380,6 @@ void AddPrune(report::Program& program) {
   verb.add_option("--health-age", options.health.age,
                   "Delete hours of health that are older than this: 1000d, "
                   "...");
-  program.AddRemoved("prune", "--shadow-age",
-                     "differences of a candidate are no longer recorded");
   verb.add_flag("--dry-run", options.dry_run,
                 "Only print what would be deleted");
   verb.add_flag("--trust-clock", options.trust_clock,
@@ -402,8 +400,6 @@ void AddMaintenanceVerbs(report::Program& program) {
       .add_option("folder", target,
                   "Folder to copy to; made if it does not exist")
       ->required();
-  program.AddRemoved("", "migrate",
-                     "fdi-store doctor brings the databases up to date");
   AddPrune(program);
 }
 

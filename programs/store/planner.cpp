@@ -295,8 +295,6 @@ void AddPlannerVerbs(report::Program& program) {
       ->type_name("FILE.html");
   options.plant.AddTo(list);
   program.AllowCsv(list, "CSV, one line per row");
-  program.AddRemoved("", "report",
-                     "`fdi-store worklist --html FILE` writes the page");
 }
 
 }  // namespace fdi::storage

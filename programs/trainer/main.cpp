@@ -15,9 +15,6 @@ int main(int argc, char** argv) {
   fdi::trainer::AddOnboardVerb(program);
   fdi::trainer::AddRelearnVerb(program);
   fdi::trainer::AddCoverageVerb(program);
-  program.AddRemoved("", "inject",
-                     "it is fdi-study inject, which the source tree builds "
-                     "with -DFDI_BENCH=ON");
   program.AddExamples(
       {{"",
         {{"Train the paper's observers",

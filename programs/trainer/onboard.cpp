@@ -15,6 +15,7 @@
 #include "programs/trainer/model_report.h"
 #include "programs/trainer/onboard_plant.h"
 #include "programs/trainer/verbs.h"
+#include "report/help.h"
 #include "report/program.h"
 #include "report/progress.h"
 #include "report/report.h"
@@ -540,6 +541,10 @@ void AddOptions(CLI::App& verb, OnboardOptions& options) {
   verb.add_flag("--gains", options.gains,
                 "Compute what each missing transmitter would add; takes the "
                 "time of an onboarding for each");
+  report::ShowInHelpAll(
+      verb, {"--resample", "--decimal", "--date", "--skip", "--save-type",
+             "--false-alarms-per-hour", "--no-fit", "--no-coverage", "--gains",
+             "--threads"});
 }
 
 }  // namespace
@@ -568,9 +573,6 @@ void AddOnboardVerb(report::Program& program) {
   for (const char* option : {"--dry-run", "--jobs", "--rows"}) {
     verb.get_option(option)->needs("--plant");
   }
-  program.AddRemoved("onboard", "--shard",
-                     "--rows GLOB takes a part of the table, and processes may "
-                     "work on one data directory at a time");
   program.AddExamples(
       {{"onboard",
         {{"A valve of the plant that has only ever been healthy",

@@ -20,6 +20,7 @@
 #include "import/tag_map.h"
 #include "programs/trainer/model_report.h"
 #include "programs/trainer/verbs.h"
+#include "report/help.h"
 #include "report/models/lineage_text.h"
 #include "report/program.h"
 #include "report/progress.h"
@@ -610,6 +611,8 @@ void AddOptions(CLI::App& verb, RelearnOptions& options) {
   verb.add_flag("--dry-run", options.dry_run,
                 "Show what would be learnt and exit")
       ->configurable(false);
+  report::ShowInHelpAll(verb, {"--resample", "--decimal", "--date", "--skip",
+                               "--type", "--threads"});
 }
 
 }  // namespace
@@ -621,16 +624,6 @@ void AddRelearnVerb(report::Program& program) {
       "take the better one",
       Relearn);
   AddOptions(verb, options);
-  const std::string instead = "fdi-trainer relearn VALVE ";
-  program.AddRemoved("", "limits",
-                     instead + "sets the limits by what was recorded since");
-  program.AddRemoved("train", "--from-labels",
-                     instead + "learns from what episodes were labelled");
-  program.AddRemoved(
-      "onboard", "--extend",
-      instead + "--models makes the models anew with more hours");
-  program.AddRemoved("onboard", "--accept",
-                     instead + "--activate takes a set that is worse");
   program.AddExamples(
       {{"relearn",
         {{"All that was recorded since, and what episodes were labelled",

@@ -382,7 +382,7 @@ TEST_F(FdiStoreHistoryTest, WhatTheWorkListTookOverNamesIt) {
   for (const char* verb : {"history stats", "history causes"}) {
     const Outcome outcome = Store(verb);
     EXPECT_EQ(outcome.code, 2) << verb;
-    EXPECT_THAT(outcome.err, HasSubstr("is gone: `fdi-store worklist`"));
+    EXPECT_THAT(outcome.err, HasSubstr("is gone: fdi-store worklist"));
   }
 }
 

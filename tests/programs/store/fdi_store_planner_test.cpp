@@ -97,7 +97,7 @@ TEST_F(FdiStorePlannerTest, WorkListOfAnEmptyHistoryIsEmpty) {
   EXPECT_EQ(Store("worklist --discipline plumber").code, 2);
   const Outcome report = Store("report --output .");
   EXPECT_EQ(report.code, 2);
-  EXPECT_THAT(report.err, HasSubstr("report is gone: `fdi-store worklist"));
+  EXPECT_THAT(report.err, HasSubstr("report is gone: fdi-store worklist"));
 }
 
 // A day of which 20 h were judged, and a fault.
