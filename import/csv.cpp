@@ -28,7 +28,7 @@ constexpr std::int64_t kMaxFileTime = 32'000'000'000'000'000;
 /// 1970-01-01 in seconds since 1904.
 constexpr std::int64_t k1970Since1904 = 2'082'844'800;
 constexpr const char* kSniff =
-    "; try: fdi-store runs sniff FILE --map-output tags.toml, then --map "
+    "; try: fdi-store runs sniff FILE -o tags.toml, then --map "
     "tags.toml";
 
 bool IsOneOf(std::string_view cell,

@@ -13,8 +13,6 @@ struct Removed {
   std::string_view instead;
 };
 
-constexpr std::string_view kTimes = "--from TIME and --to TIME";
-constexpr std::string_view kRows = "--rows N";
 constexpr std::string_view kStudyEvaluate =
     "fdi-study evaluate has it, which the source tree builds with "
     "-DFDI_BENCH=ON";
@@ -42,12 +40,39 @@ constexpr std::string_view kCertificate =
 // In the order of programs and verbs.
 constexpr auto kRemoved = std::to_array<Removed>({
     {"fdi-simulator", "", "faults", "fdi-store faults lists them"},
+    {"fdi-simulator", "run", "--valves", "--count N"},
+    {"fdi-simulator", "run", "--export", "-o FILE"},
+    {"fdi-simulator", "run", "--cold-start", "--set cold_start=true"},
+    {"fdi-simulator", "replay", "--csv", "--file FILE"},
     {"fdi-store", "", "keys",
      "the script fdi-keys makes, renews and lists keys"},
     {"fdi-store", "", "migrate",
      "fdi-store doctor brings the databases up to date"},
     {"fdi-store", "", "report",
      "fdi-store worklist --html FILE writes the page"},
+    {"fdi-store", "*", "--since", "--from TIME"},
+    {"fdi-store", "*", "--until", "--to TIME"},
+    {"fdi-store", "runs sniff", "--map-output", "-o FILE"},
+    {"fdi-store", "valves", "event", "fdi-store valves repaired VALVE WHAT"},
+    {"fdi-store", "valves add", "--model-set", "fdi-store valves assign"},
+    {"fdi-store", "valves add", "--epoch",
+     "fdi-store valves repaired begins the next epoch"},
+    {"fdi-store", "valves move", "--to", "the folder follows the valve"},
+    {"fdi-store", "types", "delete",
+     "a type is written over by fdi-trainer onboard --save-type"},
+    {"fdi-store", "history", "unshelve",
+     "fdi-store history shelve VALVE --off"},
+    {"fdi-store", "history", "shelf", "fdi-store history list --shelved"},
+    {"fdi-store", "history list", "--limit", "--rows N"},
+    {"fdi-store", "history ack", "--all", "--valve '*'"},
+    {"fdi-store", "history ack", "--limit", "--from TIME"},
+    {"fdi-store", "history export", "--limit", "--from TIME"},
+    {"fdi-store", "health", "show", "fdi-store health --valve ID"},
+    {"fdi-store", "health", "trend",
+     "fdi-store health --valve ID --limit NAME=VALUE"},
+    {"fdi-store", "worklist", "--top", "--rows N"},
+    {"fdi-store", "worklist", "--horizon",
+     "trends that reach their limit after 180 days are left out"},
     {"fdi-store", "runs", "plot",
      "fdi-store runs export writes its samples as CSV"},
     {"fdi-store", "history", "shadow",
@@ -59,11 +84,22 @@ constexpr auto kRemoved = std::to_array<Removed>({
     {"fdi-store", "history", "report",
      "print the episode on the page of the monitor; fdi-store history show "
      "says the same in text, and fdi-store history plot draws its picture"},
+    {"fdi-store", "ship", "--to", "--db URL"},
+    {"fdi-store", "ship", "--prune", "fdi-store prune --db URL"},
+    {"fdi-store", "ship", "--history-age", "fdi-store prune --db URL"},
+    {"fdi-store", "ship", "--health-age", "fdi-store prune --db URL"},
     {"fdi-store", "prune", "--shadow-age",
      "differences of a candidate are no longer recorded"},
     {"fdi-store", "audit", "--ps",
      "stroke tests are no longer evaluated; fdi-store health has dead time, "
      "T63 and T86 of ordinary steps"},
+    {"fdi-trainer", "", "coverage",
+     "fdi-trainer onboard --dry-run --signals CV,X,... shows what could be "
+     "seen, with --gains what one more transmitter would add"},
+    {"fdi-trainer", "*", "--threads", "--jobs N"},
+    {"fdi-trainer", "onboard", "--rows", "--valve GLOB"},
+    {"fdi-trainer", "onboard", "--no-fit",
+     "a type that was stored with --save-type is taken as it is"},
     {"fdi-trainer", "", "inject",
      "it is fdi-study inject, which the source tree builds with "
      "-DFDI_BENCH=ON"},
@@ -108,6 +144,14 @@ constexpr auto kRemoved = std::to_array<Removed>({
     {"fdi-trainer", "show", "--pictures",
      "it is fdi-study pictures, which the source tree builds with "
      "-DFDI_BENCH=ON"},
+    {"fdi-monitor", "*", "--valves", "--valve GLOB"},
+    {"fdi-monitor", "console", "--from", "--db URL"},
+    {"fdi-monitor", "watch", "--count", "--totals"},
+    {"fdi-monitor", "watch", "--idle", "--for S"},
+    {"fdi-monitor", "run", "--trace-before",
+     "evidence of 1800 s before a detection is kept"},
+    {"fdi-monitor", "run", "--on-event-timeout",
+     "a delivery is abandoned after 10 s"},
     {"fdi-monitor", "", "top", "fdi-monitor watch --table shows the valves"},
     {"fdi-monitor", "", "console-user",
      "users are in a file of nginx, which htpasswd makes, and their roles in a "

@@ -1,17 +1,33 @@
 #!/usr/bin/env bash
 # Counts what a user meets: verbs, their options (--help-all), the options that
-# one --help shows, and names that mean two things. Reads the help texts, so it
-# counts what is there and not what is declared. Fails beyond the limits below, which are to
-# be lowered when something goes.
+# one --help shows, names that mean two things, and advised commands that are
+# not there. Reads the help texts, so it counts what is there and not what is
+# declared. Fails beyond the limits below, which are to be lowered when something
+# goes.
 # Usage: surface.sh FOLDER_OF_THE_PROGRAMS
 set -euo pipefail
-bin=${1:?folder of the programs}
-max_verbs=53
-max_options=288
+bin=$(realpath "${1:?folder of the programs}")
+max_verbs=47
+max_options=260
 max_shown=12
 
-# The placeholders that a name may have, wherever it occurs.
+# The placeholders that a name may have, wherever it occurs; "-" is none.
 meanings='
+--by TEXT
+--comment TEXT
+--count N
+--csv -
+--db URL
+--dry-run -
+--file FILE.*
+--from TIME
+--jobs N
+--limit NAME=VALUE
+--map FILE.toml
+--monitor NAME
+--output FILE.*
+--rows N
+--to TIME
 --valve GLOB|ID
 '
 
@@ -77,5 +93,63 @@ awk -F'|' -v meanings="$meanings" '
 if [ -s "$folder/clashes" ]; then
   refuse "a name that means two things:"
   cat "$folder/clashes"
+fi
+for word in report faults; do
+  [ "$(grep -cE " $word\|\|" "$folder/surface")" -le 1 ] ||
+    refuse "'$word' is a verb twice"
+done
+
+# Commands that documents and messages advise are there, with their options.
+cat >"$folder/advice.pl" <<'END'
+use strict;
+my (%verb, %group, %option);
+open my $surface, '<', shift or die;
+while (<$surface>) {
+  my ($words, $name) = split /\|/;
+  $verb{$words} = 1;
+  $option{"$words $name"} = 1 if $name;
+  $group{$words =~ s/ [^ ]+$//r} = 1;
+}
+my $global = qr/--(?:config|data|domain|fault-catalogue|help|help-all
+  |interface|json|log-level|partition|print-config|qos|security|transport|utc
+  |version)/x;
+for my $file (@ARGV) {
+  open my $stream, '<', $file or die "$file: $!";
+  my $text = do { local $/; <$stream> };
+  if ($file =~ /\.(cpp|h)$/) {
+    $text =~ s{^\s*//.*}{}gm;
+    $text =~ s/"\s*\n\s*"//g;  # Literals that the compiler joins.
+  } elsif ($file =~ /\.md$/) {
+    $text =~ s/ *\\\n */ /g;
+    # Only code: indented, or within backticks.
+    $text = join "\n", $text =~ /^    (.*)$/gm, $text =~ /`([^`\n]+)`/g;
+  }
+  while ($text =~ /\b(fdi-(?:store|trainer|monitor|simulator))
+                   ((?:\ +$global(?:\ +[^-\s]\S*)?)*)\ +([a-z][a-z-]+)
+                   (?:\ +([a-z][a-z-]+))?([^\n`;,()#|&]*)/gx) {
+    my ($program, $word, $second, $rest) = ($1, $3, $4 // '', $5);
+    # A user, a folder, a thread and a package are no verbs.
+    next if $word =~ /^(?:anna|by|fdi-copy|intake|systemd)$/;
+    my ($command) = grep { $verb{$_} }
+      ("$program $word", "$program $word $second");
+    if (!$command) {
+      print "  $file: $program $word $second\n"
+        unless $group{"$program $word"} && !$second;
+      next;
+    }
+    for my $name ($rest =~ /(?:^|[ \[])(--[a-z][a-z-]*)/g) {
+      print "  $file: $command $name\n"
+        unless $option{"$command $name"} || $name =~ /^$global$/;
+    }
+  }
+}
+END
+cd "$(dirname "$0")/.."
+git ls-files '*.md' '*.cpp' '*.h' programs/store/examples.txt |
+  grep -vE '^(tests|bench|CHANGELOG)|vendor|report/removed_words.cpp' |
+  xargs perl "$folder/advice.pl" "$folder/surface" >"$folder/advice"
+if [ -s "$folder/advice" ]; then
+  refuse "commands that are not there are advised:"
+  cat "$folder/advice"
 fi
 exit $failed

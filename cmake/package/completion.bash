@@ -69,7 +69,7 @@ _fdi_candidates() {
     *ID\[@* | run\ * | runs\ *) _fdi_listed run_id runs list ;;
     episode\ * | episodes\ *)
       echo last
-      _fdi_listed episode_id history list --limit 100
+      _fdi_listed episode_id history list --rows 100
       ;;
     type\ *) _fdi_listed name types list ;;
     label\ *)

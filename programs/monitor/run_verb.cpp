@@ -58,10 +58,6 @@ void AddOnEventOptions(CLI::App& run, ServiceOptions& service) {
                  "At most this many a minute; the rest is counted")
       ->check(CLI::Range(1, 6000))
       ->capture_default_str();
-  run.add_option("--on-event-timeout", service.on_event_timeout_s,
-                 "Abandon a delivery after this time [s]")
-      ->check(CLI::Range(0.1, 600.0))
-      ->capture_default_str();
 }
 
 int Run(const RunArguments& arguments, const report::Context& context) {
@@ -127,9 +123,10 @@ void AddRunVerb(report::Program& program) {
       ->type_name("[=on|lossless|off]");
   ServiceOptions& service = arguments.service;
   PipelineOptions& pipeline = service.pipeline;
-  run.add_option("--valves", pipeline.valve_glob,
+  run.add_option("--valve", pipeline.valve_glob,
                  "Serve only ids that match GLOB")
-      ->capture_default_str();
+      ->capture_default_str()
+      ->type_name("GLOB");
   run.add_option("--max-valves", pipeline.max_valves,
                  "Serve at most N valves, count the others")
       ->check(CLI::Range(1, 100000))
@@ -144,11 +141,6 @@ void AddRunVerb(report::Program& program) {
                  "Close an episode when its valve was silent for this time [s]")
       ->check(CLI::Range(1.0, 1e7))
       ->capture_default_str();
-  run.add_option("--trace-before", pipeline.trace.before_s,
-                 "Evidence kept from before a detection [s], at most 1800 "
-                 "samples")
-      ->check(CLI::Range(0.0, 1800.0))
-      ->capture_default_str();
   AddGroupsOption(program, run, arguments.groups);
   AddOnEventOptions(run, service);
   AddHttpOption(run, "--http", arguments.http, "127.0.0.1:9464",
@@ -160,8 +152,7 @@ void AddRunVerb(report::Program& program) {
       ->capture_default_str();
   report::ShowInHelpAll(
       run, {"--lossless-decisions", "--best-effort", "--audit-all-loops",
-            "--trace-before", "--on-event-rate", "--on-event-timeout",
-            "--console-files", "--status-period"});
+            "--on-event-rate", "--console-files", "--status-period"});
 }
 
 }  // namespace fdi::monitor

@@ -268,6 +268,7 @@ std::int64_t NewestNs(const char* name, const std::filesystem::path& path) {
 }
 
 struct PruneOptions {
+  std::string url;  ///< Of the plant's history, or empty.
   AgeAndSize runs;
   AgeAndSize history;
   AgeAndSize health;
@@ -322,6 +323,11 @@ Json PruneAll(const PruneOptions& options, const DataDirectory& data) {
 }
 
 Report Prune(const PruneOptions& options, const Context& context) {
+  if (!options.url.empty()) {
+    return PrunePlant({options.url, options.history.age, options.health.age,
+                       options.dry_run, options.trust_clock},
+                      context);
+  }
   const Json databases = PruneAll(options, DataOf(context));
   if (databases.empty()) {
     throw ConfigError(
@@ -366,6 +372,11 @@ void AddPrune(report::Program& program) {
       "Delete old recorded runs, old episodes that are closed, acknowledged "
       "and not labelled, and old hours of health",
       Prune);
+  CLI::Option* const url =
+      verb.add_option("--db", options.url,
+                      "Delete from the plant's history instead, as its owner: "
+                      "postgresql:///database")
+          ->type_name("URL");
   for (auto& [what, limits] :
        {std::pair<std::string, AgeAndSize*>("--runs", &options.runs),
         {"--history", &options.history}}) {
@@ -384,6 +395,9 @@ void AddPrune(report::Program& program) {
                 "Only print what would be deleted");
   verb.add_flag("--trust-clock", options.trust_clock,
                 "Delete by age also if nothing was recorded for a month");
+  for (const char* here : {"--runs-age", "--runs-size", "--history-size"}) {
+    url->excludes(verb.get_option(here));
+  }
 }
 
 }  // namespace

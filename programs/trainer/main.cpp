@@ -14,7 +14,6 @@ int main(int argc, char** argv) {
   fdi::trainer::AddShowVerb(program);
   fdi::trainer::AddOnboardVerb(program);
   fdi::trainer::AddRelearnVerb(program);
-  fdi::trainer::AddCoverageVerb(program);
   program.AddExamples(
       {{"",
         {{"Train the paper's observers",

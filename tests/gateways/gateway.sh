@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# A simulated server on loopback, a gateway of docs/examples and `replay --csv -`
+# A simulated server on loopback, a gateway of docs/examples and `replay --file -`
 # feed a monitor. The server is gone for 40 samples, has readings that are bad
 # and a time in manual; the monitor has to find the fault, and the gateway to
 # count what was lost.
@@ -40,7 +40,7 @@ port=$((16000 + domain))  # No ephemeral one, nor one of a test's domain.
 "$bin/fdi-simulator" run --no-publish --duration $count --seed 7 \
   --parameters paper-operating-point --fault f19:abrupt@200:strength=0.5 \
   --set excitation.amplitude_pct=8 --set excitation.period_s=80 \
-  --export valve.csv --log-level error >/dev/null
+  -o valve.csv --log-level error >/dev/null
 start --record --model-set quick
 
 if [ "$way" = opcua ]; then
@@ -70,7 +70,7 @@ last=$((began + count - 1))
 [ "$way" = modbus ] || last=$(date -u -d "@$last" +%FT%T)
 
 "${run[@]}" 2>gateway.log > >(
-  tee rows.csv | "$bin/fdi-simulator" --domain "$domain" replay --csv - \
+  tee rows.csv | "$bin/fdi-simulator" --domain "$domain" replay --file - \
     --valve FV-101 --map "$example/tags.toml" --keep-stamps --split-gaps \
     --period 1 >replay.txt 2>replay.log) &
 gateway=$!

@@ -1,5 +1,6 @@
 // From the registers of a PLC (Modbus TCP) to CSV lines on stdout, one a sample
-// period, which `fdi-simulator replay --csv -` publishes on DDS. See README.md.
+// period, which `fdi-simulator replay --file -` publishes on DDS. See
+// README.md.
 #include <algorithm>
 #include <bit>
 #include <cerrno>

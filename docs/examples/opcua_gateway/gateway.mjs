@@ -1,5 +1,5 @@
 // From an OPC UA server to CSV lines on stdout, one a sample period, which
-// `fdi-simulator replay --csv -` publishes on DDS. See README.md.
+// `fdi-simulator replay --file -` publishes on DDS. See README.md.
 //
 // The server is subscribed to, so what happens between two publications waits in
 // its queues. The row of instant t holds, for every tag, the newest reading with

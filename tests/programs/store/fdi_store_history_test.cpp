@@ -145,8 +145,8 @@ TEST_F(FdiStoreHistoryTest, FiltersReachTheQuery) {
   EXPECT_EQ(count("--fault f7"), 1U);
   EXPECT_EQ(count("--fault paper5"), 0U);
   EXPECT_EQ(count("--valve 'PV*'"), 0U);
-  EXPECT_EQ(count("--since 2026-11-20T14:56:12Z"), 0U);
-  EXPECT_EQ(count("--until 2026-11-20T14:56:12Z"), 1U);
+  EXPECT_EQ(count("--from 2026-11-20T14:56:12Z"), 0U);
+  EXPECT_EQ(count("--to 2026-11-20T14:56:12Z"), 1U);
   EXPECT_EQ(count("--state isolated"), 1U);
   EXPECT_EQ(Store("history list --state odd").code, 2);
   EXPECT_EQ(Store("history list --fault f99").code, 2);
@@ -223,10 +223,10 @@ TEST_F(FdiStoreHistoryTest, AFilterAcknowledgesAllItFindsIfAskedTo) {
     RecordEpisode(writer, 0b001, "PV-2");
   }
   EXPECT_EQ(Store("history ack").code, 2);
-  EXPECT_EQ(Store("history ack last --all").code, 2);
+  EXPECT_EQ(Store("history ack last --valve 'PV-*'").code, 2);
 
-  const json first = StoreJson("history ack --all --valve 'PV-*'");
-  const json again = StoreJson("history ack --all --valve 'PV-*'");
+  const json first = StoreJson("history ack --valve 'PV-*'");
+  const json again = StoreJson("history ack --valve 'PV-*'");
 
   EXPECT_EQ(first["episodes"].size(), 2U);
   EXPECT_EQ(again["episodes"].size(), 0U);
@@ -245,8 +245,8 @@ TEST_F(FdiStoreHistoryTest, AWindowIsPlannedBeforeAnyMonitorHasRun) {
   EXPECT_EQ(ParseTime(planned["until_utc"].get<std::string>(), true),
             from_ns + 7200 * kSecond);
   EXPECT_FALSE(planned["planned_utc"].is_null());
-  EXPECT_EQ(StoreJson("history shelf")["shelf"].size(), 1U);
-  EXPECT_EQ(StoreJson("history unshelve --valve FV-9")["shelf"].size(), 1U);
+  EXPECT_EQ(StoreJson("history list --shelved")["shelf"].size(), 1U);
+  EXPECT_EQ(StoreJson("history shelve FV-9 --off")["shelf"].size(), 1U);
   EXPECT_THAT(Store("--utc history shelve FV-9 --from 2026-01-01").err,
               HasSubstr("planned from a time after now"));
 }
@@ -260,7 +260,7 @@ TEST_F(FdiStoreHistoryTest, AShelfNeedsNoFolderYet) {
     return std::system(command.c_str());
   };
   EXPECT_EQ(run("history shelve FV-9 --for 2h"), 0);
-  EXPECT_EQ(run("history shelf"), 0);
+  EXPECT_EQ(run("history list --shelved"), 0);
   EXPECT_THAT(Slurp(out), HasSubstr("FV-9"));
 }
 
@@ -272,12 +272,16 @@ TEST_F(FdiStoreHistoryTest, AShelvedAlarmSaysSoUntilItIsTakenOff) {
   EXPECT_THAT(Store("history list").out, HasSubstr("SHELVED"));
   EXPECT_EQ(StoreJson("history show last")["shelf"]["who"], "anna");
 
-  EXPECT_EQ(StoreJson("history unshelve --valve LV-1")["shelf"].size(), 1U);
+  EXPECT_EQ(StoreJson("history shelve LV-1 --off")["shelf"].size(), 1U);
 
-  EXPECT_EQ(StoreJson("history shelf")["shelf"].size(), 0U);
-  EXPECT_EQ(StoreJson("history shelf --all")["shelf"].size(), 1U);
-  EXPECT_EQ(Store("history unshelve 1").code, 3);
-  EXPECT_EQ(Store("history unshelve --valve LV-1").code, 5);
+  EXPECT_EQ(StoreJson("history list --shelved")["shelf"].size(), 0U);
+  EXPECT_EQ(
+      StoreJson("history list --shelved --from 1970-01-01")["shelf"].size(),
+      1U);
+  EXPECT_EQ(Store("history shelve LV-1 --off --for 1h").code, 2);
+  EXPECT_THAT(Store("history unshelve 1").err,
+              HasSubstr("unshelve is gone: fdi-store history shelve"));
+  EXPECT_EQ(Store("history shelve LV-1 --off").code, 5);
   EXPECT_EQ(Store("history shelve LV-1 --for 91d").code, 2);
   EXPECT_THAT(Store("history shelve LV-1 --for 8").err,
               HasSubstr("--for 8: expected a time with its unit"));
@@ -310,13 +314,13 @@ TEST_F(FdiStoreHistoryTest, AnIdThatLooksLikeAPatternIsAnId) {
   ASSERT_EQ(shelved.size(), 1U);
   EXPECT_EQ(shelved[0]["valve_id"], "V[1]");
 
-  const auto moved = StoreJson("valves move 'V[1]' --to there")["valves"];
+  const auto moved = StoreJson("valves move 'V[1]' there")["valves"];
 
   ASSERT_EQ(moved.size(), 1U);
   EXPECT_EQ(moved[0]["valve_id"], "V[1]");
   EXPECT_THAT(left(), testing::UnorderedElementsAre("LV-1", "V1", "V2"));
   // No valve of that id is left: a pattern.
-  EXPECT_EQ(StoreJson("valves move 'V[1]' --to there")["valves"].size(), 1U);
+  EXPECT_EQ(StoreJson("valves move 'V[1]' there")["valves"].size(), 1U);
   EXPECT_THAT(left(), testing::UnorderedElementsAre("LV-1", "V2"));
 }
 
@@ -410,7 +414,8 @@ TEST_F(FdiStoreHistoryTest, PlotIsAPictureOrAClearError) {
   EXPECT_EQ(Store("history plot last --output a.png").code, 0);
 
   EXPECT_EQ(Slurp(directory_.path() / "a.png").substr(1, 3), "PNG");
-  EXPECT_EQ(Store("history plot last -o a.svg --from -10").code, 0);
+  EXPECT_EQ(
+      Store("history plot last -o a.svg --from 2026-11-20T14:56:00Z").code, 0);
   EXPECT_THAT(Slurp(directory_.path() / "a.svg"), HasSubstr("isolated f7"));
 }
 
