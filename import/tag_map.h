@@ -56,19 +56,24 @@ void CheckGasFlow(const ColumnMap& map, double molar_mass_kg_kmol);
 /// The name of a unit of time in a map: "s", "unix ms", "filetime", "serial".
 std::string_view TimeUnitName(const TimeUnit& unit);
 
+/// Options of earlier versions, and what replaces each.
+inline constexpr std::pair<const char*, const char*> kOptionsOfMap[] = {
+    {"--decimal",
+     "decimal = \",\" under [file] of --map (fdi-store runs sniff writes it)"},
+    {"--date",
+     "date = \"d/m/y\" under [time] of --map (fdi-store runs sniff writes it)"},
+    {"--skip",
+     "skip = 3 under [file] of --map (fdi-store runs sniff writes it)"}};
+
 /// Options of every verb that reads tables; each overrides the map.
 struct TableOptions {
   std::filesystem::path map;
   std::string zone;
   std::string resample;
-  std::string decimal;
-  std::string date;
-  int skip{0};
 
   void AddTo(CLI::App& verb);
   bool given() const {
-    return !map.empty() || !zone.empty() || !resample.empty() ||
-           !decimal.empty() || !date.empty() || skip > 0;
+    return !map.empty() || !zone.empty() || !resample.empty();
   }
   /// Reads the map, overridden by the other options.
   /// @param utc times without a zone are UTC.

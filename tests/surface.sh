@@ -7,8 +7,8 @@
 set -euo pipefail
 bin=${1:?folder of the programs}
 max_verbs=53
-max_options=288
-max_shown=22
+max_options=264
+max_shown=20
 
 # The placeholders that a name may have, wherever it occurs.
 meanings='

@@ -1,4 +1,5 @@
 #include "idl/participant.h"
+#include "import/tag_map.h"
 #include "programs/simulator/sample_publisher.h"
 #include "programs/simulator/verbs.h"
 #include "report/program.h"
@@ -51,6 +52,9 @@ int main(int argc, char** argv) {
   program.MapError<fdi::storage::SqliteError>(report::kExitData);
   program.MapError<fdi::idl::TransportError>(report::kExitTransport);
   program.MapError<fdi::simulator::NoReaderError>(report::kExitTransport);
+  for (const auto& [option, key] : fdi::importer::kOptionsOfMap) {
+    program.AddRemoved("replay", option, key);
+  }
   program.AddExamples(fdi::simulator::Examples());
   return program.Run(argc, argv);
 }

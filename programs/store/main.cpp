@@ -1,3 +1,4 @@
+#include "import/tag_map.h"
 #include "programs/store/verbs.h"
 #include "storage/database/database.h"
 
@@ -20,6 +21,11 @@ int main(int argc, char** argv) {
                      "the script fdi-keys makes, renews and lists keys");
   fdi::storage::AddShipVerb(program);
   fdi::storage::AddAuditVerb(program);
+  for (const char* verb : {"import", "sniff", "audit"}) {
+    for (const auto& [option, key] : fdi::importer::kOptionsOfMap) {
+      program.AddRemoved(verb, option, key);
+    }
+  }
   program.AddExamples(fdi::storage::Examples());
   return program.Run(argc, argv);
 }

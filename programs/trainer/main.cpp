@@ -1,3 +1,4 @@
+#include "import/tag_map.h"
 #include "programs/trainer/verbs.h"
 #include "report/program.h"
 #include "storage/database/database.h"
@@ -18,6 +19,11 @@ int main(int argc, char** argv) {
   program.AddRemoved("", "inject",
                      "it is fdi-study inject, which the source tree builds "
                      "with -DFDI_BENCH=ON");
+  for (const char* verb : {"onboard", "evaluate", "compare", "relearn"}) {
+    for (const auto& [option, key] : fdi::importer::kOptionsOfMap) {
+      program.AddRemoved(verb, option, key);
+    }
+  }
   program.AddExamples(
       {{"",
         {{"Train the paper's observers",
