@@ -845,7 +845,7 @@ void LayoutFinder::RefuseSign(const SignCell& seen,
   throw DataError(source_ + ":" + std::to_string(seen.line) + ": " +
                   Quoted(seen.cell) + reason +
                   "; try decimal = \".\" or decimal = \",\" under [file] "
-                  "of --map, or --decimal");
+                  "of --map");
 }
 
 // Of dates with slashes or short years: the order in which all of them are

@@ -541,25 +541,6 @@ void TableOptions::AddTo(CLI::App& verb) {
                   "are held or interpolated for at most AGE (default: hold, "
                   "ten periods)")
       ->type_name("1s[:hold|linear[:AGE]]");
-  verb.add_option(
-          "--decimal", decimal,
-          "Decimal sign of the file, a point or a comma, where the file "
-          "does not show it")
-      ->check([](const std::string& sign) {
-        return sign == "." || sign == "," ? std::string()
-                                          : sign + " not in {.,}";
-      })
-      ->type_name("SIGN");
-  verb.add_option("--date", date,
-                  "Order of dates with slashes: d/m/y, m/d/y, y/m/d")
-      ->check(CLI::IsMember({"d/m/y", "m/d/y", "y/m/d"}))
-      ->type_name("ORDER");
-  verb.add_option("--skip", skip,
-                  "Lines in front of the names of the columns (default: as "
-                  "found)")
-      ->check(CLI::Range(0, 1000000))
-      ->default_str("")
-      ->type_name("LINES");
 }
 
 // For the zone: the option, then the file, then UTC if `utc`. A zone in the
@@ -574,14 +555,6 @@ ColumnMap TableOptions::Read(bool utc) const {
   if (!resample.empty()) {
     columns.resampling = ParseResampling(resample);
   }
-  if (!decimal.empty()) {
-    columns.decimal = decimal.front();
-    columns.thousands = '\0';
-  }
-  if (!date.empty()) {
-    columns.date_order = ParseDateOrder(date);
-  }
-  columns.skip = skip > 0 ? skip : columns.skip;
   return columns;
 }
 

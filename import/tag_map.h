@@ -61,14 +61,10 @@ struct TableOptions {
   std::filesystem::path map;
   std::string zone;
   std::string resample;
-  std::string decimal;
-  std::string date;
-  int skip{0};
 
   void AddTo(CLI::App& verb);
   bool given() const {
-    return !map.empty() || !zone.empty() || !resample.empty() ||
-           !decimal.empty() || !date.empty() || skip > 0;
+    return !map.empty() || !zone.empty() || !resample.empty();
   }
   /// Reads the map, overridden by the other options.
   /// @param utc times without a zone are UTC.

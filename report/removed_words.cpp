@@ -37,8 +37,18 @@ constexpr std::string_view kUsers =
 constexpr std::string_view kCertificate =
     "nginx has the certificate (docs/console.md, The page beyond this host)";
 
-// In the order of programs and verbs.
+constexpr std::string_view kDecimal =
+    "decimal = \",\" under [file] of --map (fdi-store runs sniff writes it)";
+constexpr std::string_view kDate =
+    "date = \"d/m/y\" under [time] of --map (fdi-store runs sniff writes it)";
+constexpr std::string_view kSkip =
+    "skip = 3 under [file] of --map (fdi-store runs sniff writes it)";
+
+// In the order of programs and verbs; "*" is any program.
 constexpr auto kRemoved = std::to_array<Removed>({
+    {"*", "*", "--decimal", kDecimal},
+    {"*", "*", "--date", kDate},
+    {"*", "*", "--skip", kSkip},
     {"fdi-simulator", "", "faults", "fdi-store faults lists them"},
     {"fdi-simulator", "run", "--valves", "--count N"},
     {"fdi-simulator", "run", "--export", "-o FILE"},
@@ -178,7 +188,7 @@ std::optional<std::string> RemovedWord(std::string_view program,
                                        std::string_view verb,
                                        std::string_view name) {
   const auto found = std::ranges::find_if(kRemoved, [&](const Removed& row) {
-    return row.program == program && row.name == name &&
+    return (row.program == program || row.program == "*") && row.name == name &&
            (row.verb == verb || row.verb == "*");
   });
   if (found == kRemoved.end()) {

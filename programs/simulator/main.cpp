@@ -1,4 +1,5 @@
 #include "idl/participant.h"
+#include "import/tag_map.h"
 #include "programs/simulator/sample_publisher.h"
 #include "programs/simulator/verbs.h"
 #include "report/program.h"

@@ -1,3 +1,4 @@
+#include "import/tag_map.h"
 #include "programs/store/verbs.h"
 #include "storage/database/database.h"
 

@@ -1,3 +1,4 @@
+#include "import/tag_map.h"
 #include "programs/trainer/verbs.h"
 #include "report/program.h"
 #include "storage/database/database.h"

@@ -89,6 +89,9 @@ TEST_F(FdiStoreTest, RemovedVerbsAndOptionsNameWhatReplacesThem) {
   const std::vector<std::pair<std::string, std::string>> removed{
       {"audit --ps PS a.csv", "--ps is gone: stroke tests"},
       {"history shadow --from 1d", "shadow is gone: fdi-trainer compare"},
+      {"audit --date m/d/y a.csv", "--date is gone: date = \"d/m/y\" under"},
+      {"runs import a.csv --skip=3", "--skip is gone: skip = 3 under [file]"},
+      {"runs sniff a.csv --decimal ,", "--decimal is gone: decimal = "},
       {"history shadow --help", "shadow is gone: fdi-trainer compare"},
       {"keys init keys --days 30", "keys is gone: the script fdi-keys"},
       {"prune --shadow-age 90d", "--shadow-age is gone: differences"}};
