@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "diagnosis/decision/observer_evidence.h"
+#include "diagnosis/decision/rules.h"
 #include "diagnosis/decision/strength_tracker.h"
 #include "diagnosis/model/verdict.h"
 #include "diagnosis/observers/fit_window.h"
@@ -101,6 +102,8 @@ class FaultBank {
   double Allowance() const;
   double AllowanceOf(double interpolation) const;
   double EvidenceMembership(double behind) const;
+  double Cap(Rule rule, const StrengthTracker& tracker, double instant,
+             double behind) const;
   bool SuitsInputs(const StrengthTracker& tracker) const;
   bool Fits(const StrengthTracker& tracker) const;
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "diagnosis/decision/rules.h"
 #include "diagnosis/model/fault_catalogue.h"
 
 namespace fdi {
@@ -68,7 +69,10 @@ const StrengthPath::Node& StrengthTracker::BestNode(
 }
 
 double StrengthTracker::evidence(const ObserverEvidence& trained) const {
-  return std::max(total_, trained.total(BestNode(trained).observer));
+  const double best = trained.total(BestNode(trained).observer);
+  return !Acts(Rule::kTrackedStrength)    ? best
+         : !Acts(Rule::kTrainedStrengths) ? total_
+                                          : std::max(total_, best);
 }
 
 double StrengthTracker::strength(const ObserverEvidence& trained) const {
@@ -380,7 +384,8 @@ void StrengthTracker::JudgeAccount(const ObserverBank& bank,
 // what that one says of it is no part of an effect to interpolate.
 double StrengthTracker::Between(std::size_t channel, const Segment& segment,
                                 const PathPlace& place, double residual) const {
-  if (place.segment == 0 || !plan_->takes_position(channel)) {
+  if (!Acts(Rule::kBetween) || place.segment == 0 ||
+      !plan_->takes_position(channel)) {
     return residual;
   }
   const double low = residual + segment.slope * place.from_low;
@@ -412,16 +417,20 @@ void StrengthTracker::PushFit(const ObserverBank& bank,
       const double normal = bank.residual(0, static_cast<int>(c));
       // An error of interpolation excuses a part of an effect, not one that is
       // not there: nearer to normal operation, there is none.
-      const bool apart = std::abs(normal) < std::abs(p.residual);
+      const bool apart =
+          Acts(Rule::kApart) && std::abs(normal) < std::abs(p.residual);
       p.residual = apart ? Between(c, segment, place, p.residual) : p.residual;
       const double effect =
           apart || std::isnan(normal) ? 0.0 : normal - p.residual;
-      const double onset = begins ? kOnsetError * effect : 0.0;
-      const double spread =
-          std::sqrt(std::min(p.variance - p.error, kMaxFitVariance * sd * sd) +
-                    (apart ? 0.0 : p.error) + onset * onset);
+      const double onset =
+          begins && Acts(Rule::kOnset) ? kOnsetError * effect : 0.0;
+      const double most = Acts(Rule::kFitVariance)
+                              ? kMaxFitVariance * sd * sd
+                              : std::numeric_limits<double>::infinity();
+      const double spread = std::sqrt(std::min(p.variance - p.error, most) +
+                                      (apart ? 0.0 : p.error) + onset * onset);
       z[c] = p.residual / spread;
-      u[c] = effect / spread;
+      u[c] = Acts(Rule::kShareOff) ? effect / spread : 0.0;
       PushAccount(bank, c, p.residual);
     }
   }
@@ -429,7 +438,7 @@ void StrengthTracker::PushFit(const ObserverBank& bank,
   misfit_ = 0.0;
   // Normal operation, the first node, has no limits.
   const std::size_t node = std::max<std::size_t>(place.nearest, 1);
-  for (std::size_t c = 0; c < channels_; ++c) {
+  for (std::size_t c = 0; c < channels_ && Acts(Rule::kFitLimits); ++c) {
     const FitBounds& limits = path_->points[node * channels_ + c].fit;
     misfit_ = std::max(misfit_, fit_.Excess(c, limits));
   }
@@ -441,7 +450,7 @@ void StrengthTracker::PushFit(const ObserverBank& bank,
   if (early || age_ > 2 * t_k) {
     tolerates_ = account.tolerates;
   }
-  if (!early && (account.lacks & explains) != 0) {
+  if (Acts(Rule::kAccounted) && !early && (account.lacks & explains) != 0) {
     misfit_ = std::max(misfit_, kUnaccounted);
   }
 }
