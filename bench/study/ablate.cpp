@@ -44,10 +44,11 @@ out, by the observers alone, without looks:
 
 `=`: every run has the same answers as with all rules. Else: runs that are
 detected / whose answer holds the fault / is the fault / is one wrong name /
-is unknown; `w` single wrong names on the way, `s` the median to the first name
-that holds the fault, then the share of the time in which a name held it; `+`
-runs in which something came on top; `e` episodes in runs without fault. The
-sets are those of the script, the number behind a name is that of its seeds.
+is unknown; `w` single wrong names on the way, `s` the median times to the first
+name that holds the fault and to the one that is the fault, then the share of
+the time in which a name held it; `+` runs in which something came on top; `e`
+episodes in runs without fault and `n` those that end with a name. The sets are
+those of the script, the number behind a name is that of its seeds.
 `fdi-study ablate --list` has the rules with their constants and tests.
 
 )";
@@ -90,6 +91,7 @@ std::vector<std::string> LineOf(const EvaluatedRun& run,
       wording == nullptr ? "" : std::string(CertaintyName(wording->certainty)),
       std::to_string(indices.wrong_isolations),
       report::FormatNumber(paper.t_it_first, 0),
+      report::FormatNumber(paper.t_exact, 0),
       report::FormatNumber(paper.r_ti, 4),
       std::to_string(indices.episodes),
       report::FormatNumber(run.second_t, 0),
@@ -104,6 +106,7 @@ enum Column : std::size_t {
   kCertainty,
   kWrong,
   kNamed,
+  kAlone,
   kShare,
   kEpisodes,
   kSecondTime,
@@ -113,7 +116,7 @@ enum Column : std::size_t {
 
 constexpr std::array<const char*, kColumns> kHeads{
     "run",   "fault", "detected", "set",      "certainty", "wrong",
-    "named", "share", "episodes", "second_t", "second_set"};
+    "named", "alone", "share",    "episodes", "second_t",  "second_set"};
 
 report::Report MakeParts(const AblateOptions& options,
                          const report::Context& context) {
@@ -184,6 +187,10 @@ bool Holds(const std::string& set, const std::string& fault) {
   return ("|" + set + "|").find("|" + fault + "|") != std::string::npos;
 }
 
+std::string TextOf(const std::vector<double>& seconds) {
+  return seconds.empty() ? "" : report::FormatNumber(Median(seconds), 0);
+}
+
 // "37 held, 36 exact, 0 wrong, 0 unknown, 13 on the way, 8 s": of runs with a
 // fault; the episodes of the others.
 std::string FiguresOf(const Part& part) {
@@ -194,13 +201,16 @@ std::string FiguresOf(const Part& part) {
   int way = 0;
   int second = 0;
   int alarms = 0;
+  int false_names = 0;
   double share = 0.0;
   int faulty = 0;
   int detected = 0;
   std::vector<double> named;
+  std::vector<double> alone;
   for (const auto& run : part) {
     if (run[kFault].empty()) {
       alarms += std::stoi(run[kEpisodes]);
+      false_names += run[kSet].empty() ? 0 : 1;
       continue;
     }
     ++faulty;
@@ -209,6 +219,9 @@ std::string FiguresOf(const Part& part) {
     share += std::max(std::stod(run[kShare]), 0.0);
     if (const double s = std::stod(run[kNamed]); s >= 0.0) {
       named.push_back(s);
+    }
+    if (const double s = std::stod(run[kAlone]); s >= 0.0) {
+      alone.push_back(s);
     }
     if (run[kDetected] != "1") {
       continue;
@@ -232,9 +245,7 @@ std::string FiguresOf(const Part& part) {
         std::to_string(exact) + "/" + std::to_string(wrong) + "/" +
         std::to_string(unknown));
     add(std::to_string(way) + "w");
-    add(named.empty()
-            ? "-"
-            : report::FormatNumber(Median(std::move(named)), 0) + "s");
+    add(TextOf(named) + "-" + TextOf(alone) + "s");
     add(report::FormatNumber(share / faulty, 3));
     if (second > 0) {
       add(std::to_string(second) + "+");
@@ -242,6 +253,7 @@ std::string FiguresOf(const Part& part) {
   }
   if (faulty < static_cast<int>(part.size())) {
     add(std::to_string(alarms) + "e");
+    add(std::to_string(false_names) + "n");
   }
   return text;
 }

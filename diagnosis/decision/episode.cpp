@@ -241,10 +241,6 @@ Episode::Episode(std::shared_ptr<const FaultPlan> plan)
                       static_cast<int>(kRefutingMemories *
                                        models_->decision.evidence_window)),
       shares_(models_->faults.size()) {
-  for (const int fault : models_->undetectable) {
-    const int index = FaultIndex(*models_, fault);
-    hidden_ |= names_last_ && index >= 0 ? FaultSet{1} << index : 0;
-  }
   left_.reserve(static_cast<std::size_t>(models_->decision.detection_samples) +
                 1);
 }
@@ -336,11 +332,6 @@ void Episode::Apply(Rule rule, Proposal& p) {
       break;
     case Rule::kMisfitIsNoName:
       supported = IsAllOf(supported, misfits_) ? 0 : supported;
-      break;
-    case Rule::kHiddenSets:
-      // As little as a fault that no limit shows explains no episode: the
-      // evidence is too weak for a name.
-      supported = (supported & hidden_) != 0 ? 0 : supported;
       break;
     case Rule::kRecognisedAlone:
       // What is recognised fits over t_k samples, be single ones rare for it.

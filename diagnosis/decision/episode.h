@@ -241,7 +241,6 @@ class Episode {
   // What the evidence refutes; counted in sets without a second look, which
   // have no other rule for a name that changes with a growing strength.
   bool names_last_;
-  FaultSet hidden_{0};  // look normal; of the same sets
   MisfitCounts contradictions_;
   std::vector<double> shares_;  // of the episode that supported each fault
   int stood_{0};  // samples that a fault of the present name fitted

@@ -200,8 +200,6 @@ double FaultBank::Cap(Rule rule, const StrengthTracker& tracker, double instant,
   switch (rule) {
     case Rule::kMemberships:
       return std::max(instant, tracker.factor());
-    case Rule::kRefutable:
-      return tracker.refutable() ? 1.0 : 0.5 * isolation;
     case Rule::kTolerates:
       return tracker.tolerates() ? 0.5 * (1.0 + isolation) : 1.0;
     default:  // Rule::kEvidence
@@ -294,8 +292,7 @@ FaultSet FaultBank::Recognised(double margin, bool fitting) const {
   }
   for (const StrengthTracker& tracker : trackers_) {
     const StrengthPath& path = tracker.path();
-    if (path.taught && tracker.refutable() &&
-        best - tracker.evidence(trained_) <= margin &&
+    if (path.taught && best - tracker.evidence(trained_) <= margin &&
         (!fitting || Fits(tracker))) {
       recognised |= FaultSet{1} << path.fault_index;
     }

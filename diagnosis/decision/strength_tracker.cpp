@@ -14,8 +14,6 @@ constexpr int kSearchSamples = 40;  // initial samples with a grid search
 // A fault rarely develops faster than to full strength in 10 minutes: at 1 Hz
 // that is 1/600 per sample, 2.5 of these deviations.
 constexpr double kRateDeviation = 1.0 / 1500.0;
-// An effect on a channel counts from this share of the deviation on.
-constexpr double kMinEffect = 0.25;
 constexpr double kAccounted = 0.5;    // of the normal observer's residual
 constexpr double kOnsetError = 0.5;   // of the effect, while a fault begins
 constexpr double kUnaccounted = 2.0;  // misfit of what only tolerates
@@ -46,7 +44,6 @@ void StrengthTracker::Restart() {
   age_ = 0;
   strength_ = path_->lowest;
   rate_ = 0.0;
-  refutable_ = false;
   accounts_ = false;
   total_ = 0.0;
   evidence_.fill(0.0);
@@ -170,7 +167,6 @@ StrengthTracker::Prediction StrengthTracker::At(const ObserverBank& bank,
 }
 
 void StrengthTracker::Step(const ObserverBank& bank) {
-  refutable_ = refutable_ || IsRefutable(bank);
   if (age_ < kSearchSamples) {
     Search(bank);
   } else {
@@ -178,29 +174,6 @@ void StrengthTracker::Step(const ObserverBank& bank) {
   }
   ++age_;
   UpdateFactor(bank);
-}
-
-// True if a reading can distinguish this fault from normal operation: one of
-// its observers makes a different prediction, unless the transmitter's limit
-// hides both. A reading at the limit that normal operation does not explain
-// counts as a test passed.
-bool StrengthTracker::IsRefutable(const ObserverBank& bank) const {
-  for (std::size_t c = 0; c < channels_; ++c) {
-    const int channel = static_cast<int>(c);
-    if (!bank.active(channel) || std::isnan(bank.residual(0, channel))) {
-      continue;
-    }
-    for (std::size_t j = 1; j < path_->nodes.size(); ++j) {
-      const StrengthPath::Point& point = path_->points[j * channels_ + c];
-      const double effect =
-          std::abs(Lane(bank.state().outputs->predictions, point.slot) -
-                   bank.prediction(0, channel));
-      if (effect > kMinEffect * point.sd) {
-        return true;
-      }
-    }
-  }
-  return false;
 }
 
 // The best of a grid of constant strengths: the filter is only valid locally,
