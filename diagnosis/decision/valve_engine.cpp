@@ -8,6 +8,7 @@
 
 #include "diagnosis/decision/episode.h"
 #include "diagnosis/decision/floor.h"
+#include "diagnosis/decision/rules.h"
 #include "diagnosis/decision/second_fault.h"
 #include "diagnosis/model/fault_catalogue.h"
 #include "diagnosis/model/model_set.h"
@@ -391,7 +392,7 @@ void ValveEngine::Impl::Decide(const Sample& sample) {
 // A finding beside those of the floor, which do not come slowly.
 void ValveEngine::Impl::FindDrift(Findings& findings) {
   DriftWatch& drift = diagnosis_->drift;
-  if (!drift.watches()) {
+  if (!Acts(Rule::kDrift) || !drift.watches()) {
     return;
   }
   const std::uint32_t beyond = diagnosis_->detection.beyond();
@@ -424,8 +425,8 @@ void ValveEngine::Impl::StepEpisode(const Sample& sample,
                                     const Findings& findings) {
   Episode& episode = diagnosis_->episode;
   SecondFaultWatch& second = diagnosis_->second;
-  const bool watched =
-      episode_open() && findings.settled && findings.stuck == 0;
+  const bool watched = Acts(Rule::kSecondHolds) && episode_open() &&
+                       findings.settled && findings.stuck == 0;
   if (watched) {
     second.Judge(sample, diagnosis_->bank);
   } else {
