@@ -9,7 +9,6 @@
 #include <SQLiteCpp/SQLiteCpp.h>
 #include <fcntl.h>
 #include <sqlite3.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include "base/headroom.h"
@@ -206,19 +205,6 @@ bool SqliteError::IsOfValues() const {
          primary == SQLITE_TOOBIG || primary == SQLITE_RANGE;
 }
 
-OpenFiles::OpenFiles(std::filesystem::path database)
-    : path_(std::move(database)),
-      database_(IdOf("")),
-      wal_(IdOf("-wal")),
-      gate_(IdOf(".gate")) {}
-
-OpenFiles::Id OpenFiles::IdOf(const char* suffix) const {
-  struct stat facts {};
-  return stat((path_.string() + suffix).c_str(), &facts) == 0
-             ? Id({facts.st_dev, facts.st_ino})
-             : std::nullopt;
-}
-
 Database::Database(const std::filesystem::path& path, const Schema& schema,
                    Access access)
     : path_(path), schema_(schema), access_(access) {
@@ -226,8 +212,8 @@ Database::Database(const std::filesystem::path& path, const Schema& schema,
   if (access != Access::kReader) {
     gate_ = std::make_unique<WriteGate>(path);
   }
-  const bool immutable = IsImmutable(path, access);
-  connection_ = Connect(path, access, immutable);
+  OpenFiles::PutBackLogOf(path);
+  connection_ = Connect(path, access, IsImmutable(path, access));
   if (access == Access::kReader) {
     version_ = CheckIdentity(schema);
     if (version_ < schema.version()) {
@@ -254,16 +240,20 @@ Database::Database(const std::filesystem::path& path, const Schema& schema,
   files_ = OpenFiles(path);
 }
 
-Database::~Database() = default;
+// SQLite deletes its files by name.
+Database::~Database() {
+  files_.PutBack();
+}
 
 bool Database::Refresh() {
   if (files_.InPlace()) {
     return false;
   }
-  if (files_.HasDatabase() && !files_.HasWal()) {
+  if (files_.HasDatabase() && !files_.HasLog()) {
     Refuse(path_,
-           "its -wal was deleted or replaced, and others cannot read "
-           "what it held: end every program that has the file open");
+           "its -wal or -shm was deleted or replaced, and others cannot read "
+           "what it held: write nothing here by other programs, and end "
+           "those that have the file open");
   }
   // Another database would take our WAL for its own.
   if (files_.LeftWal()) {
@@ -290,6 +280,7 @@ bool Database::Refresh() {
 
 void Database::Execute(const std::string& script) {
   SqliteCall(script, [&] { connection_->exec(script); });
+  files_.PutBack();
 }
 
 int Database::CheckIdentity(const Schema& schema) {
@@ -717,3 +708,4 @@ Snapshot::~Snapshot() {
 }
 
 }  // namespace fdi::storage
+  database_.files_.PutBack();

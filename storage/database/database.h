@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "base/error.h"
+#include "storage/database/open_files.h"
 
 namespace SQLite {
 class Database;
@@ -226,34 +227,6 @@ class Statement {
   bool writes_{false};
 };
 
-/// The files of a database as they were opened, to notice that one was deleted
-/// or replaced. SQLite itself does not: what it then writes is in no file that
-/// anybody else can open. A copy that overwrites a file in place is not
-/// noticed.
-class OpenFiles {
- public:
-  OpenFiles() = default;
-  explicit OpenFiles(std::filesystem::path database);
-
-  /// Whether all are still the files of these names.
-  bool InPlace() const { return HasDatabase() && HasWal() && HasGate(); }
-  bool HasDatabase() const { return database_ && IdOf("") == database_; }
-  bool HasWal() const { return !wal_ || IdOf("-wal") == wal_; }
-  /// Whether our WAL lies beside another database, or none.
-  bool LeftWal() const { return wal_ && HasWal() && !HasDatabase(); }
-
- private:
-  /// Device and inode; nothing if there is no such file.
-  using Id = std::optional<std::pair<std::uint64_t, std::uint64_t>>;
-  bool HasGate() const { return !gate_ || IdOf(".gate") == gate_; }
-  Id IdOf(const char* suffix) const;
-
-  std::filesystem::path path_;
-  Id database_;
-  Id wal_;
-  Id gate_;
-};
-
 /// One connection to one of the three databases. Not thread safe: it may be
 /// handed over, e.g. to a thread started later, but concurrent use by two
 /// threads corrupts its statements.
@@ -343,7 +316,6 @@ class Database {
   int version_{0};
   std::unique_ptr<WriteGate> gate_;  // Null for a reader.
   std::unique_ptr<SQLite::Database> connection_;
-  OpenFiles files_;
   std::map<std::string, Statement, std::less<>> cached_;
 };
 
@@ -351,6 +323,7 @@ class Database {
 /// rolls back unless committed.
 class Transaction {
  public:
+  OpenFiles files_;                  // Outlives the connection.
   /// @throws SqliteError (IsBusy) if another connection keeps the gate or lock.
   explicit Transaction(Database& database);
   ~Transaction();
