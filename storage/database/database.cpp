@@ -94,6 +94,31 @@ bool IsImmutable(const std::filesystem::path& path, Access access) {
          !std::filesystem::exists(WalPath(path), error) && !error;
 }
 
+// Whether SQLite finds the room for its shared memory.
+bool HasRoomToRead(SQLite::Database& connection) {
+  try {
+    connection.execAndGet("PRAGMA user_version");
+    return true;
+  } catch (const SQLite::Exception& error) {
+    return error.getErrorCode() != SQLITE_IOERR &&
+           error.getErrorCode() != SQLITE_FULL;
+  }
+}
+
+// SQLite calls a disk that is full an I/O error.
+void RefuseLackOfRoom(const std::filesystem::path& path) {
+  // The shared memory of a database (32 KiB) and the first pages of its log.
+  constexpr std::uintmax_t kNeeded = 65536;
+  const auto folder = path.has_parent_path() ? path.parent_path() : ".";
+  std::error_code error;
+  const auto room = std::filesystem::space(folder, error);
+  if (!error && room.available < kNeeded) {
+    Refuse<NoRoomError>(path,
+                        "the disk is full: " + std::to_string(room.available) +
+                            " bytes are free in " + folder.string());
+  }
+}
+
 // file:PATH?immutable=1, with the signs escaped that mean something in a URI.
 std::string ImmutableUri(const std::filesystem::path& path) {
   std::string uri = "file:";
@@ -215,6 +240,9 @@ Database::Database(const std::filesystem::path& path, const Schema& schema,
   OpenFiles::PutBackLogOf(path);
   connection_ = Connect(path, access, IsImmutable(path, access));
   if (access == Access::kReader) {
+    if (!HasRoomToRead(*connection_) && WalBytes() == 0) {
+      connection_ = Connect(path, access, true);
+    }
     version_ = CheckIdentity(schema);
     if (version_ < schema.version()) {
       Refuse<OutdatedError>(
@@ -227,12 +255,17 @@ Database::Database(const std::filesystem::path& path, const Schema& schema,
     // Under the gate, so that two writers that open a new file do not both
     // create it.
     const GateHolder holder(*gate_, path);
-    version_ = CheckIdentity(schema);
-    Configure(schema);
-    if (version_ < schema.version()) {
-      Migrate(schema, version_);
-    } else {
-      FinishBackups(path_, version_);
+    try {
+      version_ = CheckIdentity(schema);
+      Configure(schema);
+      if (version_ < schema.version()) {
+        Migrate(schema, version_);
+      } else {
+        FinishBackups(path_, version_);
+      }
+    } catch (const SqliteError&) {
+      RefuseLackOfRoom(path);
+      throw;
     }
   }
   // A connection that has read in WAL mode keeps its WAL until it is closed.
@@ -246,6 +279,7 @@ Database::~Database() {
 }
 
 bool Database::Refresh() {
+  files_.PutBack();
   if (files_.InPlace()) {
     return false;
   }
@@ -280,7 +314,6 @@ bool Database::Refresh() {
 
 void Database::Execute(const std::string& script) {
   SqliteCall(script, [&] { connection_->exec(script); });
-  files_.PutBack();
 }
 
 int Database::CheckIdentity(const Schema& schema) {
@@ -302,6 +335,7 @@ int Database::CheckIdentity(const Schema& schema) {
                         "): read it as a user who may write to its folder, or "
                         "read a copy that fdi-store backup has made");
     }
+    RefuseLackOfRoom(path_);
     Refuse(path_, error.what());
   }
   // A program that was stopped before it had committed its first migration
@@ -684,6 +718,7 @@ void Transaction::Commit() {
   database_.Execute("COMMIT");
   open_ = false;
   database_.gate_->Leave();
+  database_.files_.PutBack();
   if (!database_.files_.InPlace()) {
     throw SqliteError(SQLITE_READONLY_DBMOVED,
                       database_.path().string() +
@@ -708,4 +743,3 @@ Snapshot::~Snapshot() {
 }
 
 }  // namespace fdi::storage
-  database_.files_.PutBack();

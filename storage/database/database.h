@@ -106,6 +106,13 @@ class OutdatedError : public DataError {
   using DataError::DataError;
 };
 
+/// The disk has no room for what opening a database takes. What nobody has open
+/// can be read all the same.
+class NoRoomError : public DataError {
+ public:
+  using DataError::DataError;
+};
+
 class Database;
 
 /// Storage class of a column in a row.
@@ -236,11 +243,13 @@ class Database {
  public:
   /// Opens `path`. Writers create it (not its folder) and migrate it forward in
   /// one transaction, after saving a copy of an older file beside it. A reader
-  /// that may not write to the folder, as SQLite's shared memory needs, reads a
-  /// file that nobody has open, which is one without a WAL, as immutable.
+  /// that cannot write to the folder, as SQLite's shared memory needs, because
+  /// it may not or because the disk is full, reads a file that nobody has open,
+  /// which is one without a WAL, as immutable.
   /// @throws DataError naming file and reason: folder missing, no permission,
   ///   not a database, another application_id, a version that is newer, or
-  ///   older than the baseline. @throws OutdatedError for a reader.
+  ///   older than the baseline. @throws OutdatedError for a reader,
+  ///   NoRoomError.
   /// @throws SqliteError if SQLite fails otherwise.
   Database(const std::filesystem::path& path, const Schema& schema,
            Access access);
@@ -315,6 +324,7 @@ class Database {
   Access access_;
   int version_{0};
   std::unique_ptr<WriteGate> gate_;  // Null for a reader.
+  OpenFiles files_;                  // Outlives the connection.
   std::unique_ptr<SQLite::Database> connection_;
   std::map<std::string, Statement, std::less<>> cached_;
 };
@@ -323,7 +333,6 @@ class Database {
 /// rolls back unless committed.
 class Transaction {
  public:
-  OpenFiles files_;                  // Outlives the connection.
   /// @throws SqliteError (IsBusy) if another connection keeps the gate or lock.
   explicit Transaction(Database& database);
   ~Transaction();
