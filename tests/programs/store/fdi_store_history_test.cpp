@@ -478,7 +478,7 @@ TEST_F(FdiStoreHistoryTest, DoctorFindsASoundDirectorySound) {
   EXPECT_EQ(report["sound"], true);
   ASSERT_EQ(report["databases"].size(), 3U);
   EXPECT_EQ(report["databases"][0]["present"], false);
-  EXPECT_EQ(report["databases"][2]["version"], 17);
+  EXPECT_EQ(report["databases"][2]["version"], 18);
   EXPECT_EQ(report["databases"][2]["figures"]["open_episodes"], 1);
   EXPECT_EQ(report["databases"][2]["figures"]["unsent_events"], 2);
 }
@@ -541,7 +541,7 @@ TEST_F(FdiStoreHistoryTest, DoctorFindsADamagedIdInTheOutbox) {
     database.Run(
         "INSERT INTO episode_event (event_id, episode_id, kind, stamp_ns, "
         "recorded_ns) VALUES (99, 'zzzzzzzzzzzzzzzz', 'DETECTED', 1, 1)");
-    database.Run("INSERT INTO event_outbox VALUES (99)");
+    database.Run("INSERT INTO event_outbox (event_id) VALUES (99)");
     transaction.Commit();
   }
 
