@@ -6,6 +6,9 @@
 #include <exception>
 #include <utility>
 
+#include <malloc.h>
+
+#include "base/error.h"
 #include "base/printable.h"
 #include "diagnosis/loop/loop_watch.h"
 #include "diagnosis/model/quality_count.h"
@@ -428,13 +431,20 @@ void Pipeline::Count(Valve& valve, const Sample& sample,
 
 void Pipeline::Publish(const Valve& valve, const ValveOutcome& outcome) {
   const std::string& id = valve.monitor.id();
-  if (decisions_.Publish(id, outcome.models, outcome.verdict)) {
-    counters_.Add(Counter::kDecisions);
-    return;
+  std::string reason = "refused";
+  try {
+    if (decisions_.Publish(id, outcome.models, outcome.verdict)) {
+      counters_.Add(Counter::kDecisions);
+      return;
+    }
+  } catch (const DataError& error) {
+    reason = error.what();
   }
   counters_.Add(Counter::kDecisionsUnsent);
-  log_.Report(LogId::kUnsent, "publication_failed",
-              [&id] { return "topic=DecisionVector valve=" + LogValue(id); });
+  log_.Report(LogId::kUnsent, "publication_failed", [&] {
+    return "topic=DecisionVector valve=" + LogValue(id) +
+           " reason=" + LogValue(reason);
+  });
 }
 
 void Pipeline::FlushDecisions() {
@@ -527,7 +537,10 @@ void Pipeline::PublishLast() {
     // A zero stamp: a model set was adopted after the last sample.
     if (monitor.seen() && CountsAsTime(monitor.verdict()) &&
         monitor.verdict().stamp_ns != 0) {
-      decisions_.PublishLast(monitor.id(), monitor.models(), monitor.verdict());
+      Guarded(counters_, log_, "last_decision", [&] {
+        decisions_.PublishLast(monitor.id(), monitor.models(),
+                               monitor.verdict());
+      });
     }
   }
 }

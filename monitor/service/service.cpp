@@ -292,9 +292,10 @@ void Service::Start() {
 // Publishes what an earlier session committed but may not have sent.
 void Service::ResendEvents() {
   for (const FaultEvent& event : history_.UnsentEvents()) {
-    if (after_commit_.Publish(event, true)) {
+    const bool sent = after_commit_.Publish(event, true);
+    counters_.Add(sent ? Counter::kEventsResent : Counter::kEventsUnsent);
+    if (sent) {
       pipeline_.MarkPublished(event);
-      counters_.Add(Counter::kEventsResent);
     }
   }
 }

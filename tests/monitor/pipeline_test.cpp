@@ -186,6 +186,19 @@ TEST_F(PipelineTest, NoThreadStartsBeforeStart) {
   EXPECT_EQ(ThreadCount(), before);
 }
 
+TEST_F(PipelineTest, AVectorThatCannotBeSentCostsNothingElse) {
+  bus_.unsendable = "V1";
+  Start();
+  Feed("V1", 0, 3);
+  Feed("V2", 0, 3);
+  pipeline_->Stop();
+
+  EXPECT_EQ(bus_.decisions.size(), 3U);
+  EXPECT_EQ(counters_[Counter::kDecisionsUnsent], 3U);
+  EXPECT_THAT(lines_, testing::Contains(testing::HasSubstr(
+                          "valve=V1 reason=\"valve_id cannot be sent\"")));
+}
+
 // Runs that cannot even be refused: not a std::exception.
 class BrokenRuns : public FakeRuns {
  public:
