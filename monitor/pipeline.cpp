@@ -502,7 +502,26 @@ void Pipeline::CheckSilentValves(TimePoint now) {
     ExpireRecovery();
   }
   TakeCheckpoint(true);
+  ForgetEnded(now, stale_timeout);
   UpdateCensus();
+}
+
+// Gives back the memory of unknown valves whose publishers ended their streams
+// and did not come back. A valve that merely fell silent stays: it may be one
+// that is there and is not heard.
+void Pipeline::ForgetEnded(TimePoint now, std::chrono::milliseconds age) {
+  std::vector<Valve*> gone;
+  for (const std::unique_ptr<Valve>& valve : valves_) {
+    if (IsEvictable(*valve) && valve->monitor.EndedSince(now) > age) {
+      gone.push_back(valve.get());
+    }
+  }
+  for (Valve* const valve : gone) {
+    Evict(*valve);
+  }
+  if (!gone.empty()) {
+    malloc_trim(0);  // The library keeps what is freed in small pieces.
+  }
 }
 
 void Pipeline::ExpireRecovery() {

@@ -28,7 +28,8 @@ struct PipelineOptions {
   int max_valves{2000};
   /// An unknown valve, one without a model set assigned by id and without an
   /// episode left by the last session, may be evicted in favour of another
-  /// valve after this silence, or at once after its publisher ended the stream.
+  /// valve after this silence, or at once after its publisher ended the stream;
+  /// in favour of nobody, stale_timeout_s after that end.
   std::chrono::milliseconds place_timeout{60'000};
   std::string valve_glob{"*"};
   TraceOptions trace;
@@ -177,6 +178,7 @@ class Pipeline {
   void CheckSilentValves(TimePoint now);
   void ExpireRecovery();
   void UpdateCensus();
+  void ForgetEnded(TimePoint now, std::chrono::milliseconds age);
   void PublishLast();
   void TakeCheckpoint(bool urgent);
   template <typename Call>

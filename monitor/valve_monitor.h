@@ -98,6 +98,10 @@ class ValveMonitor {
     return ended_ ? TimePoint::duration::max() : now - received_;
   }
 
+  /// Time since the last sample of a stream that has ended; 0: it has not.
+  TimePoint::duration EndedSince(TimePoint now) const {
+    return ended_ ? now - received_ : TimePoint::duration::zero();
+  }
   const std::string& id() const { return id_; }
   /// Also that of the audit; null: nothing judges the valve.
   const ModelSet* models() const { return models_.get(); }

@@ -135,6 +135,25 @@ TEST_F(PipelineTest, TheRunOfAnEvictedValveEndsAndItsLastVectorGoes) {
   EXPECT_THAT(bus_.removed, testing::ElementsAre(ValveName(0), ValveName(1)));
 }
 
+TEST_F(PipelineTest, AnUnknownValveThatEndedIsForgottenAndASilentOneIsNot) {
+  assigned_ = {"known"};
+  Start();
+  const auto now = std::chrono::steady_clock::now();
+  for (const auto& valve : {"ended", "known", "silent"}) {
+    pipeline_->OnSample(valve, PlantSample(0), 1, now);
+  }
+  pipeline_->OnStreamEnded("ended", 1);
+  pipeline_->OnStreamEnded("known", 1);
+  pipeline_->Poll(now + std::chrono::minutes(59));
+  EXPECT_EQ(pipeline_->valve_names().size(), 3U);
+  pipeline_->Poll(now + std::chrono::minutes(61));
+
+  EXPECT_THAT(pipeline_->valve_names(),
+              testing::ElementsAre("known", "silent"));
+  EXPECT_EQ(pipeline_->census().valves, 2U);
+  Stop();
+}
+
 // Stamps that jump, and epochs that flip, with every sample.
 TEST_F(PipelineTest, WhatMakesADiagnosisBeginAnewIsLimited) {
   Start();
