@@ -364,8 +364,9 @@ void Pipeline::OnSample(std::string_view valve_id, const Sample& sample,
     });
     return;
   }
-  const ValveOutcome outcome =
+  ValveOutcome outcome =
       valve->monitor.Step(sample, writer, received, journal_);
+  outcome.contested = valve->monitor.Contested(received);
   Count(*valve, sample, outcome);
   // A sample out of order did not affect the engine, so its verdict is that of
   // an earlier sample, which is on the bus already.
@@ -501,9 +502,9 @@ void Pipeline::CheckSilentValves(TimePoint now) {
     recovery_deadline_.reset();
     ExpireRecovery();
   }
-  TakeCheckpoint(true);
   ForgetEnded(now, stale_timeout);
-  UpdateCensus();
+  TakeCheckpoint(true);
+  UpdateCensus(now);
 }
 
 // Gives back the memory of unknown valves whose publishers ended their streams
@@ -534,7 +535,7 @@ void Pipeline::ExpireRecovery() {
   }
 }
 
-void Pipeline::UpdateCensus() {
+void Pipeline::UpdateCensus(TimePoint now) {
   ValveCensus census;
   for (const std::unique_ptr<Valve>& valve : valves_) {
     const ValveMonitor& monitor = valve->monitor;
@@ -544,6 +545,18 @@ void Pipeline::UpdateCensus() {
     census.ended += monitor.ended() ? 1 : 0;
     census.open_episodes += monitor.episode_open() ? 1 : 0;
     census.trace_bytes += monitor.trace_bytes();
+    if (monitor.Contested(now) && census.contested++ == 0) {
+      census.contested_valve = monitor.id();
+    }
+  }
+  if (census.contested > 0) {
+    log_.Report(
+        LogId::kTwoPublishers, "two_publishers",
+        [&census] {
+          return "valves=" + std::to_string(census.contested) +
+                 " first=" + LogValue(census.contested_valve);
+        },
+        LogLevel::kError);
   }
   // Counted without the lock: readers wait for the copy, not for all valves.
   const MutexLock lock(mutex_);

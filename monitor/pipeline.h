@@ -65,6 +65,8 @@ struct ValveCensus {
   std::uint64_t ended{0};
   std::uint64_t open_episodes{0};
   std::uint64_t trace_bytes{0};
+  std::uint64_t contested{0};   ///< ValveMonitor::Contested();
+  std::string contested_valve;  ///< one of them.
 };
 
 /// From samples to decisions, events and records. The thread that takes samples
@@ -176,9 +178,9 @@ class Pipeline {
   void Recover(const std::vector<OpenEpisode>& episodes);
   void AdoptNextResolver();
   void CheckSilentValves(TimePoint now);
-  void ExpireRecovery();
-  void UpdateCensus();
   void ForgetEnded(TimePoint now, std::chrono::milliseconds age);
+  void ExpireRecovery();
+  void UpdateCensus(TimePoint now);
   void PublishLast();
   void TakeCheckpoint(bool urgent);
   template <typename Call>

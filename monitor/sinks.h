@@ -157,7 +157,8 @@ struct ValveOutcome {
   /// Signals that the model set needs and the sample lacks. Their channels
   /// abstain; if no channel is left, the quality is BAD_INPUT.
   SignalMask missing{0};
-  double period_s{0.0};  ///< The time that the sample stands for.
+  double period_s{0.0};   ///< The time that the sample stands for.
+  bool contested{false};  ///< See ValveMonitor::Contested().
 };
 
 /// Why a valve sends nothing.

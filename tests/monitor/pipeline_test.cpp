@@ -218,6 +218,53 @@ TEST_F(PipelineTest, AVectorThatCannotBeSentCostsNothingElse) {
                           "valve=V1 reason=\"valve_id cannot be sent\"")));
 }
 
+// A copied tag: the healthy readings of another valve under the id of one with
+// a fault. The one that is not judged goes on sending.
+TEST_F(PipelineTest, AValveThatTwoPublishersSendIsContested) {
+  Start();
+  const auto start = std::chrono::steady_clock::now();
+  const auto at = [start](std::uint64_t k) {
+    return start + std::chrono::seconds(k);
+  };
+  for (const std::string valve : {"V1", "bare"}) {
+    for (std::uint64_t k = 0; k < 20; ++k) {
+      pipeline_->OnSample(valve, PlantSample(k, kF7Offset), 1, at(k));
+      if (k >= 10) {
+        Sample old = PlantSample(k, 0.0, 2);
+        old.stamp_ns -= 7 * 86'400'000'000'000;  // Last week's record.
+        pipeline_->OnSample(valve, old, 2, at(k));
+      }
+    }
+  }
+  pipeline_->Poll(at(20));
+  EXPECT_EQ(pipeline_->census().contested, 2U);
+  EXPECT_EQ(pipeline_->census().contested_valve, "V1");
+  EXPECT_THAT(lines_, testing::Contains(testing::HasSubstr(
+                          "two_publishers id=M118 valves=2 first=V1")));
+  // The publisher that counts is silent, the other one does not replace it.
+  for (std::uint64_t k = 20; k < 30; ++k) {
+    pipeline_->OnSample("V1", PlantSample(k, kF7Offset), 1, at(k));
+  }
+  pipeline_->Poll(at(30));
+  EXPECT_GE(pipeline_->census().stale, 1U);
+  EXPECT_EQ(pipeline_->census().contested, 2U);
+  pipeline_->Poll(at(120));
+  EXPECT_EQ(pipeline_->census().contested, 0U);
+  Stop();
+}
+
+// The last samples of a publisher that was started anew.
+TEST_F(PipelineTest, APublisherThatIsRestartedContestsNothing) {
+  Start();
+  Feed("V1", 0, 20);
+  pipeline_->OnSample("V1", PlantSample(21, 0.0, 2), 2);
+  Feed("V1", 22, 25);
+  pipeline_->OnSample("V1", PlantSample(26, 0.0, 2), 2);
+  pipeline_->Poll(std::chrono::steady_clock::now() + std::chrono::seconds(1));
+  EXPECT_EQ(pipeline_->census().contested, 0U);
+  Stop();
+}
+
 // Runs that cannot even be refused: not a std::exception.
 class BrokenRuns : public FakeRuns {
  public:
