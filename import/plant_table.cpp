@@ -379,8 +379,15 @@ RawTable ReadToml(TomlReader& file, PlantTable& table) {
   return raw;
 }
 
+// Whether a line that begins with # may be meant as a row, of a name like #12.
+bool MayBeRow(std::string_view line, char separator, std::size_t columns) {
+  CsvCells cells(separator);
+  return columns > 1 && cells.TakeLine(line) && cells.cells().size() >= columns;
+}
+
 // The rows of a CSV. A line that begins with # is a comment, unless a quoted
-// cell is open. The separator is found out from the first fifty lines, the
+// cell is open; one with the cells of a row is left out as a row with an error.
+// The separator is found out from the first fifty lines, the
 // first row is the header, and rows with the name * are defaults: of the group
 // that they name, or of all.
 RawTable ReadCells(const std::string& text, const PlantTable& table) {
@@ -396,11 +403,13 @@ RawTable ReadCells(const std::string& text, const PlantTable& table) {
       first.push_back(line);
     }
   }
-  CsvCells reader(FindSeparator(first));
+  const char separator = FindSeparator(first);
+  CsvCells reader(separator);
   std::vector<std::string> keys;
   RawTable raw;
   for (std::size_t i = 0; i < lines.size(); ++i) {
-    if ((!reader.open() && lines[i].starts_with('#')) ||
+    const bool comment = !reader.open() && lines[i].starts_with('#');
+    if ((comment && !MayBeRow(lines[i], separator, keys.size())) ||
         !reader.TakeLine(lines[i]) || reader.blank()) {
       continue;
     }
@@ -421,6 +430,11 @@ RawTable ReadCells(const std::string& text, const PlantTable& table) {
       row.error = "the row has " + std::to_string(reader.cells().size()) +
                   " cells, the header " + std::to_string(keys.size()) +
                   "; put text with separators in quotes";
+    }
+    if (comment) {
+      row.error =
+          "it begins with #, as a comment does, and has the cells of a row: "
+          "put a name with # in quotes, or leave the row out";
     }
     for (std::size_t c = 0; c < std::min(keys.size(), reader.cells().size());
          ++c) {

@@ -7,6 +7,7 @@
 #include "base/error.h"
 #include "base/headroom.h"
 #include "monitor/service/service.h"
+#include "monitor/service/start_notice.h"
 #include "monitor/throttled_log.h"
 #include "programs/monitor/console.h"
 #include "programs/monitor/http_option.h"
@@ -88,6 +89,9 @@ int Run(const RunArguments& arguments, const report::Context& context) {
       options.parts.push_back(part);
     }
   }
+  StartNotice starting(NotifyManager);
+  starting.Start();
+  options.on_ready = [&starting] { starting.Stop(); };
   Service service(options, limited);
   return service.Run(signals);
 }

@@ -8,6 +8,7 @@
 #include "storage/database/locks.h"
 #include "storage/runs/run_recorder.h"
 #include "tests/programs/store/store_program_fixture.h"
+#include "tests/storage/small_disk.h"
 
 namespace fdi::storage {
 namespace {
@@ -348,6 +349,54 @@ TEST_F(FdiStoreHistoryTest, DoctorSaysWhatIsRecordedElsewhere) {
   EXPECT_EQ(Store("doctor").code, 0);
 }
 
+TEST_F(FdiStoreHistoryTest, AFullDiskCanBeReadAndPruned) {
+  const SmallDisk disk(directory_.path() / "disk", "4M");
+  if (!disk.mounted()) {
+    GTEST_SKIP() << "mounting a file system is not permitted";
+  }
+  std::filesystem::copy_file(path_, disk.path() / "history.db");
+  {
+    RunRecorder recorder(disk.path() / "runs.db");
+    for (int r = 0; r < 3; ++r) {
+      NewRun run;
+      run.valve_id = "LV-1";
+      run.start_ns = kDetected + r * 100'000 * kSecond;
+      const auto key = recorder.Begin(run);
+      for (int k = 0; k < 20'000; ++k) {
+        Sample sample = Instant(k).sample;
+        sample.stamp_ns = run.start_ns + k * kSecond;
+        recorder.Append(key, LabelledSample{sample, {}});
+      }
+      recorder.End(key);
+    }
+    recorder.Close();
+  }
+  const auto before = std::filesystem::file_size(disk.path() / "runs.db");
+  ASSERT_GT(before, 400'000U);
+  disk.Fill();
+  data_ = "disk";
+
+  for (const char* call :
+       {"history list", "history show last", "runs list", "doctor",
+        "history export last -o e.csv", "backup elsewhere"}) {
+    const Outcome outcome = Store(call);
+    EXPECT_EQ(outcome.code, 0) << call << ": " << outcome.err;
+  }
+  for (const char* call : {"history ack last --by anna",
+                           "history shelve LV-1 --for 8h --by anna"}) {
+    const Outcome refused = Store(call);
+    EXPECT_EQ(refused.code, 3) << call;
+    EXPECT_THAT(refused.err, HasSubstr("the disk is full: 0 bytes are free"));
+  }
+  const Outcome pruned = Store("prune --runs-size 200kB");
+  EXPECT_EQ(pruned.code, 0) << pruned.err;
+  EXPECT_LT(std::filesystem::file_size(disk.path() / "runs.db"), before / 2);
+  EXPECT_EQ(Store("runs list").code, 0);
+  const Outcome acked = Store("history ack last --by anna");
+  EXPECT_EQ(acked.code, 0) << acked.err;
+  EXPECT_EQ(Store("doctor").code, 0);
+}
+
 TEST_F(FdiStoreHistoryTest, SlipsOfThePenAreSuggested) {
   EXPECT_THAT(Store("history lsit").err, HasSubstr("did you mean 'list'"));
   EXPECT_THAT(Store("hsitory list").err, HasSubstr("did you mean 'history'"));
@@ -434,7 +483,7 @@ TEST_F(FdiStoreHistoryTest, DoctorFindsASoundDirectorySound) {
   EXPECT_EQ(report["sound"], true);
   ASSERT_EQ(report["databases"].size(), 3U);
   EXPECT_EQ(report["databases"][0]["present"], false);
-  EXPECT_EQ(report["databases"][2]["version"], 17);
+  EXPECT_EQ(report["databases"][2]["version"], 18);
   EXPECT_EQ(report["databases"][2]["figures"]["open_episodes"], 1);
   EXPECT_EQ(report["databases"][2]["figures"]["unsent_events"], 2);
 }
@@ -497,7 +546,7 @@ TEST_F(FdiStoreHistoryTest, DoctorFindsADamagedIdInTheOutbox) {
     database.Run(
         "INSERT INTO episode_event (event_id, episode_id, kind, stamp_ns, "
         "recorded_ns) VALUES (99, 'zzzzzzzzzzzzzzzz', 'DETECTED', 1, 1)");
-    database.Run("INSERT INTO event_outbox VALUES (99)");
+    database.Run("INSERT INTO event_outbox (event_id) VALUES (99)");
     transaction.Commit();
   }
 
