@@ -13,6 +13,7 @@
 #include "diagnosis/model/fault_catalogue.h"
 #include "import/elapsed.h"
 #include "import/layout.h"
+#include "import/mode_word.h"
 #include "import/tag_map.h"
 
 namespace fdi::importer {

@@ -388,10 +388,6 @@ CsvTable ReadCsv(const TextLines& lines, const CsvOptions& options);
 CsvTable ReadCsvFile(const std::filesystem::path& path,
                      CsvOptions options = {});
 
-/// The mode that a controller's word means: those of kValveModeNames, AUT, CAS,
-/// MAN, ...; nothing for other words and for numbers.
-std::optional<ValveMode> ModeOfWord(std::string_view word);
-
 /// The form of a time column, by its name and its first cell, a number.
 TimeUnit TimeUnitOf(std::string_view name, double first);
 

@@ -34,7 +34,7 @@ walk() {
     <<<"$text" | grep -v '^--help' | sed "s/^/$*|/" || true
 }
 
-for program in fdi-store fdi-trainer fdi-monitor fdi-simulator; do
+for program in fdi-store fdi-trainer fdi-monitor fdi-simulator fdi-gateway; do
   walk "$program"
 done >"$folder/surface"
 
