@@ -13,8 +13,9 @@ from a bank of fuzzy models, and keeps an evidence file of every fault episode
 in SQLite.
 
 fdi-monitor diagnoses the valves on the bus, fdi-simulator simulates or replays
-valves, fdi-trainer makes the models from recorded runs, and fdi-store looks
-after runs, models, valves and the fault history.")
+valves, fdi-trainer makes the models from recorded runs, fdi-store looks after
+runs, models, valves and the fault history, and fdi-gateway brings readings of a
+plant in and findings out.")
 set(CPACK_STRIP_FILES ON)
 set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
 set(CPACK_PRE_BUILD_SCRIPTS ${FDI_PACKAGING}/permissions.cmake)

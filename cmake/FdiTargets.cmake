@@ -101,7 +101,7 @@ function(fdi_library name)
   fdi_headers(${name} PUBLIC)
   fdi_unity(${name} 16)
   if(name MATCHES
-     "_(program|service|console|history|import|campaign|report|report_models|plot)$" OR
+     "_(program|service|console|gateway|history|import|campaign|report|report_models|plot)$" OR
      name MATCHES "_(planner|planner_live|plant|plant_onboarding)$")
     fdi_quick_build(${name})
   endif()

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Installs the Debian packages that are missing and builds Release.
 # Usage: cmake/prepare.sh [programs|tests|package [DEBIAN_PACKAGE...]]
-#   programs   the four programs and the live page (default)
+#   programs   the five programs and the live page (default)
 #   tests      these, the tests, the benchmarks and the studies
 #   package    the programs, and the Debian package in build/package/
 # Installs further packages of Debian, too, if they are named.
@@ -16,13 +16,13 @@ packages=(
   libfastrtps-dev libfastcdr-dev fastddsgen
   libeigen3-dev libsundials-dev
   libsqlite3-dev libsqlitecpp-dev sqlite3 zlib1g-dev libssl-dev openssl libpq-dev
-  libcpp-httplib-dev libsystemd-dev
+  libcpp-httplib-dev libsystemd-dev libmosquitto-dev
   libcli11-dev libtomlplusplus-dev libspdlog-dev nlohmann-json3-dev libhowardhinnant-date-dev
   gnuplot-nox
 )
 for_package=(dpkg-dev file gzip help2man)
 for_tests=(libgtest-dev libgmock-dev libbenchmark-dev cyclonedds-dev cyclonedds-tools chromium
-  libmodbus-dev postgresql nginx make procps iproute2)
+  libmodbus-dev mosquitto mosquitto-clients postgresql nginx make procps iproute2)
 testing=OFF
 packaging=OFF
 case $purpose in

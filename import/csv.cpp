@@ -13,6 +13,7 @@
 #include "diagnosis/model/fault_catalogue.h"
 #include "import/elapsed.h"
 #include "import/layout.h"
+#include "import/mode_word.h"
 #include "import/tag_map.h"
 
 namespace fdi::importer {
@@ -862,21 +863,28 @@ double CsvReader::Number(std::size_t column) const {
   return *value;
 }
 
-ValveMode CsvReader::Mode() const {
-  const std::string_view cell = record_.cells()[*mode_column_];
-  if (const std::optional<ValveMode> mode = ParseValveMode(cell)) {
-    return *mode;
+std::optional<ValveMode> ModeOfWord(std::string_view word) {
+  if (const std::optional<ValveMode> mode = ParseValveMode(word)) {
+    return mode;
   }
   // In cascade the controller acts, too; what tracks or is local does not.
-  if (IsOneOf(cell, {"aut", "a", "cas", "cascade", "rcas", "c"})) {
+  if (IsOneOf(word, {"aut", "a", "cas", "cascade", "rcas", "c"})) {
     return ValveMode::kAuto;
   }
-  if (IsOneOf(cell, {"man", "m", "iman", "imanual", "lo", "rout", "track",
+  if (IsOneOf(word, {"man", "m", "iman", "imanual", "lo", "rout", "track",
                      "trk", "local"})) {
     return ValveMode::kManual;
   }
-  if (IsOneOf(cell, {"oos", "o/s", "off"})) {
+  if (IsOneOf(word, {"oos", "o/s", "off"})) {
     return ValveMode::kOutOfService;
+  }
+  return std::nullopt;
+}
+
+ValveMode CsvReader::Mode() const {
+  const std::string_view cell = record_.cells()[*mode_column_];
+  if (const std::optional<ValveMode> mode = ModeOfWord(cell)) {
+    return *mode;
   }
   // Numbers of modes differ between systems, except in a column of this name.
   const std::string& name = names_[*mode_column_];

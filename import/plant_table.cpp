@@ -6,6 +6,7 @@
 
 #include "base/csv_cells.h"
 #include "base/error.h"
+#include "base/time_text.h"
 #include "base/toml_reader.h"
 #include "import/tag_map.h"
 
@@ -21,9 +22,9 @@ using NamedCells = std::map<std::string, std::string>;
 
 constexpr std::array<std::string_view, kLoopTagCount> kTagNames = {
     "op", "pv", "sp", "mode", "x", "f", "p1", "p2", "t1"};
-constexpr std::string_view kOtherKeys[] = {"name",  "sense", "service", "type",
-                                           "grade", "group", "file",    "from",
-                                           "to",    "auto",  "manual"};
+constexpr std::string_view kOtherKeys[] = {
+    "name", "sense", "service", "type",   "grade",   "group", "file",  "from",
+    "to",   "auto",  "manual",  "report", "max_age", "topic", "value", "time"};
 // How rows without a model set are told apart from a forgotten type.
 constexpr std::string_view kDataOnly = "data only";
 
@@ -116,6 +117,7 @@ class RowReader {
     row_.to = Cell("to");
     row_.auto_words = Words(Cell("auto"));
     row_.manual_words = Words(Cell("manual"));
+    ReadLive();
     return std::move(row_);
   }
 
@@ -149,11 +151,16 @@ class RowReader {
 
   // Replaces {loop} and {group}. The search goes on behind what was filled in,
   // so a brace in a name is not taken for a placeholder.
-  std::string Filled(std::string text) {
+  // @param live leaves {signal} and {tag}, which differ from tag to tag.
+  std::string Filled(std::string text, bool live = false) {
     std::size_t begin = 0;
     while ((begin = text.find('{', begin)) != std::string::npos) {
       const std::size_t end = text.find('}', begin);
       const std::string key = text.substr(begin + 1, end - begin - 1);
+      if (live && (key == "signal" || key == "tag")) {
+        begin = end;
+        continue;
+      }
       if (end == std::string::npos || (key != "loop" && key != "group")) {
         Refuse(Quoted(text) +
                " has a placeholder other than {loop} and "
@@ -238,6 +245,26 @@ class RowReader {
                "3");
       }
     }
+  }
+
+  // How the tags come while the plant runs.
+  void ReadLive() {
+    row_.report = Lower(Cell("report"));
+    if (!row_.report.empty() && row_.report != "exception" &&
+        row_.report != "periodic") {
+      Refuse("report is " + Quoted(row_.report) +
+             "; type exception or periodic");
+    }
+    if (const std::string age = Cell("max_age"); !age.empty()) {
+      try {
+        row_.max_age_s = 1e-9 * static_cast<double>(ParseDuration(age));
+      } catch (const ConfigError& error) {
+        Refuse("max_age: " + std::string(error.what()));
+      }
+    }
+    row_.topic = Filled(Cell("topic"), true);
+    row_.value_key = Filled(Cell("value"), true);
+    row_.time_key = Filled(Cell("time"), true);
   }
 
   const NamedCells& own_;

@@ -44,6 +44,12 @@ struct PlantRow {
   std::string to{};
   std::vector<std::string> auto_words{};
   std::vector<std::string> manual_words{};
+  std::string report{};   ///< "exception" or "periodic"; empty: not said.
+  double max_age_s{0.0};  ///< With periodic; 0: not said.
+  /// MQTT; {signal} is the key of a tag ("op"), {tag} the tag itself.
+  std::string topic{};
+  std::string value_key{};  ///< In the JSON of a payload.
+  std::string time_key{};
   std::string error{};  ///< What is wrong with the row; empty: nothing.
 
   const TagCell& operator[](LoopTag tag) const {

@@ -14,14 +14,14 @@ fail() {
   exit 1
 }
 cmake --preset release -B "$core" -DBUILD_TESTING=OFF -DFDI_PACKAGE=OFF \
-  -DFDI_BENCH=OFF -DFDI_CONSOLE=OFF -DFDI_PLANNER=OFF -DFDI_PLANT=OFF >"$core/log" 2>&1 ||
+  -DFDI_BENCH=OFF -DFDI_CONSOLE=OFF -DFDI_GATEWAY=OFF -DFDI_PLANNER=OFF -DFDI_PLANT=OFF >"$core/log" 2>&1 ||
   fail "$(cat "$core/log")"
 
 mkdir -p "$core/bin"
 make_program() {  # NAME
   local library
   ninja -C "$core" -t commands "bin/$1" | sed "s#$PWD/##g" >"$core/$1.sh"
-  ! grep -E '(^| |/)(console|planner|plant)/' "$core/$1.sh" || fail "$1 needs these"
+  ! grep -E '(^| |/)(console|gateway|planner|plant)/' "$core/$1.sh" || fail "$1 needs these"
   for library in $(grep -oE '[a-z_/]+/libfdi_[a-z_]+\.a' "$core/$1.sh" | sort -u); do
     [[ $library == programs/* ]] || ln -sf "$build/$library" "$core/$library"
   done

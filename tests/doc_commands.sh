@@ -36,7 +36,7 @@ sub walk {
   }
 }
 my @programs = grep { -x "$bin/$_" }
-  qw(fdi-store fdi-trainer fdi-monitor fdi-simulator fdi-study);
+  qw(fdi-store fdi-trainer fdi-monitor fdi-simulator fdi-gateway fdi-study);
 walk($_) for @programs;
 my $program = join '|', @programs;
 

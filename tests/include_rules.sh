@@ -19,22 +19,24 @@ forbid() {  # WHERE(regex of file) WHAT(regex of include) WHY
   fi
 }
 
-forbid '^(base|diagnosis|storage|import|report|simulator|trainer|monitor|console|planner|plant|programs)/' '(fastdds|fastrtps|fastcdr)/' \
+forbid '^(base|diagnosis|storage|import|report|simulator|trainer|monitor|console|gateway|planner|plant|programs)/' '(fastdds|fastrtps|fastcdr)/' \
   'Fast DDS belongs to idl'
-forbid '^(base|diagnosis|idl|import|report|simulator|trainer|monitor|console|planner|plant|programs)/' '(sqlite3\.h|SQLiteCpp/)' \
+forbid '^(base|diagnosis|idl|import|report|simulator|trainer|monitor|console|gateway|planner|plant|programs)/' '(sqlite3\.h|SQLiteCpp/)' \
   'SQLite belongs to storage'
-forbid '^(base|diagnosis|idl|import|report|simulator|trainer|monitor|console|planner|storage|programs)/' 'libpq' \
+forbid '^(base|diagnosis|idl|import|report|simulator|trainer|monitor|console|gateway|planner|storage|programs)/' 'libpq' \
   'PostgreSQL belongs to plant'
-forbid '^(base|diagnosis|idl|import|report|storage|trainer|monitor|console|planner|plant|programs)/' '(cvode|nvector|sun[a-z]+)/' \
+forbid '^(base|diagnosis|idl|import|report|storage|trainer|monitor|console|gateway|planner|plant|programs)/' '(cvode|nvector|sun[a-z]+)/' \
   'SUNDIALS belongs to simulator'
 forbid '^((diagnosis|idl|simulator|trainer|monitor)/[^/]+$|(base|plant|storage)/)' '(CLI/|spdlog/|nlohmann/)' \
   'command line, logging and JSON belong to the programs'
-forbid '^(diagnosis|idl|import|simulator|storage|trainer|monitor|console|planner|plant|programs)/' 'toml\+\+' \
+forbid '^(base|diagnosis|idl|import|report|simulator|storage|trainer|monitor|console|planner|plant|programs)/' 'mosquitto' \
+  'MQTT belongs to gateway'
+forbid '^(diagnosis|idl|import|simulator|storage|trainer|monitor|console|gateway|planner|plant|programs)/' 'toml\+\+' \
   'TOML belongs to base and to the options'
-forbid '^(diagnosis|idl|import|report|simulator|storage|trainer|monitor|console|planner|plant|programs|bench)/' 'date/' \
+forbid '^(diagnosis|idl|import|report|simulator|storage|trainer|monitor|console|gateway|planner|plant|programs|bench)/' 'date/' \
   'time zones belong to base'
-forbid '^((base|diagnosis|idl|import|report|simulator|trainer|storage|plant|programs)/|planner/(live/|[^/]+$))' 'httplib\.h' \
+forbid '^((base|diagnosis|idl|import|report|simulator|trainer|storage|gateway|plant|programs)/|planner/(live/|[^/]+$))' 'httplib\.h' \
   'HTTP belongs to the monitor and to the page, with what planner/page adds to it'
-forbid '^(diagnosis|idl|import|simulator|storage|trainer|monitor|console|planner|plant|programs|bench)/' '(shared_)?mutex>' \
+forbid '^(diagnosis|idl|import|simulator|storage|trainer|monitor|console|gateway|planner|plant|programs|bench)/' '(shared_)?mutex>' \
   'mutexes are those of base/mutex.h, which clang checks'
 exit "$failed"

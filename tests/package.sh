@@ -45,7 +45,8 @@ for file in etc/default/fdi-monitor usr/lib/systemd/system/fdi-monitor.service \
   usr/share/doc/fdi/{copyright,changelog.gz,changelog.Debian.gz,README.md} \
   usr/bin/fdi-keys usr/share/man/man1/fdi-keys.1.gz \
   usr/share/doc/fdi/docs/tutorial.md usr/share/fdi/console/index.html \
-  usr/share/fdi/nginx/fdi.conf; do
+  usr/share/fdi/nginx/fdi.conf \
+  usr/lib/systemd/system/fdi-gateway@.service usr/share/fdi/opcua/client.mjs; do
   [ -s "$root/$file" ] || fail "$file is missing"
 done
 grep -q '^ExecStart=/usr/bin/fdi-monitor run' \
@@ -80,7 +81,7 @@ pages() {  # PROGRAM WORDS...
 gzip -dc "$root/usr/share/man/man1/fdi-monitor-run.1.gz" |
   sed -E 's/\\f[A-Z]|\\[,/]//g' | grep >/dev/null -F '[=[ADDRESS:]PORT]' || fail "fdi-monitor-run(1) cuts --http at a colon"
 version=$(dpkg-deb --field "$package" Version)
-for program in fdi-monitor fdi-simulator fdi-store fdi-trainer; do
+for program in fdi-monitor fdi-simulator fdi-store fdi-trainer fdi-gateway; do
   "$root/usr/bin/$program" --version | grep >/dev/null "^$program ${version%-*}+" ||
     fail "$program has another version than $version"
   bash -n "$root/usr/share/bash-completion/completions/$program"

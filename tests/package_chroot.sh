@@ -42,7 +42,7 @@ quietly within apt-get install -y -q man-db bash
 within getent passwd fdi >/dev/null || fail "no user fdi"
 [ ! -e "$root/etc/systemd/system/multi-user.target.wants/fdi-monitor.service" ] ||
   fail "the service is enabled"
-for program in fdi-monitor fdi-simulator fdi-store fdi-trainer; do
+for program in fdi-monitor fdi-simulator fdi-store fdi-trainer fdi-gateway; do
   within $program --version
   quietly within man $program
 done

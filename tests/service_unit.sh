@@ -1,6 +1,8 @@
 #!/usr/bin/env bash
-# Checks the built unit file: known keys only, a limit of memory, no call
-# forbidden that the program makes, and an exposure of at most 2 of 10. Usage: service_unit.sh UNIT PROGRAM      77 without systemd-analyze.
+# Checks a built unit file: known keys only, a limit of memory, no call
+# forbidden that the program makes, and an exposure of at most 2 of 10.
+# Usage: service_unit.sh UNIT PROGRAM [INSTANCE]
+# 77 without systemd-analyze.
 set -euo pipefail
 unit=$1
 program=$2
@@ -8,11 +10,12 @@ command -v systemd-analyze >/dev/null || exit 77
 
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
-checked=$folder/fdi-monitor.service
+name=$(basename "$unit")
+checked=$folder/${name/@./@${3:-}.}
 sed "s#^ExecStart=[^ ]*#ExecStart=$program#" "$unit" >"$checked"
 
 complaints=$(systemd-analyze verify --man=no "$checked" 2>&1 |
-  grep fdi-monitor || true)
+  grep "${name%%[@.]*}" || true)
 if [ -n "$complaints" ]; then
   echo "$complaints"
   exit 1

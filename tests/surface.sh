@@ -56,7 +56,7 @@ walk() {
   options "$("$bin/$1" "${@:2}" --help-all)" | sed "s/^/$*|/"
 }
 
-for program in fdi-store fdi-trainer fdi-monitor fdi-simulator; do
+for program in fdi-store fdi-trainer fdi-monitor fdi-simulator fdi-gateway; do
   walk "$program"
 done >"$folder/surface"
 

@@ -1,5 +1,5 @@
-# bash completion of fdi-monitor, fdi-simulator, fdi-store and fdi-trainer. Verbs,
-# options and words come from the programs' --help-all, ids from fdi-store.
+# bash completion of fdi-monitor and the other programs of fdi. Verbs, options
+# and words come from the programs' --help-all, ids from fdi-store.
 
 # Values of KEY in what fdi-store lists: _fdi_listed KEY ARGUMENTS...
 _fdi_listed() {
@@ -149,4 +149,5 @@ _fdi_complete() {
       _fdi_value "${arguments[count]%% *}" "${arguments[count]#* }"
   fi
 }
-complete -F _fdi_complete fdi-monitor fdi-simulator fdi-store fdi-trainer
+complete -F _fdi_complete fdi-monitor fdi-simulator fdi-store fdi-trainer \
+  fdi-gateway

@@ -21,7 +21,7 @@ pages() {  # VERB...: writes the page of the verb and those below it
   if [ $# -gt 0 ]; then
     see+=("${page%-"${!#}"}")
   else
-    for verb in fdi-monitor fdi-simulator fdi-store fdi-trainer; do
+    for verb in fdi-monitor fdi-simulator fdi-store fdi-trainer fdi-gateway; do
       [ "$verb" = "$name" ] || see+=("$verb")
     done
   fi

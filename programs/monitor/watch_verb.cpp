@@ -10,9 +10,9 @@
 #include <unistd.h>
 
 #include "base/time_text.h"
+#include "monitor/bus/watch_records.h"
+#include "monitor/bus/watch_table.h"
 #include "programs/monitor/verbs.h"
-#include "programs/monitor/watch_records.h"
-#include "programs/monitor/watch_table.h"
 #include "report/json_output.h"
 #include "report/live_screen.h"
 #include "report/logging.h"

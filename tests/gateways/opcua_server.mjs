@@ -1,5 +1,5 @@
 // A simulated OPC UA server: gives the rows of a CSV table of fdi-simulator, in
-// the tags and units of docs/examples/opcua_gateway, one a second of the source
+// the tags and units of gateway.sh, one a second of the source
 // time and every 10 ms. Goes on while somebody subscribes to all tags.
 // Usage: opcua_server.mjs CSV PORT
 import {readFileSync} from 'node:fs';

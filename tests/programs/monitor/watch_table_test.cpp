@@ -1,11 +1,11 @@
 // What `fdi-monitor watch --table` makes of the messages, and how it looks.
-#include "programs/monitor/watch_table.h"
+#include "monitor/bus/watch_table.h"
 
 #include <sstream>
 
 #include <gmock/gmock.h>
 
-#include "programs/monitor/watch_records.h"
+#include "monitor/bus/watch_records.h"
 
 namespace fdi::monitor {
 namespace {

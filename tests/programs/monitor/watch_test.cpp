@@ -1,7 +1,7 @@
 // What `fdi-monitor watch` makes of the messages.
 #include <gmock/gmock.h>
 
-#include "programs/monitor/watch_records.h"
+#include "monitor/bus/watch_records.h"
 
 namespace fdi::monitor {
 namespace {

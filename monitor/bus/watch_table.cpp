@@ -1,4 +1,4 @@
-#include "programs/monitor/watch_table.h"
+#include "monitor/bus/watch_table.h"
 
 #include <algorithm>
 #include <limits>

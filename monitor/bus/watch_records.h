@@ -6,7 +6,7 @@
 #include <unordered_map>
 
 #include "base/printable.h"
-#include "programs/monitor/bus_view.h"
+#include "monitor/bus/bus_view.h"
 #include "report/json_output.h"
 
 namespace fdi::monitor {

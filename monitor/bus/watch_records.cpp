@@ -1,4 +1,4 @@
-#include "programs/monitor/watch_records.h"
+#include "monitor/bus/watch_records.h"
 
 #include <algorithm>
 

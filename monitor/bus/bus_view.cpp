@@ -1,10 +1,9 @@
-#include "programs/monitor/bus_view.h"
+#include "monitor/bus/bus_view.h"
 
 #include "diagnosis/decision/certainty.h"
 #include "diagnosis/model/fault_catalogue.h"
 #include "diagnosis/records/valve_glob.h"
 #include "monitor/bus/dds_options.h"
-#include "programs/monitor/verbs.h"
 
 namespace fdi::monitor {
 namespace {

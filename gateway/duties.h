@@ -1,0 +1,67 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include "base/log.h"
+#include "base/mutex.h"
+#include "monitor/http/http_server.h"
+
+namespace fdi::gateway {
+
+/// A line of the metrics page.
+struct Metric {
+  std::string name;  ///< Without "fdi_gateway_"; "_total" marks a counter.
+  std::string help;
+  double value{0.0};
+};
+
+/// What a service owes its host beside its work: it tells systemd that it is
+/// ready and gets on, and serves its figures.
+class Duties {
+ public:
+  /// @param address for /metrics and /healthz, "[ADDRESS:]PORT"; empty: none.
+  /// @throws ConfigError; std::runtime_error if it cannot listen there.
+  explicit Duties(const std::string& address);
+
+  void Ready(const std::string& status);
+  /// Call at least once a second. Once a second it takes the figures.
+  /// @param tags a JSON document for /tags; null: none.
+  /// @returns whether a second has passed.
+  bool Tick(const std::function<std::vector<Metric>()>& metrics,
+            const std::function<std::string()>& tags = {});
+
+ private:
+  std::chrono::steady_clock::time_point ticked_{};
+  Mutex mutex_;
+  std::string metrics_ GUARDED_BY(mutex_);
+  std::string tags_ GUARDED_BY(mutex_);
+  std::unique_ptr<monitor::HttpServer> server_;  // Last: uses the others.
+};
+
+/// A log in which one thing is said at most once a minute, so that no flood of
+/// bad input fills the disk.
+class CalmLog {
+ public:
+  explicit CalmLog(LogSink log) : log_(std::move(log)) {}
+
+  /// @param about what the line is of: a tag, a topic.
+  void Warn(
+      std::string_view event, const std::string& about,
+      std::initializer_list<std::pair<std::string_view, std::string>> fields);
+
+ private:
+  struct Told {
+    std::chrono::steady_clock::time_point at;
+    std::uint64_t not_shown{0};
+  };
+  LogSink log_;
+  std::unordered_map<std::string, Told> told_;
+};
+
+}  // namespace fdi::gateway

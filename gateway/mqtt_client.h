@@ -1,0 +1,107 @@
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "base/bounded_queue.h"
+#include "base/log.h"
+
+struct mosquitto;
+struct mosquitto_message;
+
+namespace CLI {
+class App;
+}
+
+namespace fdi::gateway {
+
+/// How a broker is reached. Secrets come by files or by the environment, for
+/// the arguments of a program are seen by everybody.
+struct MqttOptions {
+  std::string url;           ///< mqtt[s]://[USER@]HOST[:PORT]
+  std::filesystem::path ca;  ///< PEM; empty: the authorities of the system.
+  std::filesystem::path certificate;  ///< Of this client, with its key.
+  std::filesystem::path key;
+  std::filesystem::path password;  ///< A file; empty: FDI_MQTT_PASSWORD.
+
+  /// Adds --mqtt, --ca, --certificate, --key and --password-file.
+  void AddTo(CLI::App& verb);
+};
+
+/// What a broker told, in order.
+struct MqttEvent {
+  enum class Kind : std::uint8_t { kConnected, kLost, kMessage };
+  Kind kind{Kind::kMessage};
+  std::string topic;
+  std::string payload;  ///< Of kLost: why.
+  bool retained{false};
+};
+
+/// A connection to a broker that is made again whenever it is lost, after 1, 2,
+/// 4 ... 60 s. A thread of its own speaks with the broker; what comes waits in
+/// a bounded queue, and is dropped and counted beyond it.
+class MqttClient {
+ public:
+  struct Will {
+    std::string topic;
+    std::string payload;
+  };
+
+  /// @param will published by the broker when this client is gone; empty
+  ///   topic: none.
+  /// @throws ConfigError for an URL, a file of keys or a password that cannot
+  ///   be used; NotFoundError.
+  MqttClient(const MqttOptions& options, const Will& will, LogSink log);
+  ~MqttClient();
+  MqttClient(const MqttClient&) = delete;
+  MqttClient& operator=(const MqttClient&) = delete;
+
+  void Start();
+  /// Says good-bye, so that the broker does not publish the will.
+  void Stop();
+
+  /// What has come, oldest first, after waiting up to `timeout`.
+  void Take(std::vector<MqttEvent>& events, std::chrono::milliseconds timeout);
+  /// Of QoS 0 on the way in; call at each kConnected.
+  void Subscribe(const std::vector<std::string>& topics);
+  void Unsubscribe(const std::vector<std::string>& topics);
+  /// QoS 1. @returns false if there is no connection, or the message does not
+  ///   fit: it is not kept for later.
+  bool Publish(const std::string& topic, const std::string& payload,
+               bool retained);
+
+  bool connected() const { return connected_; }
+  std::uint64_t dropped() const { return dropped_; }
+
+ private:
+  struct Address {
+    bool tls{false};
+    std::string user;
+    std::string host;
+    int port{0};
+  };
+  static Address Parse(const std::string& url);
+  void SetUp(const MqttOptions& options, const Will& will);
+  void Run(const std::stop_token& stop);
+  void OnConnect(int code);
+  void OnMessage(const mosquitto_message& message);
+  void SayLost(const std::string& why);
+
+  Address address_;
+  LogSink log_;
+  mosquitto* library_{nullptr};
+  BoundedQueue<MqttEvent> events_;
+  std::atomic<bool> connected_{false};
+  std::atomic<std::uint64_t> dropped_{0};
+  std::string refused_;  // Why the broker refused; of the thread.
+  std::string said_;     // What was logged last; of the thread.
+  std::jthread thread_;
+};
+
+}  // namespace fdi::gateway

@@ -1,0 +1,240 @@
+#include "gateway/valve_states.h"
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <cstdio>
+#include <utility>
+
+#include "base/text.h"
+#include "base/time_text.h"
+#include "diagnosis/model/fault_catalogue.h"
+#include "diagnosis/model/severity.h"
+
+namespace fdi::gateway {
+namespace {
+
+using report::Json;
+
+constexpr std::chrono::minutes kRefresh(1);
+// Events wait for the broker; beyond these the history has them.
+constexpr std::size_t kMaxEvents = 10'000;
+
+// NAMUR NE 107 in the words of OPC 10000-100, DeviceHealthEnumeration.
+std::string_view HealthOf(report::NamurClass namur) {
+  switch (namur) {
+    case report::NamurClass::kFailure:
+      return "FAILURE";
+    case report::NamurClass::kOutOfSpecification:
+      return "OFF_SPEC";
+    case report::NamurClass::kMaintenanceRequired:
+      return "MAINTENANCE_REQUIRED";
+    case report::NamurClass::kCheckFunction:
+      break;
+  }
+  return "CHECK_FUNCTION";
+}
+
+// Why a sample was not judged.
+std::string ReasonOf(const Json& quality) {
+  static constexpr std::pair<std::string_view, std::string_view> kReasons[] = {
+      {"BAD_INPUT", "readings are missing or impossible"},
+      {"SETTLING", "the diagnosis has just begun or begun again"},
+      {"INHIBITED", "the valve is out of service or calibrating"},
+      {"UNCOVERED", "it works where its models do not know it"},
+      {"MODEL_UNSUITED", "its models do not suit it"},
+      {"UNASSIGNED", "it has no models, and its loop is not judged yet"},
+      {"STALE", "its readings have ended"}};
+  const std::string name =
+      quality.is_string() ? quality.get<std::string>() : std::string("STALE");
+  for (const auto& [known, reason] : kReasons) {
+    if (name == known) {
+      return std::string(reason);
+    }
+  }
+  return name;
+}
+
+// "valve clogging" of f1; of several faults joined by "or".
+std::string DescriptionOf(std::string_view answer) {
+  std::string text;
+  while (!answer.empty()) {
+    const std::size_t bar = std::min(answer.find('|'), answer.size());
+    for (const auto& fault : kFaultCatalogue) {
+      if (fault.name == answer.substr(0, bar)) {
+        text += (text.empty() ? "" : " or ") + std::string(fault.description);
+      }
+    }
+    answer.remove_prefix(std::min(bar + 1, answer.size()));
+  }
+  return text;
+}
+
+}  // namespace
+
+std::string TopicPrefix(const std::string& site) {
+  return "fdi/" + TopicLevel(site) + "/";
+}
+
+std::string TopicLevel(std::string_view valve_id) {
+  std::string level;
+  for (const char c : valve_id) {
+    if (std::string_view("/+#%").find(c) != std::string_view::npos) {
+      char code[4];
+      std::snprintf(code, sizeof code, "%%%02X",
+                    static_cast<unsigned>(static_cast<unsigned char>(c)));
+      level += code;
+    } else {
+      level += c;
+    }
+  }
+  return level;
+}
+
+std::string ValveOfLevel(std::string_view level) {
+  std::string valve_id;
+  for (std::size_t i = 0; i < level.size(); ++i) {
+    const auto code = level[i] == '%'
+                          ? ParseWhole<unsigned>(level.substr(i + 1, 2), 16)
+                          : std::nullopt;
+    valve_id += code ? static_cast<char>(*code) : level[i];
+    i += code ? 2 : 0;
+  }
+  return valve_id;
+}
+
+void ValveStates::Add(const Json& record, Clock::time_point now) {
+  table_.Add(record, now);
+  const Json& topic = record["topic"];
+  if (topic == "DecisionVector") {
+    vectors_[record["valve_id"]] = {{"stamp_utc", record["stamp_utc"]},
+                                    {"model_hash", record["model_hash"]}};
+  } else if (topic == "FaultEvent") {
+    events_[record["valve_id"]] = record;
+    if (new_events_.size() < kMaxEvents) {
+      new_events_.push_back(record);
+    }
+  } else if (topic == "ModelSetInfo") {
+    model_sets_[record["model_hash"]] =
+        record["model_set"].get<std::string>() + "@" +
+        std::to_string(record["version"].get<int>());
+  }
+}
+
+std::vector<Outgoing> ValveStates::Due(std::int64_t now_ns,
+                                       Clock::time_point now) {
+  std::vector<Outgoing> due;
+  for (Json& event : std::exchange(new_events_, {})) {
+    // The bus may tell an event twice, and a broker, too.
+    event["id"] = event["episode_id"].get<std::string>() + "/" +
+                  event["transition"].get<std::string>() + "/" +
+                  event["stamp_utc"].get<std::string>();
+    due.push_back(
+        {prefix_ + TopicLevel(event["valve_id"].get<std::string>()) + "/event",
+         report::JsonText(event), false});
+  }
+  const Json document = table_.Valves(now_ns, now).document;
+  const bool monitored = !document["monitor"].is_null();
+  Tell(prefix_ + "monitor", {{"alive", true}, {"monitor", document["monitor"]}},
+       document["as_of_utc"], now, due);
+  std::set<std::string> known;
+  for (const Json& row : document["valves"]) {
+    const auto valve_id = row["valve_id"].get<std::string>();
+    known.insert(valve_id);
+    const auto vector = vectors_.find(valve_id);
+    Tell(prefix_ + TopicLevel(valve_id) + "/state", StateOf(row, monitored),
+         vector == vectors_.end() ? Json() : vector->second["stamp_utc"], now,
+         due);
+  }
+  for (const std::string& valve_id : expected_) {
+    if (!known.contains(valve_id)) {
+      Tell(prefix_ + TopicLevel(valve_id) + "/state",
+           {{"valve_id", valve_id},
+            {"health", "CHECK_FUNCTION"},
+            {"reason", "no monitor tells of it since this gateway started"}},
+           Json(), now, due);
+    }
+  }
+  valves_ = known.size();
+  return due;
+}
+
+Json ValveStates::StateOf(const Json& row, bool monitored) const {
+  const auto valve_id = row["valve_id"].get<std::string>();
+  const auto state = row["state"].get<std::string>();
+  const bool alarm = row["certainty"].is_string();
+  const std::string fault =
+      row["fault"].is_string() ? row["fault"].get<std::string>() : "";
+  const double strength =
+      row["strength"].is_number() ? row["strength"].get<double>() : 0.0;
+  // An alarm without a name yet is one unlike any known fault as far as anybody
+  // knows.
+  const report::FaultWords words =
+      texts_.Words(fault.empty() ? "unknown" : fault, strength);
+  std::string health = "NORMAL";
+  Json reason;
+  if (!monitored) {
+    health = "CHECK_FUNCTION";
+    reason = "no monitor is heard";
+  } else if (state == "NOT_CONFIRMED") {
+    health = "CHECK_FUNCTION";
+    reason = "no data since " + row["unconfirmed_utc"].get<std::string>();
+  } else if (alarm) {
+    health = HealthOf(words.namur);
+  } else if (state == "PARTLY_JUDGED") {
+    health = "CHECK_FUNCTION";
+    reason = "judged in part: a reading that its models need is missing";
+  } else if (state != "NORMAL") {
+    health = "CHECK_FUNCTION";
+    reason = ReasonOf(row["quality"]);
+  }
+  const auto when = [&](bool shown, Json value) {
+    return shown ? std::move(value) : Json();
+  };
+  const auto event = events_.find(valve_id);
+  const auto vector = vectors_.find(valve_id);
+  Json model_set;
+  if (alarm && event != events_.end()) {
+    model_set = event->second["model_set"];
+  } else if (vector != vectors_.end()) {
+    const auto known =
+        model_sets_.find(vector->second["model_hash"].get<std::string>());
+    model_set = known == model_sets_.end() ? Json() : Json(known->second);
+  }
+  return {{"valve_id", valve_id},
+          {"health", health},
+          {"reason", reason},
+          {"state", state},
+          {"fault", row["fault"]},
+          {"name", when(alarm && !fault.empty(), words.name)},
+          {"description",
+           when(!DescriptionOf(fault).empty(), DescriptionOf(fault))},
+          {"certainty", row["certainty"]},
+          {"look_alikes", row["look_alikes"]},
+          {"strength_pct", when(row["strength"].is_number(),
+                                std::round(1000.0 * strength) / 10.0)},
+          {"severity", when(alarm, std::string(SeverityName(words.severity)))},
+          {"priority", when(alarm, PriorityOf(words.severity))},
+          {"since_utc", row["since_utc"]},
+          {"check", when(alarm && !fault.empty(), words.check)},
+          {"model_set", std::move(model_set)}};
+}
+
+void ValveStates::Tell(const std::string& topic, Json state, const Json& as_of,
+                       Clock::time_point now, std::vector<Outgoing>& due) {
+  std::string payload = report::JsonText(state);
+  Published& last = published_[topic];
+  if (payload == last.payload && now - last.at < kRefresh) {
+    return;
+  }
+  last = {std::move(payload), now};
+  state["as_of_utc"] = as_of;
+  due.push_back({topic, report::JsonText(state), true});
+}
+
+Outgoing ValveStates::Farewell() const {
+  return {prefix_ + "monitor",
+          report::JsonText({{"alive", false}, {"monitor", Json()}}), true};
+}
+
+}  // namespace fdi::gateway

@@ -1,0 +1,84 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <map>
+#include <set>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "monitor/bus/watch_table.h"
+#include "report/fault_texts.h"
+#include "report/json_output.h"
+
+namespace fdi::gateway {
+
+/// What goes out by MQTT.
+struct Outgoing {
+  std::string topic;
+  std::string payload;
+  bool retained{true};
+};
+
+/// "fdi/SITE/": the topics of one plant.
+std::string TopicPrefix(const std::string& site);
+/// A valve in a topic: /, +, # and % as %2F, ...; and back.
+std::string TopicLevel(std::string_view valve_id);
+std::string ValveOfLevel(std::string_view level);
+
+/// Makes the messages of all valves from the records of `fdi-monitor watch
+/// --json`: fdi/SITE/VALVE/state, fdi/SITE/VALVE/event, fdi/SITE/monitor;
+/// docs/connect.md has their keys.
+///
+/// A state is NORMAL only while a monitor judges samples of the valve.
+/// Otherwise its health is CHECK_FUNCTION, with the reason. One thread, no
+/// clock.
+class ValveStates {
+ public:
+  using Clock = std::chrono::steady_clock;
+
+  ValveStates(report::FaultTexts texts, const std::string& site)
+      : texts_(texts),
+        table_(std::move(texts), true),
+        prefix_(TopicPrefix(site)) {}
+
+  /// @param record as WatchRecord::object; of any topic.
+  void Add(const report::Json& record, Clock::time_point now);
+  void Remove(const std::string& valve_id) { table_.Remove(valve_id); }
+  /// A valve that the broker still tells of, from before the start.
+  void Expect(const std::string& valve_id) { expected_.insert(valve_id); }
+  /// All states go out again: the connection is a new one.
+  void Forget() { published_.clear(); }
+
+  /// Events that have come, then states that have changed, or were told a
+  /// minute ago: `as_of_utc` goes on. Call once a second.
+  std::vector<Outgoing> Due(std::int64_t now_ns, Clock::time_point now);
+  /// What the monitor's topic says while this program does not live.
+  Outgoing Farewell() const;
+
+  std::size_t valves() const { return valves_; }
+
+ private:
+  struct Published {
+    std::string payload;  // Without as_of_utc.
+    Clock::time_point at;
+  };
+  report::Json StateOf(const report::Json& row, bool monitored) const;
+  void Tell(const std::string& topic, report::Json state,
+            const report::Json& as_of, Clock::time_point now,
+            std::vector<Outgoing>& due);
+
+  report::FaultTexts texts_;
+  monitor::WatchTable table_;
+  std::string prefix_;
+  std::map<std::string, report::Json> vectors_;  // The last one of each valve.
+  std::map<std::string, report::Json> events_;
+  std::map<std::string, std::string> model_sets_;  // By hash.
+  std::vector<report::Json> new_events_;
+  std::set<std::string> expected_;
+  std::map<std::string, Published> published_;  // By topic.
+  std::size_t valves_{0};
+};
+
+}  // namespace fdi::gateway

@@ -1,0 +1,140 @@
+#!/usr/bin/env bash
+# A broker, `fdi-gateway in` and `out`, a monitor: readings come by topics, the
+# findings go out; the broker is killed and comes back.
+# Usage: mqtt.sh FOLDER-OF-PROGRAMS      77 without mosquitto.
+set -euo pipefail
+PATH=$PATH:/usr/sbin:/usr/local/sbin
+for needed in mosquitto mosquitto_pub mosquitto_sub; do
+  command -v $needed >/dev/null || {
+    echo "mqtt: skipped, no $needed (Debian: mosquitto, mosquitto-clients)"
+    exit 77
+  }
+done
+tests=$(cd "$(dirname "$0")/.." && pwd)
+source "$tests/system/programs.sh" "$1"
+broker= in= out=
+finish() {
+  exec 2>/dev/null
+  rm -f feeding
+  kill -9 $broker $in $out ${monitor:-} || true
+  rm -rf "$work"
+}
+trap finish EXIT
+port=$((17000 + domain))  # No ephemeral one, nor one of a test's domain.
+await() {  # SECONDS WORD FILE
+  timeout "$1" sh -c 'until grep -q "$0" "$1"; do sleep 0.1; done' "$2" "$3" ||
+    fail "no $2 in $3 within $1 s: $(tail -5 "$3")"
+}
+# The retained state of a valve has WORD within 40 s.
+expect_state() {  # VALVE WORD
+  for _ in $(seq 80); do
+    mosquitto_sub -p $port -C 1 -W 2 -t "fdi/north/$1/state" >state.json \
+      2>/dev/null || true
+    ! grep -q "$2" state.json || return 0
+    sleep 0.5
+  done
+  fail "the state of $1 is $(cat state.json), not $2"
+}
+start_broker() {
+  printf 'listener %s 127.0.0.1\nuser %s\nallow_anonymous false\npassword_file %s\n' \
+    $port "$(id -un)" "$work/users" >broker.conf
+  mosquitto -c broker.conf >broker.out 2>&1 &
+  broker=$!
+}
+mosquitto_passwd -b -c users fdi s3cret
+mosquitto_sub() { command mosquitto_sub -u fdi -P s3cret "$@"; }
+
+"$bin/fdi-trainer" train --campaign "$tests/survival/quick.toml" \
+  >/dev/null 2>train.log
+"$bin/fdi-simulator" run --no-publish --duration 300 --seed 1 --export V1.csv \
+  --parameters paper-operating-point --log-level error >/dev/null
+cat >plant.toml <<'END'
+[defaults]
+op = "{loop}.OP"
+x = "{loop}.ZT"
+f = "{loop}.FT"
+f_unit = "m3/h"
+p1 = "{loop}.P1"
+p1_unit = "kPa"
+p2 = "{loop}.P2"
+p2_unit = "kPa"
+t1 = "{loop}.T1"
+topic = "plant/{loop}"
+value = "{signal}"
+[[loop]]
+name = "V1"
+[[loop]]
+name = "V2"
+END
+start_broker
+start --model-set quick
+echo wrong >password
+"$bin/fdi-gateway" --domain "$domain" in --plant plant.toml \
+  --mqtt "mqtt://fdi@127.0.0.1:$port" --password-file password 2>refused.log &
+in=$!
+await 20 "broker_lost" refused.log
+grep -q "not authorised" refused.log || fail "$(cat refused.log)"
+kill $in
+wait $in || fail "in ended with $?"
+echo s3cret >password
+"$bin/fdi-gateway" --domain "$domain" in --plant plant.toml \
+  --mqtt "mqtt://fdi@127.0.0.1:$port" --password-file password >in.txt \
+  2>in.log &
+in=$!
+FDI_MQTT_PASSWORD=s3cret "$bin/fdi-gateway" --domain "$domain" out \
+  --mqtt "mqtt://fdi@127.0.0.1:$port" --site north 2>out.log &
+out=$!
+await 20 broker_connected in.log
+await 20 broker_connected out.log
+
+# Both valves once a second, V2 without its position, while there is a file
+# "feeding".
+feed() {  # VALVE FORMAT-OF-X
+  while [ -e feeding ]; do
+    tail -n +2 V1.csv | while [ -e feeding ] && IFS=, read -r _ cv p1 p2 t1 x f _; do
+      printf "{\"op\":%s,\"p1\":%s,\"p2\":%s,\"t1\":%s,\"f\":%s,$2\"q\":\"good\"}\n" \
+        "$cv" "$p1" "$p2" "$t1" "$f" "$x"
+      sleep 1
+    done | mosquitto_pub -u fdi -P s3cret -p $port -l -t "plant/$1" \
+      2>/dev/null || true
+    sleep 0.3
+  done
+}
+head -1 V1.csv | grep -q '^t_s,CV_pct,P1_kPa,P2_kPa,T1_degC,X_pct,F_m3_h' ||
+  fail "columns: $(head -1 V1.csv)"
+touch feeding
+feed V1 '\"x\":%s,' &
+feed V2 '\"no_x\":%s,' &
+expect_state V1 '"health":"NORMAL"'
+expect_state V2 '"health":"CHECK_FUNCTION"'
+mosquitto_sub -p $port -C 1 -W 5 -t fdi/north/monitor | grep -q '"alive":true' ||
+  fail "the monitor's topic"
+
+# The broker is killed: what it kept is gone, and all comes back by itself.
+kill -9 $broker
+wait $broker 2>/dev/null || true
+await 20 broker_lost in.log
+await 20 broker_lost out.log
+start_broker
+expect_state V1 '"health":"NORMAL"'
+
+# Without readings nothing stays normal.
+rm feeding
+expect_state V1 '"health":"CHECK_FUNCTION"'
+grep -q "tag_silent" in.log || fail "no tag is said to be silent"
+
+# The gateway is killed: the broker publishes the last will.
+kill -9 $out
+wait $out 2>/dev/null || true
+out=
+for _ in $(seq 60); do
+  mosquitto_sub -p $port -C 1 -W 2 -t fdi/north/monitor >alive.json || true
+  ! grep -q '"alive":false' alive.json || break
+  sleep 0.5
+done
+grep -q '"alive":false' alive.json || fail "no last will: $(cat alive.json)"
+kill $in
+wait $in || fail "in ended with $?"
+in=
+stop
+echo "mqtt: $(grep '^readings' in.txt), $(grep '^samples' in.txt)"

@@ -1,0 +1,83 @@
+// What payloads of a broker say, and which URLs name one.
+#include "gateway/mqtt_source.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "base/error.h"
+#include "base/time_units.h"
+
+namespace fdi::gateway {
+namespace {
+
+using importer::Said;
+using ::testing::HasSubstr;
+
+class PayloadTest : public ::testing::Test {
+ protected:
+  Said Read(const std::string& payload) {
+    payload_ = payload;
+    return ReadPayload(topic_, payload_, stamps_, word_);
+  }
+  LiveTopic topic_{"plant/A/x", "A.ZT", "", ""};
+  importer::StampReader stamps_;
+  std::string payload_;
+  std::string word_;
+};
+
+TEST_F(PayloadTest, ANumberOrAWord) {
+  EXPECT_EQ(Read(" 41.5\n").reading.value, 41.5);
+  EXPECT_EQ(Read("41.5").reading.tag, "A.ZT");
+  EXPECT_EQ(Read("MAN").reading.word, "MAN");
+  EXPECT_EQ(Read("Bad").reading.quality, SignalQuality::kBad);
+  EXPECT_EQ(Read("").reading.quality, SignalQuality::kBad);
+}
+
+TEST_F(PayloadTest, AnObjectHasValueTimeAndQuality) {
+  const Said said =
+      Read(R"({"value": 41.5, "ts": 1767607200000, "quality": "uncertain"})");
+  ASSERT_EQ(said.kind, Said::Kind::kReading);
+  EXPECT_EQ(said.reading.value, 41.5);
+  EXPECT_EQ(said.reading.stamp_ns, 1'767'607'200 * kNsPerSecond);
+  EXPECT_EQ(said.reading.quality, SignalQuality::kUncertain);
+}
+
+TEST_F(PayloadTest, KeysAreThoseOfTheRow) {
+  topic_.value_key = "position";
+  topic_.time_key = "at";
+  const Said said =
+      Read(R"({"position": 3, "value": 9, "at": "2026-01-05T10:00:00Z"})");
+  EXPECT_EQ(said.reading.value, 3.0);
+  EXPECT_EQ(said.reading.stamp_ns, 1'767'607'200 * kNsPerSecond);
+  // A payload of several signals need not have all of them.
+  EXPECT_EQ(Read(R"({"command": 3})").kind, Said::Kind::kNothing);
+}
+
+TEST_F(PayloadTest, OtherTextIsRefusedWithTheReason) {
+  EXPECT_THAT(Read("{41}").why, HasSubstr("not a JSON object"));
+  EXPECT_THAT(Read(R"({"speed": 1})").why, HasSubstr("no key \"value\""));
+  EXPECT_THAT(Read(R"({"value": 1, "t": "noon"})").why, HasSubstr("time"));
+  EXPECT_EQ(Read(std::string(70'000, '1')).kind, Said::Kind::kWrong);
+}
+
+TEST(MqttUrl, IsThatOfABrokerWithoutASecret) {
+  const auto error = [](const std::string& url) -> std::string {
+    try {
+      MqttClient client({.url = url}, {}, {});
+      return "";
+    } catch (const ConfigError& refused) {
+      return refused.what();
+    }
+  };
+  EXPECT_EQ(error("mqtt://127.0.0.1"), "");
+  EXPECT_EQ(error("mqtts://fdi@[::1]:8884/"), "");
+  EXPECT_THAT(error("http://127.0.0.1"), HasSubstr("mqtt://HOST"));
+  EXPECT_THAT(error("mqtt://"), HasSubstr("no host"));
+  EXPECT_THAT(error("mqtt://a:70000"), HasSubstr("1..65535"));
+  EXPECT_THAT(error("mqtt://fdi:secret@a"), HasSubstr("--password-file"));
+  EXPECT_THAT(error("mqtt://fdi:secret@a"),
+              ::testing::Not(HasSubstr("secret@")));
+}
+
+}  // namespace
+}  // namespace fdi::gateway

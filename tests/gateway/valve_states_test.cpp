@@ -1,0 +1,203 @@
+// What goes out by MQTT of a valve: never NORMAL where nobody judges it.
+#include "gateway/valve_states.h"
+
+#include <fstream>
+#include <set>
+#include <sstream>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "monitor/bus/watch_records.h"
+
+namespace fdi::gateway {
+namespace {
+
+using monitor::WatchRecord;
+using report::Json;
+using std::chrono::seconds;
+using ::testing::HasSubstr;
+using Clock = ValveStates::Clock;
+
+constexpr std::int64_t kSecond = 1'000'000'000;
+
+class ValveStatesTest : public ::testing::Test {
+ protected:
+  ValveStatesTest() {
+    idl::ModelSetInfoMessage info;
+    info.model_set = "demo";
+    info.version = 2;
+    info.model_hash = 7;
+    info.faults = {1, 7, 19};
+    records_.Add(info, now_);
+  }
+  void Hear(std::int64_t second, State state = State::kNormal,
+            Quality quality = Quality::kLive) {
+    idl::DecisionMessage message;
+    message.valve_id = "FV/1";
+    message.model_hash = 7;
+    message.fault_count = 3;
+    message.verdict.quality = quality;
+    message.verdict.confidence = 1.0;
+    message.verdict.state = state;
+    message.verdict.stamp_ns = second * kSecond;
+    now_ += seconds(1);
+    HearMonitor();
+    records_.Add(message, now_);
+  }
+  void HearMonitor() {
+    idl::MonitorStatusMessage status;
+    status.monitor = "host:1";
+    records_.Add(status, now_);
+  }
+  void HearFault(TransitionKind kind, std::int64_t second,
+                 EndReason reason = EndReason::kNone) {
+    FaultEvent event;
+    event.valve_id = "FV/1";
+    event.episode_id = 1;
+    event.model_set = "demo";
+    event.model_version = 2;
+    event.transition.kind = kind;
+    event.transition.reason = reason;
+    event.transition.stamp_ns = second * kSecond;
+    event.transition.detection_stamp_ns = 40 * kSecond;
+    event.transition.strength = 0.25;
+    event.candidates = {{19, 0.9, 0.25, true}};
+    records_.Add(event, now_);
+  }
+  std::vector<Outgoing> Due() { return states_.Due(0, now_); }
+  Json State() {
+    states_.Forget();
+    for (const Outgoing& message : Due()) {
+      if (message.topic == "fdi/north/FV%2F1/state") {
+        EXPECT_TRUE(message.retained);
+        return Json::parse(message.payload);
+      }
+    }
+    return {};
+  }
+
+  Clock::time_point now_{Clock::now()};
+  ValveStates states_{
+      report::FaultTexts(std::filesystem::path(FDI_FAULT_CATALOGUE)), "north"};
+  monitor::WatchRecords records_{true, [this](const WatchRecord& record) {
+                                   states_.Add(record.object, now_);
+                                 }};
+};
+
+TEST_F(ValveStatesTest, NormalWhileAMonitorJudgesIt) {
+  Hear(1);
+  Hear(2);
+  const Json state = State();
+  EXPECT_EQ(state["health"], "NORMAL");
+  EXPECT_TRUE(state["reason"].is_null());
+  EXPECT_EQ(state["model_set"], "demo@2");
+  EXPECT_EQ(state["as_of_utc"], "1970-01-01T00:00:02Z");
+}
+
+TEST_F(ValveStatesTest, WithoutDataItIsNotNormal) {
+  Hear(1);
+  Hear(2);
+  for (int i = 0; i < 20; ++i) {
+    now_ += seconds(1);
+    HearMonitor();
+  }
+  EXPECT_EQ(State()["health"], "CHECK_FUNCTION");
+  EXPECT_THAT(State()["reason"], HasSubstr("no data since 1970-01-01"));
+  now_ += seconds(20);
+  EXPECT_EQ(State()["reason"], "no monitor is heard");
+}
+
+TEST_F(ValveStatesTest, WhatIsNotJudgedIsNotNormal) {
+  Hear(1);
+  Hear(2, State::kNormal, Quality::kBadInput);
+  EXPECT_EQ(State()["health"], "CHECK_FUNCTION");
+  EXPECT_EQ(State()["reason"], "readings are missing or impossible");
+  Hear(3, State::kNormal, Quality::kUnassigned);
+  EXPECT_THAT(State()["reason"], HasSubstr("no models"));
+}
+
+TEST_F(ValveStatesTest, AFaultHasItsClassAndWords) {
+  Hear(39);
+  Hear(40, State::kDetected);
+  HearFault(TransitionKind::kDetected, 40);
+  HearFault(TransitionKind::kIsolated, 43);
+  Hear(43, State::kDetected);
+  const Json state = State();
+  EXPECT_EQ(state["fault"], "f19");
+  EXPECT_EQ(state["health"], "FAILURE");
+  EXPECT_EQ(state["name"], "Flow transmitter wrong");
+  EXPECT_EQ(state["strength_pct"], 25.0);
+  EXPECT_EQ(state["since_utc"], "1970-01-01T00:00:40Z");
+  EXPECT_TRUE(state["check"].is_string());
+  EXPECT_TRUE(state["severity"].is_string());
+}
+
+TEST_F(ValveStatesTest, AnEventGoesOutOnceWithAnId) {
+  HearFault(TransitionKind::kIsolated, 43);
+  int events = 0;
+  for (const Outgoing& message : Due()) {
+    if (message.topic == "fdi/north/FV%2F1/event") {
+      ++events;
+      EXPECT_FALSE(message.retained);
+      EXPECT_EQ(Json::parse(message.payload)["id"],
+                "0000000000000001/ISOLATED/1970-01-01T00:00:43Z");
+    }
+  }
+  EXPECT_EQ(events, 1);
+  for (const Outgoing& message : Due()) {
+    EXPECT_THAT(message.topic, ::testing::Not(HasSubstr("event")));
+  }
+}
+
+TEST_F(ValveStatesTest, OnlyWhatChangesGoesOutAndAllOnceAMinute) {
+  Hear(1);
+  Hear(2);
+  EXPECT_EQ(Due().size(), 2U);  // The monitor's and the valve's.
+  Hear(3);
+  EXPECT_TRUE(Due().empty());
+  now_ += seconds(60);
+  Hear(4);
+  EXPECT_EQ(Due().size(), 2U);
+}
+
+TEST_F(ValveStatesTest, AValveThatNobodyTellsOfAnyMore) {
+  states_.Expect("FV/1");
+  const Json state = State();
+  EXPECT_EQ(state["health"], "CHECK_FUNCTION");
+  EXPECT_THAT(state["reason"], HasSubstr("no monitor tells of it"));
+}
+
+// The table of keys is the schema.
+TEST_F(ValveStatesTest, ThePageExplainsEachKey) {
+  Hear(1);
+  Hear(2);
+  std::ifstream page(FDI_CONNECT_PAGE);
+  std::set<std::string> keys;
+  bool in_state = false;
+  for (std::string line; std::getline(page, line);) {
+    in_state = line.starts_with("| valve_id |") ||
+               (in_state && line.starts_with("| "));
+    std::istringstream cell(in_state ? line.substr(2, line.find(" |") - 2)
+                                     : "");
+    for (std::string key; std::getline(cell, key, ',');) {
+      keys.insert(key.substr(key.find_first_not_of(' ')));
+    }
+  }
+  std::set<std::string> told;
+  const Json state = State();
+  for (const auto& [key, value] : state.items()) {
+    told.insert(key);
+  }
+  EXPECT_EQ(keys, told);
+}
+
+TEST(TopicLevel, IsOneLevelOfATopicAndBack) {
+  EXPECT_EQ(TopicLevel("a/b+c#d%"), "a%2Fb%2Bc%23d%25");
+  EXPECT_EQ(ValveOfLevel("a%2Fb%2Bc%23d%25"), "a/b+c#d%");
+  EXPECT_EQ(ValveOfLevel("FV-101"), "FV-101");
+  EXPECT_EQ(ValveOfLevel("100%"), "100%");
+}
+
+}  // namespace
+}  // namespace fdi::gateway
