@@ -6,6 +6,7 @@
 
 #include "base/csv_cells.h"
 #include "base/error.h"
+#include "base/text.h"
 #include "base/time_text.h"
 #include "base/toml_reader.h"
 #include "import/tag_map.h"
@@ -27,13 +28,6 @@ constexpr std::string_view kOtherKeys[] = {
     "to",   "auto",  "manual",  "report", "max_age", "topic", "value", "time"};
 // How rows without a model set are told apart from a forgotten type.
 constexpr std::string_view kDataOnly = "data only";
-
-std::string Lower(std::string text) {
-  std::ranges::transform(text, text.begin(), [](unsigned char c) {
-    return static_cast<char>(c >= 'A' && c <= 'Z' ? c - 'A' + 'a' : c);
-  });
-  return text;
-}
 
 // All keys of a row. A tag has a unit and a range, but the mode, which is
 // words.
@@ -697,6 +691,16 @@ ColumnMapping MappingOf(const PlantRow& row, LoopTag tag, Signal signal,
   return mapping;
 }
 
+void SetMode(const PlantRow& row, const TagMatch& match, ColumnMap& map) {
+  map.mode_column = match[LoopTag::kMode];
+  for (const std::string& word : row.auto_words) {
+    map.mode_words.emplace(word, ValveMode::kAuto);
+  }
+  for (const std::string& word : row.manual_words) {
+    map.mode_words.emplace(word, ValveMode::kManual);
+  }
+}
+
 }  // namespace
 
 ColumnMap LoopColumns(const PlantRow& row, const TagMatch& match,
@@ -717,7 +721,7 @@ ColumnMap LoopColumns(const PlantRow& row, const TagMatch& match,
     }
   }
   file.flow_unit = FlowUnit::kM3PerHour;
-  file.mode_column = match[LoopTag::kMode];
+  SetMode(row, match, file);
   return file;
 }
 
@@ -737,7 +741,7 @@ ColumnMap ValveColumns(const PlantRow& row, const TagMatch& match,
   add(LoopTag::kP1, Signal::kP1);
   add(LoopTag::kP2, Signal::kP2);
   add(LoopTag::kT1, Signal::kT1);
-  file.mode_column = match[LoopTag::kMode];
+  SetMode(row, match, file);
   return file;
 }
 

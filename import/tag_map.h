@@ -19,6 +19,8 @@ namespace fdi::importer {
 /// examples.
 /// @throws ConfigError naming file, line and key; NotFoundError.
 ColumnMap ReadTagMap(const std::filesystem::path& path);
+/// The same for the text of a map; `name` stands for the file in messages.
+ColumnMap ReadTagMapText(std::string_view text, const std::string& name);
 
 /// Parses "1s", "1s:hold", "500ms:linear", "1s:linear:2min": the period, how to
 /// fill between readings (hold), and the longest interval to fill (ten
@@ -52,9 +54,6 @@ bool IsGasUnit(std::string_view name);
 /// @param molar_mass_kg_kmol of the medium; 0: a liquid.
 /// @throws ConfigError naming the likeliest cause.
 void CheckGasFlow(const ColumnMap& map, double molar_mass_kg_kmol);
-
-/// The name of a unit of time in a map: "s", "unix ms", "filetime", "serial".
-std::string_view TimeUnitName(const TimeUnit& unit);
 
 /// Options of every verb that reads tables; each overrides the map.
 struct TableOptions {

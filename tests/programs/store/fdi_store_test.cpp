@@ -64,7 +64,7 @@ TEST_F(FdiStoreTest, AuditJudgesLoopsAndGoesOnAfterWhatItCannotRead) {
   Write("FIC7.csv", StickyLoop(3.0));
   Write("FIC8.csv", StickyLoop(0.0));
   Write("words.csv", "t_s,OP,PV,mode\n0,1,2,AUTO\n10,1,2,HAND\n");
-  Write("no_pv.csv", "t_s,OP,flow\n0,1,2\n10,1,2\n");
+  Write("no_pv.csv", "t_s,OP,remark\n0,1,2\n10,1,2\n");
 
   const json audit =
       StoreJson("audit FIC8.csv FIC7.csv words.csv no_pv.csv gone.csv");
