@@ -7,7 +7,8 @@
 # Usage: surface.sh FOLDER_OF_THE_PROGRAMS
 set -euo pipefail
 bin=$(realpath "${1:?folder of the programs}")
-max_verbs=47
+# The 47 of the list of names, and the two of the gateway.
+max_verbs=49
 max_options=260
 max_shown=12
 
@@ -124,7 +125,7 @@ for my $file (@ARGV) {
     # Only code: indented, or within backticks.
     $text = join "\n", $text =~ /^    (.*)$/gm, $text =~ /`([^`\n]+)`/g;
   }
-  while ($text =~ /\b(fdi-(?:store|trainer|monitor|simulator))
+  while ($text =~ /\b(fdi-(?:store|trainer|monitor|simulator|gateway))
                    ((?:\ +$global(?:\ +[^-\s]\S*)?)*)\ +([a-z][a-z-]+)
                    (?:\ +([a-z][a-z-]+))?([^\n`;,()#|&]*)/gx) {
     my ($program, $word, $second, $rest) = ($1, $3, $4 // '', $5);

@@ -124,7 +124,8 @@ if [ -n "$faketime" ]; then
   await 30 closed || fail "there is no episode"
   store history shelve FV-1 --for 8h --by anna >/dev/null
   for offset in -3600s -2min +3600s; do
-    at $offset "$bin/fdi-store" --data "$out/clock" history shelf | grep >/dev/null FV-1 ||
+    at $offset "$bin/fdi-store" --data "$out/clock" history list --shelved |
+      grep >/dev/null FV-1 ||
       fail "the shelf is lifted by a clock at $offset"
   done
   store history ack last --by anna >/dev/null
