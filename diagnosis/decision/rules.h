@@ -158,7 +158,7 @@ inline constexpr auto kRules = std::to_array<RuleRow>({
     {Rule::kEvidence, Stage::kFactors, "evidence",
      "caps a fault by how far it is behind the best", "-",
      "core, support, memory: campaign",
-     "StrengthTrackerTest.EvidenceTellsSlopeFromOffsetOnlyInMotion"},
+     "FaultBankTest.ErrorsOfInterpolationDoNotAddUpToAVerdict"},
     {Rule::kDrift, Stage::kFindings, "drift",
      "says that X drifts; opens an episode, and holds it open", "-",
      "3 h, 99.9 %, a quarter of a deviation: healthy days",
