@@ -12,11 +12,13 @@ for needed in mosquitto mosquitto_pub mosquitto_sub; do
 done
 tests=$(cd "$(dirname "$0")/.." && pwd)
 source "$tests/system/programs.sh" "$1"
-broker= in= out=
+broker= in= out= feeds=
 finish() {
   exec 2>/dev/null
   rm -f feeding
-  kill -9 $broker $in $out ${monitor:-} || true
+  # A client that has lost its broker waits for it.
+  for feed in $feeds; do pkill -P "$feed" || true; done
+  kill -9 $broker $in $out $feeds ${monitor:-} || true
   rm -rf "$work"
 }
 trap finish EXIT
@@ -103,8 +105,10 @@ feed() {  # VALVE FORMAT-OF-X
 head -1 V1.csv | grep -q '^t_s,CV_pct,P1_kPa,P2_kPa,T1_degC,X_pct,F_m3_h' ||
   fail "columns: $(head -1 V1.csv)"
 touch feeding
-feed V1 '\"x\":%s,' &
-feed V2 '\"no_x\":%s,' &
+feed V1 '\"x\":%s,' >/dev/null 2>&1 &
+feeds=$!
+feed V2 '\"no_x\":%s,' >/dev/null 2>&1 &
+feeds+=" $!"
 expect_state V1 '"health":"NORMAL"'
 expect_state V2 '"health":"CHECK_FUNCTION"'
 mosquitto_sub -p $port -C 1 -W 5 -t fdi/north/monitor | grep -q '"alive":true' ||
