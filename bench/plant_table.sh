@@ -20,7 +20,7 @@ simulate() {  # TAG SEED COLUMNS OPTION...
   local tag=$1 seed=$2 columns=$3
   shift 3
   "$bin/fdi-simulator" run --no-publish --speed max --excitation level-loop \
-    --duration "$seconds" --seed "$seed" --export one.csv "$@" >/dev/null
+    --duration "$seconds" --seed "$seed" -o one.csv "$@" >/dev/null
   awk -F, -v tag="$tag" -v columns="$columns" '
     NR == 1 {
       n = split(columns, name, " ")

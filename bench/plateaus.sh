@@ -22,7 +22,7 @@ simulate() {  # FILE CV SECONDS OPTION...
   run fdi-simulator run --no-publish --speed max --parameters lublin-actuator-3 \
     --excitation operating-point --set "excitation.cv_pct=$2" \
     --set excitation.amplitude_pct=1.5 --set excitation.period_s=90 \
-    --seed $seed --duration "$3" --export "$1" "${@:4}"
+    --seed $seed --duration "$3" -o "$1" "${@:4}"
 }
 
 score() {

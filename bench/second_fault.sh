@@ -24,14 +24,14 @@ run() {  # PROGRAM ARGUMENT...
 
 simulate() {  # FILE SEED OPTION...
   run fdi-simulator run --no-publish --seed "$2" --parameters lublin-actuator-3 \
-    --export "$1" "${@:3}"
+    -o "$1" "${@:3}"
 }
 
 for loop in $loops; do
   setting=(--excitation level-loop)
   judge=(--valve V)
   if [ "$loop" = open ]; then
-    setting=(--excitation sine --set continuous_inputs=true --cold-start)
+    setting=(--excitation sine --set continuous_inputs=true --set cold_start=true)
     judge=(--model-set benchmark)
     run fdi-trainer train --campaign campaigns/benchmark.toml
   else

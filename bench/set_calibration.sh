@@ -68,7 +68,7 @@ simulate() {  # FILE ROWS OPTION...
   [ -z "${types[$name]:-}" ] || loop=inventory-loop
   seed=$((seed + 1))
   run_valve $loop --set period_s="$period" --duration $(($2 * period)) \
-    --seed "$seed" --export "$1.all" "${@:3}"
+    --seed "$seed" -o "$1.all" "${@:3}"
   awk -F, -v OFS=, -v only="${FDI_SIGNALS:-CV,P1,P2,T1,X,F}" '
     NR == 1 { for (i = 1; i <= NF; ++i) {
       split($i, name, "_")
@@ -82,7 +82,7 @@ simulate() {  # FILE ROWS OPTION...
 # FAULT[-] STRENGTH: whether it moves F or X by $effect % of the mean.
 moves() {
   local sign=${1//[^-]/}
-  run_valve "csv:$work/inputs.csv" --set noise=false --export "$work/moved.csv" \
+  run_valve "csv:$work/inputs.csv" --set noise=false -o "$work/moved.csv" \
     --fault "${1%-}:abrupt@60:strength=$sign$2"
   awk -F, -v effect="$effect" '
     FNR == 1 { for (i = 1; i <= NF; ++i) column[substr($i, 1, 2)] = i; next }
@@ -100,7 +100,7 @@ moves() {
 find_strengths() {
   local fault effect low high middle
   head -n 301 "$work/healthy.csv.all" | cut -d, -f1-7 >"$work/inputs.csv"
-  run_valve "csv:$work/inputs.csv" --set noise=false --export "$work/still.csv"
+  run_valve "csv:$work/inputs.csv" --set noise=false -o "$work/still.csv"
   faults=()
   for effect in $FDI_EFFECTS; do
     for fault in "${moving[@]}"; do

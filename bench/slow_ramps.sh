@@ -40,7 +40,7 @@ run() {  # PROGRAM ARGUMENT...
 simulate() {  # SECONDS OPTION...
   seed=$((seed + 1))
   run fdi-simulator run --no-publish --speed max --seed "$seed" --duration "$1" \
-    --parameters lublin-actuator-3 "${setting[@]}" --export "$work/run.csv" "${@:2}"
+    --parameters lublin-actuator-3 "${setting[@]}" -o "$work/run.csv" "${@:2}"
 }
 
 evaluate() {  # a line of the file, the faults of its set joined by bars

@@ -19,7 +19,7 @@ TIMEFORMAT='%U s of CPU'
 
 simulate() {  # NAME SECONDS OPTION...
   "$bin/fdi-simulator" run --no-publish --speed max --excitation level-loop \
-    --seed "$seed" --duration "$2" --export "$work/$1.csv" "${@:3}" >/dev/null
+    --seed "$seed" --duration "$2" -o "$work/$1.csv" "${@:3}" >/dev/null
   seed=$((seed + 1))
 }
 

@@ -42,7 +42,7 @@ run() {  # PROGRAM ARGUMENT...
 
 simulate() {  # FILE OPTION...
   run fdi-simulator run --no-publish --seed "$seed" --duration "$seconds" \
-    "${setting[@]}" --export "$@"
+    "${setting[@]}" -o "$@"
 }
 
 simulate_fault() {  # FILE FAULT STRENGTH OPTION...
@@ -51,7 +51,7 @@ simulate_fault() {  # FILE FAULT STRENGTH OPTION...
 
 if [ "$campaign" = onboarded ]; then
   run fdi-simulator run --no-publish --seed $((seed + 1)) --duration 7200 \
-    "${setting[@]}" --export "$work/healthy.csv"
+    "${setting[@]}" -o "$work/healthy.csv"
   run fdi-trainer onboard --valve V --file "$work/healthy.csv" --no-coverage
   set_name=five
   without=f8,$(printf '%s\n' "${untrained[@]}" | grep -v -- - | paste -sd,)

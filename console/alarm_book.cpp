@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "base/error.h"
+#include "storage/history/foreign_history.h"
 
 namespace fdi::console {
 namespace {
@@ -114,6 +115,7 @@ std::vector<Json> AlarmBook::Read(storage::History& history,
   ReadFacts(history, now_ns);
   const auto facts = Facts();
   const std::vector<Alarm> alarms = history.AlarmList(now_ns, kMaxAlarms);
+  std::string note = storage::TakeNote(history);
   const auto shelves = history.Shelves(now_ns);
   std::map<std::string, std::string> last;
   {
@@ -157,6 +159,7 @@ std::vector<Json> AlarmBook::Read(storage::History& history,
   ByValveMap stored = ByValveOf(alarms, shelves, now_ns, texts_);
   const MutexLock lock(mutex_);
   rows_ = std::move(rows);
+  note_ = std::move(note);
   stored_ = std::move(stored);
   std::erase_if(unstored_, [this](const auto& item) REQUIRES(mutex_) {
     return rows_.contains(item.first);
@@ -193,6 +196,17 @@ bool AlarmBook::OnEvent(const FaultEvent& event) {
   }
   Combine();
   return true;
+}
+
+AlarmBook::Rows AlarmBook::Stored() const {
+  const MutexLock lock(mutex_);
+  Rows stored;
+  for (const auto& [id, text] : rows_) {
+    stored.rows.push_back(Json::parse(text));
+  }
+  stored.note =
+      away_ ? "as of the last answer of the history: " + away_->reason : note_;
+  return stored;
 }
 
 std::vector<Alarm> AlarmBook::UnstoredAlarms() const {

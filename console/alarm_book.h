@@ -52,6 +52,13 @@ class AlarmBook {
   /// history contains it or it closes. @returns false if the history already
   /// has it, with its acknowledgement. Thread safe.
   bool OnEvent(const FaultEvent& event);
+  /// The alarms of the history as of the last Refresh(), and what to say of
+  /// them. Thread safe.
+  struct Rows {
+    std::vector<Json> rows;
+    std::string note;
+  };
+  Rows Stored() const;
   /// Alarms that were heard and are not in the history. Thread safe.
   std::vector<storage::Alarm> UnstoredAlarms() const;
   /// The error of the last Refresh(), if it failed. Thread safe.
@@ -76,7 +83,8 @@ class AlarmBook {
   std::shared_ptr<const findings::RankFacts> facts_ GUARDED_BY(mutex_){
       std::make_shared<findings::RankFacts>()};
   std::map<std::string, std::string> rows_
-      GUARDED_BY(mutex_);  // By episode, as last returned.
+      GUARDED_BY(mutex_);                // By episode, as last returned.
+  std::string note_ GUARDED_BY(mutex_);  // TakeNote() of them.
   std::map<std::string, storage::Alarm> unstored_
       GUARDED_BY(mutex_);                 // By episode.
   ByValveMap stored_ GUARDED_BY(mutex_);  // As by_valve_, without unstored_.

@@ -29,19 +29,19 @@ constexpr std::int64_t kPageLimit = 1000;
 
 Json Alarms(const Api& api, const httplib::Request& /*request*/) {
   const std::int64_t now_ns = api.sources.utc_now_ns();
-  // While the history of a plant is unavailable, alarms heard on the bus are
-  // used.
   std::vector<storage::Alarm> alarms = api.alarms.UnstoredAlarms();
-  std::string note;
-  if (!api.sources.plant_history || !api.alarms.away()) {
-    const auto reader = api.History();
-    std::ranges::move(reader->AlarmList(now_ns, kMaxAlarms),
+  const bool plant = api.sources.plant_history != nullptr;
+  if (!plant) {
+    std::ranges::move(api.History()->AlarmList(now_ns, kMaxAlarms),
                       std::back_inserter(alarms));
-    note = storage::TakeNote(*reader);
   }
+  Json rows = AlarmsJson(alarms, api.texts, *api.alarms.Facts());
+  // A database that is locked or out of reach holds up nobody who asks.
+  AlarmBook::Rows last = plant ? api.alarms.Stored() : AlarmBook::Rows{};
+  std::ranges::move(last.rows, std::back_inserter(rows));
   return {{"now_ms", Ms(now_ns)},
-          {"alarms", AlarmsJson(alarms, api.texts, *api.alarms.Facts())},
-          {"note", TextOrNull(note)}};
+          {"alarms", std::move(rows)},
+          {"note", TextOrNull(last.note)}};
 }
 
 storage::EpisodeFilter FilterOf(const Api& api,

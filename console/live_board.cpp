@@ -280,12 +280,16 @@ void LiveBoard::ShowLocked(Slot& slot, const Sample& sample,
 
 void LiveBoard::OnVerdict(const std::string& valve_id, const Sample& sample,
                           const monitor::ValveOutcome& outcome) {
-  if (OutOfOrder(outcome.verdict.intake)) {
-    return;
-  }
   const ModelSet* const models = outcome.models;
   Slot& slot = At(valve_id);
   const MutexLock lock(slot.mutex);
+  if (outcome.contested !=
+      std::exchange(slot.now.contested, outcome.contested)) {
+    ++slot.now.version;
+  }
+  if (OutOfOrder(outcome.verdict.intake)) {
+    return;
+  }
   auto facts = slot.now.models;
   // The pointer alone does not tell: a new set may be at the address of one
   // that was freed.

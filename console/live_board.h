@@ -30,6 +30,7 @@ struct ValveState {
   Intake intake{Intake::kAccepted};     ///< Of the newest sample.
   SignalMask refused{0};                ///< Because of these signals.
   std::vector<std::string> unjudged{};  ///< Channels that abstain now.
+  bool contested{false};                ///< See monitor::ValveOutcome.
   bool blind{false};  ///< Every known fault looks normal to the model set.
   FaultSet isolated{0};
   double factor{0.0};    ///< The largest of the isolated set [-].

@@ -5,7 +5,6 @@
 
 #include "base/text.h"
 #include "base/time_units.h"
-#include "import/mode_word.h"
 
 // Time is that of the stamps. The clock of a source that is silent goes on with
 // the steady clock of the caller:

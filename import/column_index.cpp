@@ -1,8 +1,6 @@
 #include "import/column_index.h"
 
 #include <algorithm>
-#include <cstring>
-#include <optional>
 #include <utility>
 
 #include "base/csv_cells.h"
@@ -30,46 +28,6 @@ std::string_view FirstLines(std::string_view text, std::size_t count) {
     end = line_break + 1;
   }
   return text.substr(0, end);
-}
-
-// The quotes of a record, line by line.
-struct OpenQuote {
-  bool quoted{false};
-  bool at_begin{true};
-
-  // Whether the record goes on after `line`, because a quote is open.
-  bool Take(std::string_view line, char separator) {
-    for (const char c : line) {
-      if (c == '"' && (at_begin || quoted)) {
-        quoted = !quoted;
-        at_begin = !quoted;  // The second of a doubled quote reopens it.
-      } else if (!quoted) {
-        at_begin = c == separator || (at_begin && c == ' ');
-      }
-    }
-    return quoted;
-  }
-};
-
-// A long table of many tags does not show in its first lines that the tags
-// repeat; its header does.
-std::optional<LongTable> LongByNames(const std::vector<std::string>& names) {
-  LongTable table;
-  bool has_tag = false;
-  bool has_value = false;
-  for (const std::string& name : names) {
-    const std::string plain = PlainText(name);
-    if (!has_tag && (plain == "tag" || plain == "tagname" ||
-                     plain == "tag_name" || plain == "point")) {
-      table.tag = name;
-      has_tag = true;
-    } else if (!has_value && (plain == "value" || plain == "wert")) {
-      table.value = name;
-      has_value = true;
-    }
-  }
-  return has_tag && has_value && names.size() <= 8 ? std::optional(table)
-                                                   : std::nullopt;
 }
 
 std::string_view Trimmed(std::string_view cell) {
@@ -122,10 +80,8 @@ void ColumnIndex::FindForm(const ColumnMap& map) {
     form_.time_column = kTimeColumn;  // Which FindLayout() need not say.
   }
   form_.clock_column = layout.map.clock_column;
+  form_.ms_column = layout.map.ms_column;
   form_.long_table = layout.map.long_table;
-  if (!form_.long_table) {
-    form_.long_table = LongByNames(names_);
-  }
   form_.quality_of = layout.map.quality_of;
   if (form_.long_table) {
     return;
@@ -135,30 +91,17 @@ void ColumnIndex::FindForm(const ColumnMap& map) {
         form_.quality_of,
         [&](const auto& entry) { return entry.second == name; });
     if (!quality && !SameName(name, form_.time_column) &&
-        !SameName(name, form_.clock_column)) {
+        !SameName(name, form_.clock_column) &&
+        !SameName(name, form_.ms_column)) {
       tags_.push_back(name);
     }
   }
 }
 
-// Quotes are those of CsvCells: at the begin of a cell only, doubled inside.
 void ColumnIndex::IndexRows() {
   std::size_t line = 1;
   for (std::size_t begin = 0; begin < text_.size();) {
-    const std::size_t first_line = line++;
-    std::size_t end = std::min(text_.find('\n', begin), text_.size());
-    if (std::memchr(text_.data() + begin, '"', end - begin) != nullptr) {
-      OpenQuote quote;
-      std::size_t from = begin;
-      while (quote.Take(std::string_view(text_).substr(from, end - from),
-                        form_.separator) &&
-             end < text_.size()) {
-        from = end;
-        end = std::min(text_.find('\n', end + 1), text_.size());
-        ++line;
-      }
-    }
-    TakeRecord(begin, end, first_line);
+    begin = TakeRecord(begin, line) + 1;
     if (packed_ &&
         (bytes() > kMaxPacked || rows_of_tag_.size() > kMaxColumns)) {
       throw DataError(source_ +
@@ -166,54 +109,55 @@ void ColumnIndex::IndexRows() {
                       "not; try to unpack it with gunzip first, or to export "
                       "fewer tags at a time");
     }
-    begin = end + 1;
+  }
+  for (const auto& [tag, rows] : rows_of_tag_) {
+    tags_.push_back(tag);
   }
   if (form_.long_table) {
-    for (const auto& [tag, rows] : rows_of_tag_) {
-      tags_.push_back(tag);
-    }
     std::ranges::sort(tags_);
   }
 }
 
 // Of a wide table the begin of each cell is kept, in bytes from that of the
-// record; of a long one the rows of each tag.
-void ColumnIndex::TakeRecord(std::size_t begin, std::size_t end,
-                             std::size_t line) {
-  const std::string_view record(text_.data() + begin, end - begin);
-  if (record.starts_with('#') || record.starts_with("sep=") ||
-      record.find_first_not_of(" \t\r") == std::string_view::npos) {
-    return;
+// record; of a long one the rows of each tag. Quotes are those of CsvCells: at
+// the begin of a cell only, doubled inside, where the second one reopens them.
+std::size_t ColumnIndex::TakeRecord(std::size_t begin, std::size_t& line) {
+  Row row{begin, 0, cells_.size(), 0, line++};
+  std::size_t end = std::min(text_.find('\n', begin), text_.size());
+  const auto first = std::string_view(text_).substr(begin, end - begin);
+  if (first.starts_with('#') || first.starts_with("sep=") ||
+      first.find_first_not_of(" \t\r") == std::string_view::npos) {
+    return end;
   }
-  Row row{begin, record.size(), cells_.size(), 0, line};
   bool quoted = false;
   bool at_begin = true;
   cells_.push_back(0);
-  const std::size_t tag = form_.long_table ? ColumnOf(form_.long_table->tag)
-                                           : std::string_view::npos;
-  for (std::size_t i = 0; i < record.size(); ++i) {
-    const char c = record[i];
+  for (end = begin; end < text_.size() && (quoted || text_[end] != '\n');
+       ++end) {
+    const char c = text_[end];
+    line += c == '\n' ? 1U : 0U;
     if (c == '"' && (at_begin || quoted)) {
       quoted = !quoted;
       at_begin = !quoted;
     } else if (c == form_.separator && !quoted) {
-      cells_.push_back(static_cast<std::uint32_t>(i + 1));
+      cells_.push_back(static_cast<std::uint32_t>(end - begin + 1));
       at_begin = true;
     } else if (c != ' ' && !quoted) {
       at_begin = false;
     }
   }
+  row.length = end - begin;
   row.count = cells_.size() - row.first_cell;
-  const auto header_end = static_cast<std::size_t>(form_.skip) +
-                          static_cast<std::size_t>(form_.header_rows);
   if (form_.long_table) {
-    if (tag < row.count && line > header_end) {
+    const std::size_t tag = ColumnOf(form_.long_table->tag);
+    if (tag < row.count && row.line > HeaderEnd()) {
       rows_of_tag_[std::string(Trimmed(CellAt(row, tag)))].push_back(
           rows_.size());
     }
     cells_.resize(row.first_cell);  // Whole rows are kept.
   }
   rows_.push_back(row);
+  return end;
 }
 
 std::string_view ColumnIndex::CellAt(const Row& row, std::size_t cell) const {
@@ -244,9 +188,7 @@ std::size_t ColumnIndex::bytes() const {
 
 // Rows keep their line: an empty line stands for each that is left out, so that
 // ReadCsv() reports mistakes by the lines of the original file.
-std::string ColumnIndex::Project(
-    const std::vector<std::string>& tags, const std::string& words_of,
-    const std::map<std::string, std::string>& words) const {
+std::string ColumnIndex::Project(const std::vector<std::string>& tags) const {
   if (form_.long_table) {
     return ProjectLong(tags);
   }
@@ -259,6 +201,7 @@ std::string ColumnIndex::Project(
     }
   };
   add(form_.clock_column);
+  add(form_.ms_column);
   for (const std::string& tag : tags) {
     add(tag);
     if (const auto found = form_.quality_of.find(tag);
@@ -268,18 +211,6 @@ std::string ColumnIndex::Project(
   }
   // A column of quality is that of the columns before it.
   std::ranges::sort(columns);
-  const std::size_t translated =
-      words.empty() ? names_.size() : ColumnOf(words_of);
-  const auto add_cell = [&](std::string_view cell, std::size_t column,
-                            std::string& table) {
-    if (column == translated) {
-      const auto found = std::ranges::find_if(words, [&](const auto& word) {
-        return SameName(word.first, Trimmed(cell));
-      });
-      cell = found == words.end() ? cell : std::string_view(found->second);
-    }
-    table += cell;
-  };
   std::string table;
   std::size_t line = 1;
   for (const Row& row : rows_) {
@@ -290,7 +221,7 @@ std::string ColumnIndex::Project(
       if (i > 0) {
         table += form_.separator;
       }
-      add_cell(CellAt(row, columns[i]), columns[i], table);
+      table += CellAt(row, columns[i]);
     }
     table += '\n';
     ++line;
@@ -301,9 +232,7 @@ std::string ColumnIndex::Project(
 std::string ColumnIndex::ProjectLong(
     const std::vector<std::string>& tags) const {
   std::vector<std::size_t> chosen;
-  const auto header_end = static_cast<std::size_t>(form_.skip) +
-                          static_cast<std::size_t>(form_.header_rows);
-  for (std::size_t i = 0; i < rows_.size() && rows_[i].line <= header_end;
+  for (std::size_t i = 0; i < rows_.size() && rows_[i].line <= HeaderEnd();
        ++i) {
     chosen.push_back(i);
   }

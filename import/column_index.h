@@ -32,11 +32,7 @@ class ColumnIndex {
   std::size_t bytes() const;
 
   /// The table with its times and these tags alone, rows in the same lines.
-  /// @param words of the column `words_of` of a wide table (in any case), and
-  ///   what stands for them in the result.
-  std::string Project(
-      const std::vector<std::string>& tags, const std::string& words_of = {},
-      const std::map<std::string, std::string>& words = {}) const;
+  std::string Project(const std::vector<std::string>& tags) const;
 
  private:
   struct Row {
@@ -48,7 +44,12 @@ class ColumnIndex {
   };
   void FindForm(const ColumnMap& map);
   void IndexRows();
-  void TakeRecord(std::size_t begin, std::size_t end, std::size_t line);
+  /// @param line of its first line; set behind its last. @returns its end.
+  std::size_t TakeRecord(std::size_t begin, std::size_t& line);
+  /// The last line of the header.
+  std::size_t HeaderEnd() const {
+    return static_cast<std::size_t>(form_.skip + form_.header_rows);
+  }
   std::string_view CellAt(const Row& row, std::size_t cell) const;
   std::size_t ColumnOf(std::string_view name) const;
   std::string ProjectLong(const std::vector<std::string>& tags) const;

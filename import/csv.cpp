@@ -13,7 +13,6 @@
 #include "diagnosis/model/fault_catalogue.h"
 #include "import/elapsed.h"
 #include "import/layout.h"
-#include "import/mode_word.h"
 #include "import/tag_map.h"
 
 namespace fdi::importer {
@@ -21,38 +20,22 @@ namespace {
 
 /// 100 years: later times would overflow nanoseconds since `start_ns`.
 constexpr double kMaxSeconds = 3.2e9;
-constexpr double kSecondsPerDay = 86400.0;
-/// 1970-01-01 in units of 100 ns since 1601 and since year 1, and 100 years.
-constexpr std::int64_t kFileTimeOf1970 = 116'444'736'000'000'000;
-constexpr std::int64_t kTicksOf1970 = 621'355'968'000'000'000;
-constexpr std::int64_t kMaxFileTime = 32'000'000'000'000'000;
-/// 1970-01-01 in seconds since 1904.
-constexpr std::int64_t k1970Since1904 = 2'082'844'800;
 constexpr const char* kSniff =
-    "; try: fdi-store runs sniff FILE --map-output tags.toml, then --map "
+    "; try: fdi-store runs sniff FILE -o tags.toml, then --map "
     "tags.toml";
 
-bool IsOneOf(std::string_view cell,
-             std::initializer_list<std::string_view> words) {
-  return std::ranges::any_of(
-      words, [cell](std::string_view word) { return SameName(cell, word); });
-}
-
-// 1970-01-01 in days of a form; 0 if it does not count days.
-double DaysOf1970(TimeForm form) {
-  switch (form) {
-    case TimeForm::kSerial:
-      return 25569.0;
-    case TimeForm::kDateNumber:
-      return 719529.0;
-    case TimeForm::kJulian:
-      return 2440587.5;
-    case TimeForm::kModifiedJulian:
-      return 40587.0;
-    default:
-      return 0.0;
-  }
-}
+/// Words of controllers. In cascade the controller acts, too; what tracks or is
+/// local does not. Numbers differ between systems, except in a column `auto`.
+struct ModeWords {
+  ValveMode mode;
+  std::string_view words;
+  std::string_view of_auto;
+};
+constexpr ModeWords kModeWords[] = {
+    {ValveMode::kAuto, "|aut|a|cas|cascade|rcas|c|", "|1|1.0|true|yes|on|"},
+    {ValveMode::kManual, "|man|m|iman|imanual|lo|rout|track|trk|local|",
+     "|0|0.0|false|no|"},
+    {ValveMode::kOutOfService, "|oos|o/s|off|", ""}};
 
 /// The names that `signal` may have in a header: "F_m3_h or F_t_h".
 std::string ColumnNames(Signal signal) {
@@ -136,74 +119,24 @@ std::vector<std::string> RowOf(const LabelledSample& labelled,
 
 }  // namespace
 
-std::optional<std::string> Unflagged(std::string_view cell) {
-  if (cell.size() < 2 || (cell.back() != '?' && cell.back() != '*')) {
-    return std::nullopt;
+std::optional<ValveMode> ModeOfWord(std::string_view word) {
+  if (const auto mode = ParseValveMode(word)) {
+    return mode;
   }
-  cell.remove_suffix(1);
-  const auto last = static_cast<unsigned char>(cell.back());
-  const auto [number, unit] = SplitUnit(cell);
-  return unit.empty() && std::isdigit(last) != 0
-             ? std::optional(std::string(number))
-             : std::nullopt;
+  const auto* const row = std::ranges::find_if(
+      kModeWords,
+      [&](const auto& each) { return IsListedWord(Lower(word), each.words); });
+  return row == std::end(kModeWords) ? std::nullopt : std::optional(row->mode);
 }
 
-// Told apart by name and size, e.g. 6e8 .. 4e9 s since 1970 are 1989 to 2096:
-//
-//     t_s           elapsed seconds
-//     6e8 .. 4e9    seconds since 1970, and thousandths to billionths of them
-//     3.5e9 .. 4.3e9    seconds since 1904, 2014 to 2040
-//     1.22e17 .. 1.6e17    100 ns since 1601, 1987 to 2107
-//     6.2e17 .. 6.7e17     100 ns since year 1, 1965 to 2124
-//     3e4 .. 7e4    days of a spreadsheet, 1982 to 2091
-//     7.2e5 .. 7.7e5       days of MATLAB, 1971 to 2108
-//     2.44e6 .. 2.5e6      Julian days, 1968 to 2132
-//     else          elapsed, in seconds or the unit at the end of the name
-//
-// A whole number of days is rather a count of seconds than a midnight, and so
-// is any number in a column whose name ends in that unit. Nobody has readings
-// of 2080 yet: what would be seconds since 1970 then counts from 1904.
-TimeUnit TimeUnitOf(std::string_view name, double first) {
-  if (SameName(name, kTimeColumn)) {
-    return {TimeForm::kElapsed, 1.0};
+// A number with one of these signs behind it, and nothing else.
+std::string_view WithoutFlag(std::string_view cell) {
+  if (cell.size() < 2 || (cell.back() != '?' && cell.back() != '*') ||
+      std::isdigit(static_cast<unsigned char>(cell[cell.size() - 2])) == 0) {
+    return cell;
   }
-  if (first > 1.22e17 && first < 1.6e17) {
-    return {TimeForm::kFileTime, 1e-7};
-  }
-  if (first > 6.2e17 && first < 6.7e17) {
-    return {TimeForm::kTicks, 1e-7};
-  }
-  if (first > 3.5e9 && first < 4.3e9) {
-    return {TimeForm::kSince1904, 1.0};
-  }
-  for (const double scale : {1.0, 1e-3, 1e-6, 1e-9}) {
-    if (first * scale > 6e8 && first * scale < 4e9) {
-      return {TimeForm::kUnix, scale};
-    }
-  }
-  static constexpr std::pair<const char*, double> kEndings[] = {
-      {"s", 1.0}, {"ms", 1e-3}, {"us", 1e-6}, {"min", 60.0}, {"h", 3600.0}};
-  for (const auto& [unit, scale] : kEndings) {
-    const std::string text(unit);
-    if (name.ends_with('_' + text) || name.ends_with('[' + text + ']') ||
-        name.ends_with('(' + text + ')')) {
-      return {TimeForm::kElapsed, scale};
-    }
-  }
-  const bool midnight = first == std::floor(first);
-  if (HasWord(PlainText(name), "mjd|modified julian") && first > 4e4 &&
-      first < 8e4) {
-    return {TimeForm::kModifiedJulian, 1.0};
-  }
-  if (first > 2.44e6 && first < 2.5e6 &&
-      (!midnight || HasWord(PlainText(name), "jd|julian"))) {
-    return {TimeForm::kJulian, 1.0};
-  }
-  return {midnight                         ? TimeForm::kElapsed
-          : first > 3e4 && first < 7e4     ? TimeForm::kSerial
-          : first > 7.2e5 && first < 7.7e5 ? TimeForm::kDateNumber
-                                           : TimeForm::kElapsed,
-          1.0};
+  const std::string_view number = cell.substr(0, cell.size() - 1);
+  return SplitUnit(number).second.empty() ? number : cell;
 }
 
 // With the period T and the step d of two samples, |d - T| < T/2 is accepted:
@@ -441,6 +374,11 @@ std::optional<double> CsvReader::Reading(const Conversion& c,
     ++beyond_[Index(c.mapping.signal)];
     return std::nullopt;
   }
+  if (value && c.mapping.root) {
+    const auto [low, high] = *c.mapping.root;
+    const double share = std::max((*value - low) / (high - low), 0.0);
+    value = low + (high - low) * std::sqrt(share);
+  }
   // Skipped for the identity: 0 + 1 * value would lose the sign of −0.
   if (value && (c.mapping.scale != 1.0 || c.mapping.offset != 0.0)) {
     value = c.mapping.offset + c.mapping.scale * *value;
@@ -484,13 +422,15 @@ void CsvReader::Convert(const Conversion& c, Sample& sample) {
   SignalQuality quality =
       c.quality ? QualityAt(*c.quality) : SignalQuality::kGood;
   const std::string& cell = Cell(c.column);
-  const auto unflagged = Unflagged(cell);
-  if (unflagged && quality == SignalQuality::kGood) {
+  const std::string_view number = WithoutFlag(cell);
+  if (number.size() < cell.size() && quality == SignalQuality::kGood) {
     quality = SignalQuality::kUncertain;
   }
-  std::optional<double> value = quality == SignalQuality::kBad
-                                    ? std::nullopt
-                                    : Reading(c, unflagged ? *unflagged : cell);
+  const auto value_of = [&](const std::string& whole) {
+    return quality == SignalQuality::kBad ? std::nullopt : Reading(c, whole);
+  };
+  auto value = number.size() == cell.size() ? value_of(cell)
+                                            : value_of(std::string(number));
   if (!value) {
     sample.quality[Index(signal)] = SignalQuality::kBad;
     return;
@@ -520,16 +460,38 @@ bool CsvReader::TakeTagged(Sample& sample) {
   return true;
 }
 
+std::optional<SignalQuality> CsvReader::KnownQualityAt(
+    std::size_t column) const {
+  const std::string& cell = Cell(column);
+  const auto code = options_.map.quality_codes.find(names_[column]);
+  return QualityOf(cell, options_.map.quality,
+                   code != options_.map.quality_codes.end()
+                       ? code->second
+                       : QualityCodeOf(names_[column], {{cell, 1}}));
+}
+
+CsvReader::ScannedCell CsvReader::ScannedAt(std::size_t column) const {
+  const std::string& cell = Cell(column);
+  const auto quality = tag_column_ ? quality_column_ : qualities_[column];
+  if (quality && KnownQualityAt(*quality) == SignalQuality::kBad) {
+    return {.missing = true};
+  }
+  const std::string_view plain = WithoutFlag(cell);
+  if (const auto value = ParseNumber(plain, options_.map.decimal)) {
+    return {value};
+  }
+  if (IsNoReading(plain, options_.map.no_reading)) {
+    return {.missing = true};
+  }
+  const auto [number, unit] = SplitUnit(plain);
+  return {unit.empty() || IsUnit(unit) ? Parsed(number) : std::nullopt, unit};
+}
+
 // What is not known is refused: taken as bad it would empty a file in silence,
 // taken as good it would let anything pass.
 SignalQuality CsvReader::QualityAt(std::size_t column) const {
   const std::string& cell = Cell(column);
-  const auto code = options_.map.quality_codes.find(names_[column]);
-  const auto quality =
-      QualityOf(cell, options_.map.quality,
-                code != options_.map.quality_codes.end()
-                    ? code->second
-                    : QualityCodeOf(names_[column], {{cell, 1}}));
+  const auto quality = KnownQualityAt(column);
   if (!quality) {
     Refuse("column " + Quoted(names_[column]) + ": " + Quoted(cell) +
            (cell == "0" ? " is good in OPC UA and bad in OPC DA; try good = "
@@ -619,11 +581,20 @@ void CsvReader::TakeHeader() {
   if (!map.clock_column.empty()) {
     clock_column_ = Column(map.clock_column);
   }
+  if (!map.ms_column.empty()) {
+    ms_column_ = Column(map.ms_column);
+  }
   if (map.long_table) {
     TakeLongHeader();
     return;
   }
   if (options_.scan) {
+    for (const std::string& name : names_) {
+      const auto quality = map.quality_of.find(name);
+      qualities_.push_back(quality == map.quality_of.end()
+                               ? std::nullopt
+                               : Column(quality->second));
+    }
     used_.clear();
     if (!time_column_) {
       Refuse("no column of " + Quoted(Listed(names_)) +
@@ -794,6 +765,7 @@ void CsvReader::CheckHeader() const {
                                         ? kTimeColumn
                                         : std::string_view(map.time_column));
   require(clock_column_ || map.clock_column.empty(), map.clock_column);
+  require(ms_column_ || map.ms_column.empty(), map.ms_column);
   require(mode_column_ || map.mode_column.empty(), map.mode_column);
   for (const ColumnMapping& m : map.columns) {
     require((header_.signals & MaskOf(m.signal)) != 0, m.column);
@@ -863,43 +835,26 @@ double CsvReader::Number(std::size_t column) const {
   return *value;
 }
 
-std::optional<ValveMode> ModeOfWord(std::string_view word) {
-  if (const std::optional<ValveMode> mode = ParseValveMode(word)) {
-    return mode;
-  }
-  // In cascade the controller acts, too; what tracks or is local does not.
-  if (IsOneOf(word, {"aut", "a", "cas", "cascade", "rcas", "c"})) {
-    return ValveMode::kAuto;
-  }
-  if (IsOneOf(word, {"man", "m", "iman", "imanual", "lo", "rout", "track",
-                     "trk", "local"})) {
-    return ValveMode::kManual;
-  }
-  if (IsOneOf(word, {"oos", "o/s", "off"})) {
-    return ValveMode::kOutOfService;
-  }
-  return std::nullopt;
-}
-
 ValveMode CsvReader::Mode() const {
-  const std::string_view cell = record_.cells()[*mode_column_];
-  if (const std::optional<ValveMode> mode = ModeOfWord(cell)) {
+  const std::string& cell = Cell(*mode_column_);
+  const std::string& name = names_[*mode_column_];
+  for (const auto& [word, mode] : options_.map.mode_words) {
+    if (SameName(word, cell)) {
+      return mode;
+    }
+  }
+  if (const auto mode = ModeOfWord(cell)) {
     return *mode;
   }
-  // Numbers of modes differ between systems, except in a column of this name.
-  const std::string& name = names_[*mode_column_];
-  if (SameName(name, kAutoColumn) &&
-      IsOneOf(cell, {"1", "1.0", "true", "yes", "on"})) {
-    return ValveMode::kAuto;
-  }
-  if (SameName(name, kAutoColumn) &&
-      IsOneOf(cell, {"0", "0.0", "false", "no"})) {
-    return ValveMode::kManual;
+  for (const ModeWords& row : kModeWords) {
+    if (SameName(name, kAutoColumn) && IsListedWord(Lower(cell), row.of_auto)) {
+      return row.mode;
+    }
   }
   Refuse("column " + Quoted(name) + ": " + Quoted(cell) + " is none of " +
          std::string(kValveModeNames) +
-         ", AUT, CAS, RCAS, MAN, IMAN, LO, OOS; try these words, or 1 and 0 in "
-         "a column named auto");
+         ", AUT, CAS, RCAS, MAN, IMAN, LO, OOS; try these words, 1 and 0 in a "
+         "column named auto, or auto and manual under [mode] of --map");
 }
 
 FaultTruth CsvReader::Truth() const {
@@ -940,33 +895,30 @@ FaultTruth CsvReader::Truth() const {
 // What rests on a guess is noted for the user.
 void CsvReader::FindTimeForm(const std::string& cell) {
   const ColumnMap& map = options_.map;
-  time_form_ = map.time_form;
-  time_scale_ = map.time_scale;
-  if (time_form_ != TimeForm::kFindOut) {
+  time_unit_ = map.time_unit;
+  if (time_unit_.form != TimeForm::kFindOut) {
     return;
   }
   const std::string& name = names_[*time_column_];
   const auto number =
       ParseNumber(cell, map.decimal == '\0' ? '.' : map.decimal);
   if (!number && !ScanTime(cell, map.date_order) && ParseElapsed(cell)) {
-    time_form_ = TimeForm::kClock;
+    time_unit_.form = TimeForm::kClock;
     notes_.push_back("column " + name +
                      " has times without a date: --start says when they begin");
     return;
   }
   // "20260310090000" is both.
   if (!number || ScanTime(cell, map.date_order)) {
-    time_form_ = TimeForm::kText;
+    time_unit_.form = TimeForm::kText;
     return;
   }
-  const TimeUnit unit = TimeUnitOf(name, *number);
-  time_form_ = unit.form;
-  time_scale_ *= unit.scale;
+  time_unit_ = TimeUnitOf(name, *number);
   if (SameName(name, kTimeColumn)) {
     return;
   }
   notes_.push_back("column " + name + " taken as " +
-                   std::string(TimeUnitName({time_form_, time_scale_})) +
+                   std::string(TimeUnitName(time_unit_)) +
                    " (guessed; unit under [time] confirms it)");
 }
 
@@ -994,21 +946,20 @@ std::string CsvReader::NoTime(const std::string& cell) const {
 // Of text and spreadsheet days; nothing for the second that UTC repeats.
 std::optional<std::int64_t> CsvReader::UtcOf(const std::string& cell) {
   std::optional<CivilTime> time;
-  if (time_form_ == TimeForm::kText) {
+  if (time_unit_.form == TimeForm::kText) {
     time = ScanTime(cell, options_.map.date_order);
-  } else if (const double days = Number(*time_column_) - DaysOf1970(time_form_);
+  } else if (const double days = Number(*time_column_) - time_unit_.of_1970;
              days > -25567.0 && days < 104431.0) {
     // Excel shows times to the millisecond; further digits are rounding
     // errors.
-    const auto ms = std::llround(days * kSecondsPerDay * 1e3);
+    const auto ms = std::llround(days * time_unit_.scale * 1e3);
     // Rounded towards minus infinity, so that the fraction is not negative
     // before 1970 either.
     const std::time_t seconds = (ms - ((ms % 1000) + 1000) % 1000) / 1000;
     time.emplace();
     gmtime_r(&seconds, &time->fields);
     time->fraction_ns = (ms - seconds * 1000) * 1'000'000;
-    if (time_form_ == TimeForm::kJulian ||
-        time_form_ == TimeForm::kModifiedJulian) {
+    if (time_unit_.form == TimeForm::kDaysUtc) {
       time->offset_s = 0;
     }
   }
@@ -1079,42 +1030,34 @@ bool CsvReader::TakeTime(CsvRow& row) {
   }
   // The form of the first row holds for all rows: if each cell were judged by
   // itself, a count of seconds would change its meaning on the way.
-  if (time_form_ == TimeForm::kFindOut) {
+  if (time_unit_.form == TimeForm::kFindOut) {
     FindTimeForm(cell);
   }
   std::int64_t& stamp_ns = row.labelled.sample.stamp_ns;
-  // Nanoseconds since 1970 have more digits than a double.
-  const auto count = ParseWhole<std::int64_t>(cell);
-  if (time_form_ == TimeForm::kFileTime || time_form_ == TimeForm::kTicks) {
-    const std::int64_t begin =
-        time_form_ == TimeForm::kTicks ? kTicksOf1970 : kFileTimeOf1970;
-    if (!count || *count < begin || *count - begin > kMaxFileTime) {
-      throw DataError(NoTime(cell));
-    }
-    stamp_ns = (*count - begin) * 100;
-  } else if (time_form_ == TimeForm::kElapsed ||
-             time_form_ == TimeForm::kUnix ||
-             time_form_ == TimeForm::kSince1904) {
-    row.t_s = Number(*time_column_) * time_scale_;
-    if (time_form_ == TimeForm::kSince1904) {
-      row.t_s -= static_cast<double>(k1970Since1904);
-    }
+  const bool elapsed = time_unit_.form == TimeForm::kElapsed;
+  if (elapsed || time_unit_.form == TimeForm::kCount) {
+    row.t_s = (Number(*time_column_) - time_unit_.of_1970) * time_unit_.scale;
     if (std::abs(row.t_s) > kMaxSeconds) {
       Refuse("column " + Quoted(names_[*time_column_]) + ": time " +
              NumberText(row.t_s) +
              " s is beyond 100 years; try unit under [time] of --map");
     }
-    stamp_ns = count && time_form_ == TimeForm::kUnix
-                   ? *count * std::llround(time_scale_ * 1e9)
-                   : std::llround(row.t_s * 1e9);
-    stamp_ns += time_form_ == TimeForm::kElapsed ? options_.start_ns : 0;
-  } else if (time_form_ == TimeForm::kClock) {
+    // Nanoseconds since 1970 have more digits than a double.
+    const auto count = ParseWhole<std::int64_t>(cell);
+    stamp_ns = count && !elapsed ? (*count - std::llround(time_unit_.of_1970)) *
+                                       std::llround(time_unit_.scale * 1e9)
+                                 : std::llround(row.t_s * 1e9);
+    stamp_ns += elapsed ? options_.start_ns : 0;
+  } else if (time_unit_.form == TimeForm::kClock) {
     row.t_s = ClockOf(cell);
     stamp_ns = std::llround(row.t_s * 1e9) + options_.start_ns;
   } else if (const auto utc = UtcOf(cell)) {
     stamp_ns = *utc;
   } else {
     return false;
+  }
+  if (ms_column_) {
+    stamp_ns += std::llround(Number(*ms_column_) * 1e6);
   }
   if (!first_ns_) {
     first_ns_ = stamp_ns;

@@ -20,6 +20,7 @@
 #include "base/time_text.h"
 #include "diagnosis/model/sample_series.h"
 #include "import/quality.h"
+#include "import/time_unit.h"
 
 namespace fdi::importer {
 
@@ -82,6 +83,8 @@ struct ColumnMapping {
   double lowest{-std::numeric_limits<double>::infinity()};
   double highest{std::numeric_limits<double>::infinity()};
   bool clamped{false};  ///< To 0..100 %: half of a split range.
+  /// Range of a pressure difference in the cells, whose root is the flow.
+  std::optional<std::pair<double, double>> root{};
 };
 
 /// Of a wide table; as many tags may a long one have.
@@ -91,28 +94,6 @@ inline constexpr std::size_t kLongestRecord = 2U << 20U;
 /// Of a table in a gzip, so that a small file does not take much memory; one
 /// that is not packed may have more, at some 170 bytes each.
 inline constexpr std::size_t kMaxPackedRows = 1'000'000;
-
-/// Format of the time column.
-enum class TimeForm {
-  kFindOut,
-  kElapsed,     ///< Seconds (after scaling) from CsvOptions::start_ns.
-  kUnix,        ///< Seconds (after scaling) since 1970.
-  kFileTime,    ///< 100 ns since 1601-01-01.
-  kTicks,       ///< 100 ns since 0001-01-01, as .NET counts.
-  kSince1904,   ///< Seconds since 1904-01-01, as LabVIEW counts.
-  kSerial,      ///< Days of a spreadsheet, 25569 being 1970-01-01, local time.
-  kDateNumber,  ///< Days of MATLAB, 719529 being 1970-01-01, local time.
-  kJulian,      ///< Julian days, 2440587.5 being 1970-01-01, UTC.
-  kModifiedJulian,  ///< Julian days less 2400000.5, UTC.
-  kText,            ///< As ScanTime() reads it.
-  kClock,  ///< Without a date, as ParseElapsed() reads it, from start_ns.
-};
-
-/// Form of a time column, and the unit of its numbers [s].
-struct TimeUnit {
-  TimeForm form{TimeForm::kFindOut};
-  double scale{1.0};
-};
 
 /// A table with one reading per row.
 struct LongTable {
@@ -148,8 +129,8 @@ struct ColumnMap {
   std::vector<std::string> no_reading;  ///< Words beside the usual ones.
   std::string time_column;   ///< Empty: t_s, time, timestamp or datetime.
   std::string clock_column;  ///< Time of day, if in a column of its own.
-  TimeForm time_form{TimeForm::kFindOut};
-  double time_scale{1.0};  ///< To seconds.
+  std::string ms_column;     ///< Milliseconds, if in a column of their own.
+  TimeUnit time_unit;
   DateOrder date_order{DateOrder::kNotSaid};
   std::string zone;  ///< Of times without an offset; empty: the machine's.
   std::optional<LongTable> long_table;
@@ -160,7 +141,9 @@ struct ColumnMap {
   std::map<std::string, QualityCode> quality_codes;
   bool newest_first{false};  ///< Found by FindLayout().
   std::vector<ColumnMapping> columns;
-  std::string mode_column;            ///< Empty: mode or auto, if there is one.
+  std::string mode_column;  ///< Empty: mode or auto, if there is one.
+  /// Words of the mode beside the usual ones.
+  std::map<std::string, ValveMode> mode_words;
   std::optional<FlowUnit> flow_unit;  ///< Needed if the flow is mapped.
   std::optional<GasFlow> gas_flow;
   std::optional<Resampling> resampling;
@@ -281,19 +264,28 @@ class CsvReader {
   const CsvHeader& header() const { return header_; }
   const CsvOptions& options() const { return options_; }
   bool dated() const {
-    return time_form_ != TimeForm::kElapsed && time_form_ != TimeForm::kClock &&
-           time_form_ != TimeForm::kFindOut;
+    return time_unit_.form != TimeForm::kElapsed &&
+           time_unit_.form != TimeForm::kClock &&
+           time_unit_.form != TimeForm::kFindOut;
   }
   const std::vector<std::string>& notes() const { return notes_; }
   const std::vector<std::string>& names() const { return names_; }
   const std::vector<std::string>& cells() const { return record_.cells(); }
-  TimeUnit time_unit() const { return {time_form_, time_scale_}; }
+  const TimeUnit& time_unit() const { return time_unit_; }
   /// Whether the header is over.
   bool in_rows() const { return !names_.empty() && header_left_ == 0; }
   std::size_t markers() const { return markers_; }
   /// Cells beyond ColumnMapping::lowest and highest.
   std::size_t beyond(Signal signal) const { return beyond_[Index(signal)]; }
   [[noreturn]] void Refuse(const std::string& reason) const;
+  /// With CsvOptions::scan: a cell of the last row. What is of bad quality or a
+  /// known word is missing.
+  struct ScannedCell {
+    std::optional<double> value{};
+    std::string_view unit{};
+    bool missing{false};
+  };
+  ScannedCell ScannedAt(std::size_t column) const;
 
  private:
   struct Conversion {
@@ -325,6 +317,7 @@ class CsvReader {
   double Number(std::size_t column) const;
   void Convert(const Conversion& conversion, Sample& sample);
   bool TakeTagged(Sample& sample);
+  std::optional<SignalQuality> KnownQualityAt(std::size_t column) const;
   SignalQuality QualityAt(std::size_t column) const;
   bool IsMarker();
   std::string NoTime(const std::string& cell) const;
@@ -344,9 +337,11 @@ class CsvReader {
   std::vector<std::string> notes_;
   CsvCells record_;
   std::vector<Conversion> conversions_;
+  std::vector<std::optional<std::size_t>> qualities_;  // Of scanned columns.
   std::vector<bool> used_;
   std::optional<std::size_t> time_column_;
   std::optional<std::size_t> clock_column_;
+  std::optional<std::size_t> ms_column_;
   std::optional<std::size_t> tag_column_;
   std::size_t value_column_{0};
   std::optional<std::size_t> quality_column_;
@@ -354,8 +349,7 @@ class CsvReader {
   std::optional<std::size_t> strength_column_;
   std::optional<std::size_t> mode_column_;
   bool fault_by_number_{false};
-  TimeForm time_form_{TimeForm::kFindOut};
-  double time_scale_{1.0};
+  TimeUnit time_unit_;
   std::optional<std::int64_t> first_ns_;
   std::int64_t latest_ns_{0};  // Of the row before.
   // Per tag, because a table may be sorted by tag; a wide table uses "".
@@ -388,12 +382,12 @@ CsvTable ReadCsv(const TextLines& lines, const CsvOptions& options);
 CsvTable ReadCsvFile(const std::filesystem::path& path,
                      CsvOptions options = {});
 
-/// The form of a time column, by its name and its first cell, a number.
-TimeUnit TimeUnitOf(std::string_view name, double first);
+/// The mode that a word of a controller means: AUT, CAS, IMAN, OOS, ...
+std::optional<ValveMode> ModeOfWord(std::string_view word);
 
 /// "12.3" of "12.3?" and "12.3*", which historians write for a reading that is
-/// questionable or substituted; nothing for other cells.
-std::optional<std::string> Unflagged(std::string_view cell);
+/// questionable or substituted; other cells as they are.
+std::string_view WithoutFlag(std::string_view cell);
 
 /// Feeds whole tables to `reader`, from the end if they are newest first, and
 /// calls take(row) for each row.

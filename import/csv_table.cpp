@@ -311,6 +311,14 @@ void TableReader::OrderTags() {
 void TableReader::CheckOrder() const {
   for (std::size_t k = 1; k < rows_.size(); ++k) {
     if (rows_[k].t_s <= rows_[k - 1].t_s) {
+      if (table_.dated && std::ranges::all_of(rows_, [](const CsvRow& row) {
+            return row.labelled.sample.stamp_ns % 60'000'000'000 == 0;
+          })) {
+        RefuseAt(rows_[k].line,
+                 "several rows have one time, and all times are whole minutes: "
+                 "the seconds are missing; try to export times with seconds (a "
+                 "spreadsheet hides them unless the cells show hh:mm:ss)");
+      }
       RefuseAt(rows_[k].line,
                "time goes back or stands still: from " +
                    NumberText(rows_[k - 1].t_s) + " s to " +

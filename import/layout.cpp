@@ -1,11 +1,13 @@
 #include "import/layout.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
 #include <utility>
 
 #include "base/error.h"
+#include "base/text.h"
 #include "import/elapsed.h"
 #include "import/tag_map.h"
 
@@ -65,8 +67,7 @@ bool IsClock(std::string_view cell) {
 
 // Before the decimal sign is known: with either sign, and with a unit behind.
 std::optional<double> AnyNumber(std::string_view cell) {
-  const auto unflagged = Unflagged(cell);
-  cell = unflagged ? std::string_view(*unflagged) : cell;
+  cell = WithoutFlag(cell);
   for (const char decimal : {'.', ','}) {
     if (const auto value = ParseNumber(cell, decimal)) {
       return value;
@@ -89,6 +90,14 @@ std::optional<double> AnyNumber(std::string_view cell) {
 bool IsValue(std::string_view cell) {
   return AnyNumber(cell).has_value() || AnyTime(cell).has_value() ||
          IsClock(cell);
+}
+
+// Of a row of types below the names: F is a number there, and no Fahrenheit.
+bool IsTypeCell(const std::string& cell) {
+  return IsListedWord(PlainText(cell),
+                      "|d|f|i|l|b|s|date|datetime|datetime:rfc3339|time|double|"
+                      "float|single|real|int|integer|long|short|bool|boolean|"
+                      "string|str|text|number|decimal|");
 }
 
 bool IsUnitCell(std::string_view cell) {
@@ -143,6 +152,15 @@ struct Signs {
   std::map<char, SignCell> grouped;  ///< "1.234,5" by ','.
 };
 
+/// How an order of day, month and year fits the dates of a table.
+struct OrderFit {
+  std::size_t read{0};
+  std::time_t last{0};
+  double walked_s{0.0};
+};
+constexpr std::array kOrders = {DateOrder::kDayFirst, DateOrder::kMonthFirst,
+                                DateOrder::kYearFirst};
+
 class LayoutFinder {
  public:
   LayoutFinder(const TextLines& lines, ColumnMap map, const std::string& source,
@@ -152,15 +170,18 @@ class LayoutFinder {
   }
 
   Layout Find() {
+    RefuseOtherForms();
     FindSeparatorSign();
     data_line_ = static_cast<std::size_t>(map().skip) + 1;
     const bool has_rows = FindHeader();
+    if (has_rows) {
+      FindTimeColumn();
+    }
+    ReadRows();
     FindDecimal();
     if (!has_rows) {
       return std::move(layout_);
     }
-    FindTimeColumn();
-    CountWords();
     FindTags();
     FindQualities();
     FindDateOrder();
@@ -180,15 +201,19 @@ class LayoutFinder {
     return std::nullopt;
   }
   bool IsNamed(const Cells& cells) const;
+  void RefuseOtherForms() const;
   void FindSeparatorSign();
   bool FindHeader();
   void TakeNames(std::span<const Record> header, std::size_t at);
   void TakeSampleRow(const Record& record);
   void FindTimeColumn();
-  void CheckTimeColumns() const;
-  void CountWords();
+  void FindMilliseconds();
+  void ReadRows();
+  bool MayHoldWords(std::size_t c) const;
+  void CheckTimes(std::size_t line, const Cells& cells) const;
+  void TakeDate(const Cells& cells);
+  void TakeSigns(std::size_t line, const Cells& cells);
   void FindDecimal();
-  Signs FindSigns() const;
   void TakeGrouped(const Signs& signs);
   [[noreturn]] void RefuseSign(const SignCell& seen,
                                const std::string& reason) const;
@@ -198,17 +223,6 @@ class LayoutFinder {
   void ChooseGood(const std::string& name, const WordCounts& words);
   void FindDateOrder();
   void FindDirection();
-  template <typename Take>
-  void ForEachRow(const Take& take) const {
-    ForEachRecord(lines_, data_line_, layout_.map.separator,
-                  [&](std::size_t line, const Cells& cells) {
-                    if (cells.size() == columns_.size()) {
-                      take(line, cells);
-                    }
-                    return true;
-                  });
-  }
-
   const TextLines& lines_;
   const std::string& source_;
   bool choose_;
@@ -218,7 +232,69 @@ class LayoutFinder {
   std::size_t data_line_{1};
   std::optional<std::size_t> time_;
   std::optional<std::size_t> clock_;
+  // Of all rows.
+  Signs signs_;
+  std::array<OrderFit, 3> orders_{};
+  std::size_t dates_{0};
+  bool american_{false};
 };
+
+/// Texts that are no tables, by how their first line begins, and the command
+/// that makes a table of one.
+struct OtherForm {
+  std::string_view name;
+  std::string_view begins;
+  std::string_view holds;  ///< Further on in this line.
+  std::string_view command;
+};
+constexpr OtherForm kOtherForms[] = {
+    {"JSON of OData", "{", "@odata.",
+     "jq -r '\"time,tag,value,quality\", (.value[] | [.DateTime, .FQN, .Value, "
+     ".OpcQuality] | @csv)' FILE.json > FILE.csv"},
+    {"JSON of the PI Web API", "{", "\"Items\"",
+     "jq -r '\"time,value,good\", (.Items[] | [.Timestamp, .Value, .Good] | "
+     "@csv)' FILE.json > FILE.csv, one file a tag"},
+    {"JSON lines", "{", "\"t_s\"",
+     "fdi-simulator replay --csv - < FILE, which publishes them"},
+    {"JSON", "{", "", "jq -r '.[] | [.time, .tag, .value] | @csv'"},
+    {"JSON", "[", "\":", "jq -r '.[] | [.time, .tag, .value] | @csv'"},
+};
+
+// A line of InfluxDB: measurement,tag=value field=number nanoseconds
+bool IsLineProtocol(std::string_view line) {
+  const std::size_t tags = line.find(' ');
+  const std::size_t fields = line.rfind(' ');
+  const auto has = [&](std::size_t begin, std::size_t end, char sign) {
+    return line.substr(begin, end - begin).find(sign) != std::string_view::npos;
+  };
+  return tags != std::string_view::npos && fields > tags && has(0, tags, ',') &&
+         has(0, tags, '=') && has(tags, fields, '=') &&
+         ParseWhole<std::int64_t>(line.substr(fields + 1)).has_value();
+}
+
+void LayoutFinder::RefuseOtherForms() const {
+  lines_.ForEach([&](std::string_view line, std::size_t) {
+    const auto refuse = [&](std::string_view name, std::string_view command) {
+      throw DataError(source_ + ":1: is " + std::string(name) +
+                      ", not a table; try: " + std::string(command));
+    };
+    for (const OtherForm& form : kOtherForms) {
+      if (line.starts_with(form.begins) &&
+          line.find(form.holds) != std::string_view::npos) {
+        refuse(form.name, form.command);
+      }
+    }
+    if (IsLineProtocol(line)) {
+      refuse(
+          "line protocol",
+          "awk 'BEGIN {print \"time,tag,value\"} {gsub(\",\", \".\", $1); n = "
+          "split($2, f, \",\"); for (i = 1; i <= n; ++i) {split(f[i], v, "
+          "\"=\"); print $3 \",\" v[1] \".\" $1 \",\" v[2]}}' FILE > "
+          "FILE.csv");
+    }
+    return false;
+  });
+}
 
 void LayoutFinder::FindSeparatorSign() {
   std::vector<std::string> first;
@@ -428,7 +504,8 @@ void LayoutFinder::TakeNames(std::span<const Record> header, std::size_t at) {
   }
   NumberRepeated(layout_.names);
   for (std::size_t row = 0; row < header.size(); ++row) {
-    if (row == at || header[row].cells.size() != width) {
+    if (row == at || header[row].cells.size() != width ||
+        std::ranges::all_of(header[row].cells, IsTypeCell)) {
       continue;
     }
     // A cell above the names that spans several columns is written in the first
@@ -498,10 +575,8 @@ void LayoutFinder::FindTimeColumn() {
           column.values.size() > 1 &&
           (backwards == 0 || backwards + 1 == column.values.size());
       score =
-          form == TimeForm::kUnix || form == TimeForm::kFileTime ||
-                  form == TimeForm::kTicks || form == TimeForm::kSince1904
-              ? 30
-          : named ? 20
+          form == TimeForm::kCount ? 30
+          : named                  ? 20
           : grows && c == 0 &&
                   std::adjacent_find(column.values.begin(),
                                      column.values.end()) == column.values.end()
@@ -522,7 +597,7 @@ void LayoutFinder::FindTimeColumn() {
               " utc |(utc)|[utc]|_utc |utc time|utctime|.utc | gmt |(gmt)")) {
     map().zone = "UTC";
   }
-  CheckTimeColumns();
+  FindMilliseconds();
   clock_ = At(map().clock_column);
   if (!time_ || clock_ || !map().clock_column.empty() || rows_.empty() ||
       rows_.front().cells[*time_].find(':') != std::string::npos ||
@@ -537,56 +612,113 @@ void LayoutFinder::FindTimeColumn() {
   }
 }
 
+// Whole seconds, and beside them numbers below 1000 under a name that says so.
+void LayoutFinder::FindMilliseconds() {
+  for (std::size_t c = 0; c < columns_.size() && map().ms_column.empty(); ++c) {
+    const Column& column = columns_[c];
+    const std::string name = PlainText(Name(c));
+    if (time_ && c != *time_ &&
+        columns_[*time_].Mostly(columns_[*time_].dates) &&
+        (HasWord(name, "millis|msec") || name == "ms") &&
+        column.Mostly(column.numbers) &&
+        std::ranges::all_of(column.values,
+                            [](double v) { return v >= 0.0 && v < 1000.0; })) {
+      map().ms_column = Name(c);
+    }
+  }
+}
+
+// One pass over all rows: what a few of them say of signs, words and dates
+// decides nothing.
+void LayoutFinder::ReadRows() {
+  std::vector<std::size_t> counted;
+  for (std::size_t c = 0; c < columns_.size(); ++c) {
+    if (MayHoldWords(c)) {
+      counted.push_back(c);
+    }
+  }
+  const bool slashed = time_ && map().date_order == DateOrder::kNotSaid &&
+                       !rows_.empty() &&
+                       columns_[*time_].Mostly(columns_[*time_].dates) &&
+                       !ScanTime(rows_.front().cells[*time_]);
+  ForEachRecord(lines_, data_line_, map().separator,
+                [&](std::size_t line, const Cells& cells) {
+                  TakeSigns(line, cells);
+                  if (cells.size() != columns_.size()) {
+                    return true;
+                  }
+                  for (const std::size_t c : counted) {
+                    auto& words = columns_[c].words;
+                    if (words.size() < kMaxWords || words.contains(cells[c])) {
+                      ++words[cells[c]];
+                    }
+                  }
+                  if (slashed) {
+                    TakeDate(cells);
+                  }
+                  CheckTimes(line, cells);
+                  return true;
+                });
+}
+
+// Whether a column may hold tags or qualities.
+bool LayoutFinder::MayHoldWords(std::size_t c) const {
+  const ColumnMap& map = layout_.map;
+  const bool stated =
+      (map.long_table && SameName(map.long_table->quality, Name(c))) ||
+      std::ranges::any_of(map.columns, [&](const ColumnMapping& m) {
+        return SameName(m.quality, Name(c));
+      });
+  const bool words = !columns_[c].Mostly(columns_[c].numbers) &&
+                     !SameName(Name(c), kModeColumn) &&
+                     !SameName(Name(c), kFaultColumn);
+  return c != time_ && c != clock_ &&
+         (stated || words || IsQualityColumn(Name(c), {{"0", 1}}));
+}
+
 // Trends have a column of times beside each value. If they differ, the rows are
 // no samples.
-void LayoutFinder::CheckTimeColumns() const {
+void LayoutFinder::CheckTimes(std::size_t line, const Cells& cells) const {
   const auto stem = [](const std::string& name) {
     return name.substr(0, name.find(" ("));
   };
   for (std::size_t c = 0; time_ && c < columns_.size(); ++c) {
-    if (c == *time_ || !columns_[c].Mostly(columns_[c].dates) ||
-        !columns_[*time_].Mostly(columns_[*time_].dates) ||
-        !SameName(stem(Name(c)), stem(Name(*time_)))) {
-      continue;
+    if (c != *time_ && columns_[c].Mostly(columns_[c].dates) &&
+        columns_[*time_].Mostly(columns_[*time_].dates) && !cells[c].empty() &&
+        cells[c] != cells[*time_] &&
+        SameName(stem(Name(c)), stem(Name(*time_)))) {
+      throw DataError(
+          source_ + ":" + std::to_string(line) + ": column " + Quoted(Name(c)) +
+          " is at " + Quoted(cells[c]) + " and column " + Quoted(Name(*time_)) +
+          " at " + Quoted(cells[*time_]) +
+          ": each value has a time of its own; expected one time for a row; "
+          "try to export sampled (interpolated) values, or one reading in a "
+          "row: time,tag,value");
     }
-    ForEachRow([&](std::size_t line, const Cells& cells) {
-      if (!cells[c].empty() && cells[c] != cells[*time_]) {
-        throw DataError(
-            source_ + ":" + std::to_string(line) + ": column " +
-            Quoted(Name(c)) + " is at " + Quoted(cells[c]) + " and column " +
-            Quoted(Name(*time_)) + " at " + Quoted(cells[*time_]) +
-            ": each value has a time of its own; expected one time for a row; "
-            "try to export sampled (interpolated) values, or one reading in a "
-            "row: time,tag,value");
-      }
-    });
   }
 }
 
-// Different cells of the columns that may hold tags or qualities.
-void LayoutFinder::CountWords() {
-  std::vector<std::size_t> counted;
-  for (std::size_t c = 0; c < columns_.size(); ++c) {
-    const Column& column = columns_[c];
-    const bool words = !column.Mostly(column.numbers) &&
-                       !SameName(Name(c), kModeColumn) &&
-                       !SameName(Name(c), kFaultColumn);
-    if (c != time_ && c != clock_ &&
-        (words || IsQualityColumn(Name(c), {{"0", 1}}))) {
-      counted.push_back(c);
-    }
-  }
-  if (counted.empty()) {
+void LayoutFinder::TakeDate(const Cells& cells) {
+  const std::string& cell = cells[*time_];
+  if (cell.empty() ||
+      std::isdigit(static_cast<unsigned char>(cell.front())) == 0) {
     return;
   }
-  ForEachRow([&](std::size_t, const Cells& cells) {
-    for (const std::size_t c : counted) {
-      auto& words = columns_[c].words;
-      if (words.size() < kMaxWords || words.contains(cells[c])) {
-        ++words[cells[c]];
-      }
+  ++dates_;
+  american_ = american_ || HasWord(PlainText(cell), "am|pm") ||
+              (clock_ && HasWord(PlainText(cells[*clock_]), "am|pm")) ||
+              (cell.size() > 1 && cell[1] == '/');
+  for (std::size_t i = 0; i < kOrders.size(); ++i) {
+    if (const auto time = ScanTime(cell, kOrders.at(i))) {
+      OrderFit& fit = orders_.at(i);
+      std::tm fields = time->fields;
+      const std::time_t at = timegm(&fields);
+      fit.walked_s +=
+          fit.read > 0 ? std::abs(std::difftime(at, fit.last)) : 0.0;
+      fit.last = at;
+      ++fit.read;
     }
-  });
+  }
 }
 
 // A table is long if one column has few distinct names, each at many times,
@@ -595,6 +727,16 @@ void LayoutFinder::FindTags() {
   if (map().long_table || !time_) {
     return;
   }
+  // Names that nothing but a long table has tell it by a few rows, too.
+  const auto name_of = [&](std::string_view words) {
+    const auto at = std::ranges::find_if(layout_.names, [&](const auto& name) {
+      return IsListedWord(PlainText(name), words);
+    });
+    return at == layout_.names.end() ? "" : *at;
+  };
+  const LongTable by_names{name_of("|tag|tagname|tag_name|point|"),
+                           name_of("|value|wert|"), ""};
+  constexpr std::size_t kFewColumns = 8;
   std::optional<std::size_t> tag;
   std::size_t most = 0;
   for (std::size_t c = 0; c < columns_.size(); ++c) {
@@ -622,6 +764,10 @@ void LayoutFinder::FindTags() {
     }
   }
   if (!tag) {
+    if (choose_ && map().columns.empty() && !by_names.tag.empty() &&
+        !by_names.value.empty() && layout_.names.size() <= kFewColumns) {
+      map().long_table = by_names;
+    }
     return;
   }
   std::optional<std::size_t> value;
@@ -681,9 +827,6 @@ void LayoutFinder::FindQualities() {
         (words.empty() || state || !IsQualityColumn(Name(c), words))) {
       values.push_back(Name(c));
       continue;
-    }
-    if (words.empty()) {
-      ForEachRow([&](std::size_t, const Cells& cells) { ++words[cells[c]]; });
     }
     QualityCode code = QualityCodeOf(Name(c), words);
     map().quality_codes[Name(c)] = code;
@@ -749,8 +892,7 @@ void LayoutFinder::FindDecimal() {
   if (map().decimal != '\0') {
     return;
   }
-  const Signs signs = FindSigns();
-  const auto& [decimal, either, grouped] = signs;
+  const auto& [decimal, either, grouped] = signs_;
   if (decimal.size() == 2 || grouped.size() == 2) {
     const auto& both = decimal.size() == 2 ? decimal : grouped;
     const bool point_first = both.at('.').line < both.at(',').line;
@@ -759,7 +901,7 @@ void LayoutFinder::FindDecimal() {
                "one of point and comma throughout");
   }
   if (!grouped.empty()) {
-    TakeGrouped(signs);
+    TakeGrouped(signs_);
     return;
   }
   constexpr const char* kUnknown =
@@ -795,36 +937,32 @@ void LayoutFinder::FindDecimal() {
   map().decimal = sign;
 }
 
-Signs LayoutFinder::FindSigns() const {
-  Signs signs;
-  ForEachRecord(
-      lines_, data_line_, layout_.map.separator,
-      [&](std::size_t line, const Cells& cells) {
-        for (const std::string& whole : cells) {
-          const bool has_unit =
-              !whole.empty() &&
-              std::isdigit(static_cast<unsigned char>(whole.back())) == 0 &&
-              IsUnit(SplitUnit(whole).second);
-          const std::string cell(has_unit ? SplitUnit(whole).first : whole);
-          char sign = '.';
-          switch (DigitsOf(cell, sign)) {
-            case Digits::kDecimal:
-              signs.decimal.try_emplace(sign, SignCell{cell, line});
-              break;
-            case Digits::kEither:
-              signs.either.try_emplace(sign, SignCell{cell, line});
-              break;
-            case Digits::kThousands:
-              signs.grouped.try_emplace(sign == '.' ? ',' : '.',
-                                        SignCell{cell, line});
-              break;
-            case Digits::kNone:
-              break;
-          }
-        }
-        return true;
-      });
-  return signs;
+void LayoutFinder::TakeSigns(std::size_t line, const Cells& cells) {
+  if (map().decimal != '\0') {
+    return;
+  }
+  for (const std::string& whole : cells) {
+    const bool has_unit =
+        !whole.empty() &&
+        std::isdigit(static_cast<unsigned char>(whole.back())) == 0 &&
+        IsUnit(SplitUnit(whole).second);
+    const std::string cell(has_unit ? SplitUnit(whole).first : whole);
+    char sign = '.';
+    switch (DigitsOf(cell, sign)) {
+      case Digits::kDecimal:
+        signs_.decimal.try_emplace(sign, SignCell{cell, line});
+        break;
+      case Digits::kEither:
+        signs_.either.try_emplace(sign, SignCell{cell, line});
+        break;
+      case Digits::kThousands:
+        signs_.grouped.try_emplace(sign == '.' ? ',' : '.',
+                                   SignCell{cell, line});
+        break;
+      case Digits::kNone:
+        break;
+    }
+  }
 }
 
 // Cells with both signs leave no doubt, unless others contradict them.
@@ -845,55 +983,19 @@ void LayoutFinder::RefuseSign(const SignCell& seen,
   throw DataError(source_ + ":" + std::to_string(seen.line) + ": " +
                   Quoted(seen.cell) + reason +
                   "; try decimal = \".\" or decimal = \",\" under [file] "
-                  "of --map, or --decimal");
+                  "of --map");
 }
 
 // Of dates with slashes or short years: the order in which all of them are
 // dates; else the one with fewer days from the first to the last. In America
 // slashes come without zeros, with AM and PM, or with gallons.
 void LayoutFinder::FindDateOrder() {
-  if (!time_ || map().date_order != DateOrder::kNotSaid || rows_.empty() ||
-      !columns_[*time_].Mostly(columns_[*time_].dates) ||
-      ScanTime(rows_.front().cells[*time_])) {
+  if (dates_ == 0) {
     return;
   }
-  constexpr DateOrder kOrders[] = {DateOrder::kDayFirst, DateOrder::kMonthFirst,
-                                   DateOrder::kYearFirst};
-  struct Fit {
-    std::size_t read{0};
-    std::time_t last{0};
-    double walked_s{0.0};
-  };
-  Fit fits[3];
-  std::size_t rows = 0;
-  bool american = false;
-  ForEachRow([&](std::size_t, const Cells& cells) {
-    const std::string& cell = cells[*time_];
-    if (cell.empty() ||
-        std::isdigit(static_cast<unsigned char>(cell.front())) == 0) {
-      return;
-    }
-    ++rows;
-    american = american || HasWord(PlainText(cell), "am|pm") ||
-               (clock_ && HasWord(PlainText(cells[*clock_]), "am|pm")) ||
-               (cell.size() > 1 && cell[1] == '/');
-    for (std::size_t i = 0; i < 3; ++i) {
-      if (const auto time = ScanTime(cell, kOrders[i])) {
-        std::tm fields = time->fields;
-        const std::time_t at = timegm(&fields);
-        fits[i].walked_s +=
-            fits[i].read > 0 ? std::abs(std::difftime(at, fits[i].last)) : 0.0;
-        fits[i].last = at;
-        ++fits[i].read;
-      }
-    }
-  });
-  for (const std::string& name : layout_.names) {
-    american = american || HasWord(PlainText(name), "gpm|psi|degf");
-  }
   const auto most = [&](std::size_t i) {
-    return static_cast<double>(fits[i].read) >=
-           0.99 * static_cast<double>(rows);
+    return static_cast<double>(orders_.at(i).read) >=
+           0.99 * static_cast<double>(dates_);
   };
   const bool day = most(0);
   const bool month = most(1);
@@ -901,11 +1003,16 @@ void LayoutFinder::FindDateOrder() {
     map().date_order = day ? DateOrder::kDayFirst : DateOrder::kMonthFirst;
   } else if (!day) {
     map().date_order = most(2) ? DateOrder::kYearFirst : DateOrder::kNotSaid;
-  } else if (fits[0].walked_s > 10.0 * fits[1].walked_s) {
+  } else if (orders_[0].walked_s > 10.0 * orders_[1].walked_s) {
     map().date_order = DateOrder::kMonthFirst;
-  } else if (fits[1].walked_s > 10.0 * fits[0].walked_s) {
+  } else if (orders_[1].walked_s > 10.0 * orders_[0].walked_s) {
     map().date_order = DateOrder::kDayFirst;
   } else if (choose_) {
+    const bool american =
+        american_ ||
+        std::ranges::any_of(layout_.names, [](const std::string& name) {
+          return HasWord(PlainText(name), "gpm|psi|degf");
+        });
     map().date_order = american ? DateOrder::kMonthFirst : DateOrder::kDayFirst;
     layout_.choices["date"] =
         "no day is above 12, so day and month may be exchanged";
@@ -945,18 +1052,12 @@ void LayoutFinder::FindDirection() {
 }  // namespace
 
 void NumberRepeated(std::vector<std::string>& names) {
-  const auto plain = [](std::string name) {
-    std::ranges::transform(name, name.begin(), [](unsigned char c) {
-      return static_cast<char>(std::tolower(c));
-    });
-    return name;
-  };
   std::map<std::string, std::pair<int, int>> times;  // In all, and so far.
   for (const std::string& name : names) {
-    ++times[plain(name)].first;
+    ++times[Lower(name)].first;
   }
   for (std::string& name : names) {
-    auto& [all, number] = times[plain(name)];
+    auto& [all, number] = times[Lower(name)];
     ++number;
     if (all > 1) {
       name += " (" + std::to_string(number) + ")";

@@ -6,6 +6,7 @@
 
 #include "base/csv_cells.h"
 #include "base/error.h"
+#include "base/text.h"
 #include "base/time_text.h"
 #include "base/toml_reader.h"
 #include "import/tag_map.h"
@@ -27,13 +28,6 @@ constexpr std::string_view kOtherKeys[] = {
     "to",   "auto",  "manual",  "report", "max_age", "topic", "value", "time"};
 // How rows without a model set are told apart from a forgotten type.
 constexpr std::string_view kDataOnly = "data only";
-
-std::string Lower(std::string text) {
-  std::ranges::transform(text, text.begin(), [](unsigned char c) {
-    return static_cast<char>(c >= 'A' && c <= 'Z' ? c - 'A' + 'a' : c);
-  });
-  return text;
-}
 
 // All keys of a row. A tag has a unit and a range, but the mode, which is
 // words.
@@ -406,8 +400,15 @@ RawTable ReadToml(TomlReader& file, PlantTable& table) {
   return raw;
 }
 
+// Whether a line that begins with # may be meant as a row, of a name like #12.
+bool MayBeRow(std::string_view line, char separator, std::size_t columns) {
+  CsvCells cells(separator);
+  return columns > 1 && cells.TakeLine(line) && cells.cells().size() >= columns;
+}
+
 // The rows of a CSV. A line that begins with # is a comment, unless a quoted
-// cell is open. The separator is found out from the first fifty lines, the
+// cell is open; one with the cells of a row is left out as a row with an error.
+// The separator is found out from the first fifty lines, the
 // first row is the header, and rows with the name * are defaults: of the group
 // that they name, or of all.
 RawTable ReadCells(const std::string& text, const PlantTable& table) {
@@ -423,11 +424,13 @@ RawTable ReadCells(const std::string& text, const PlantTable& table) {
       first.push_back(line);
     }
   }
-  CsvCells reader(FindSeparator(first));
+  const char separator = FindSeparator(first);
+  CsvCells reader(separator);
   std::vector<std::string> keys;
   RawTable raw;
   for (std::size_t i = 0; i < lines.size(); ++i) {
-    if ((!reader.open() && lines[i].starts_with('#')) ||
+    const bool comment = !reader.open() && lines[i].starts_with('#');
+    if ((comment && !MayBeRow(lines[i], separator, keys.size())) ||
         !reader.TakeLine(lines[i]) || reader.blank()) {
       continue;
     }
@@ -448,6 +451,11 @@ RawTable ReadCells(const std::string& text, const PlantTable& table) {
       row.error = "the row has " + std::to_string(reader.cells().size()) +
                   " cells, the header " + std::to_string(keys.size()) +
                   "; put text with separators in quotes";
+    }
+    if (comment) {
+      row.error =
+          "it begins with #, as a comment does, and has the cells of a row: "
+          "put a name with # in quotes, or leave the row out";
     }
     for (std::size_t c = 0; c < std::min(keys.size(), reader.cells().size());
          ++c) {
@@ -683,6 +691,16 @@ ColumnMapping MappingOf(const PlantRow& row, LoopTag tag, Signal signal,
   return mapping;
 }
 
+void SetMode(const PlantRow& row, const TagMatch& match, ColumnMap& map) {
+  map.mode_column = match[LoopTag::kMode];
+  for (const std::string& word : row.auto_words) {
+    map.mode_words.emplace(word, ValveMode::kAuto);
+  }
+  for (const std::string& word : row.manual_words) {
+    map.mode_words.emplace(word, ValveMode::kManual);
+  }
+}
+
 }  // namespace
 
 ColumnMap LoopColumns(const PlantRow& row, const TagMatch& match,
@@ -703,7 +721,7 @@ ColumnMap LoopColumns(const PlantRow& row, const TagMatch& match,
     }
   }
   file.flow_unit = FlowUnit::kM3PerHour;
-  file.mode_column = match[LoopTag::kMode];
+  SetMode(row, match, file);
   return file;
 }
 
@@ -723,7 +741,7 @@ ColumnMap ValveColumns(const PlantRow& row, const TagMatch& match,
   add(LoopTag::kP1, Signal::kP1);
   add(LoopTag::kP2, Signal::kP2);
   add(LoopTag::kT1, Signal::kT1);
-  file.mode_column = match[LoopTag::kMode];
+  SetMode(row, match, file);
   return file;
 }
 

@@ -13,12 +13,15 @@ namespace {
 // Whole cells, in plain text (PlainText()); a bar before and behind each.
 constexpr std::string_view kConfidenceWords = "confid|konfid|confianza";
 constexpr std::string_view kGoodWords =
-    "|g|ok|okay|raw|valid|normal|gut|bon|bueno|dobry|0x00000000|";
+    "|g|ok|okay|raw|valid|normal|gut|bon|bueno|dobry|0x00000000|alarm|"
+    "unackedalarm|alarm,unackedalarm|";
 constexpr std::string_view kUncertainWords =
     "|u|questionable|substituted|interpolated|suspect|estimated|doubtful|fair|"
-    "poor|fraglich|unsicher|ersatzwert|douteux|dudoso|dubbio|niepewny|";
+    "poor|overridden|fraglich|unsicher|ersatzwert|douteux|dudoso|dubbio|"
+    "niepewny|";
 constexpr std::string_view kBadWords =
-    "|b|failed|failure|not connected|not good|stale|out of service|"
+    "|b|failed|failure|not connected|not good|stale|out of service|down|"
+    "disabled|"
     "schlecht|ungultig|gestort|mauvais|invalide|malo|cattivo|zly|";
 // What historians, OPC clients and spreadsheets write where there is no value.
 // The words are complete cells, as Bare() leaves them, so no reading is lost.
@@ -38,12 +41,6 @@ constexpr std::string_view kNoReading =
     "coercion failed|undefined|n.a.|k.a.|kein wert|keine daten|storung|fehler|"
     "pas de donnees|erreur|defaut|sin datos|fallo|nessun dato|errore|guasto|"
     "brak|brak danych|blad|awaria|";
-
-bool IsOneOf(const std::string& plain, std::string_view words) {
-  // A text with a bar of its own could match across two words.
-  return plain.find('|') == std::string::npos &&
-         words.find('|' + plain + '|') != std::string_view::npos;
-}
 
 // The words of a cell: "No Data" of "<No_Data>", "No Good Data" of
 // "[-11059] No Good Data".
@@ -83,6 +80,12 @@ std::optional<std::uint32_t> CodeOf(std::string_view cell) {
 
 }  // namespace
 
+// A text with a bar of its own could match across two words.
+bool IsListedWord(std::string_view text, std::string_view words) {
+  return !text.empty() && text.find('|') == std::string_view::npos &&
+         words.find('|' + std::string(text) + '|') != std::string_view::npos;
+}
+
 bool HasWord(std::string_view text, std::string_view words) {
   while (!words.empty()) {
     const std::size_t end = std::min(words.find('|'), words.size());
@@ -102,8 +105,8 @@ bool IsNoReading(std::string_view cell, const std::vector<std::string>& more) {
   // "---", "*****", "--.-"; not "%", which may be a unit below a name.
   const bool signs =
       cell.find_first_not_of("-*?.#_=~!") == std::string_view::npos;
-  return signs || IsOneOf(bare, kNoReading) || IsOneOf(bare, kUncertainWords) ||
-         IsOneOf(bare, kBadWords) ||
+  return signs || IsListedWord(bare, kNoReading) ||
+         IsListedWord(bare, kUncertainWords) || IsListedWord(bare, kBadWords) ||
          (bare.starts_with("bad") && bare.size() > 3 &&
           std::isalpha(static_cast<unsigned char>(bare[3])) == 0) ||
          bare.starts_with("bad input");
@@ -123,15 +126,17 @@ std::optional<SignalQuality> QualityOf(std::string_view cell,
   if (IsListed(cell, words.bad)) {
     return SignalQuality::kBad;
   }
-  const std::string plain = PlainText(cell);
-  if (plain.starts_with("good") || IsOneOf(plain, kGoodWords)) {
+  // Niagara writes its words in braces: "{ok}".
+  const std::string plain =
+      cell.starts_with('{') ? Bare(cell) : PlainText(cell);
+  if (plain.starts_with("good") || IsListedWord(plain, kGoodWords)) {
     return SignalQuality::kGood;
   }
-  if (plain.starts_with("uncertain") || IsOneOf(plain, kUncertainWords)) {
+  if (plain.starts_with("uncertain") || IsListedWord(plain, kUncertainWords)) {
     return SignalQuality::kUncertain;
   }
-  if (plain.starts_with("bad") || IsOneOf(plain, kBadWords) ||
-      (!cell.empty() && IsOneOf(Bare(cell), kNoReading))) {
+  if (plain.starts_with("bad") || IsListedWord(plain, kBadWords) ||
+      (!cell.empty() && IsListedWord(Bare(cell), kNoReading))) {
     return SignalQuality::kBad;
   }
   auto number = CodeOf(cell);

@@ -6,35 +6,16 @@
 #include <vector>
 
 #include "import/csv.h"
+#include "import/signal_guess.h"
 
 namespace fdi::importer {
-
-/// A column, or a tag of a long table, and what it seems to be.
-struct SniffedColumn {
-  std::string name;
-  std::string about;  ///< Units and descriptions below the name.
-  std::vector<double> times_s{};
-  std::vector<double> values{};
-  std::size_t cells{0};
-  std::size_t missing{0};
-  std::vector<std::string> words{};      ///< Neither numbers nor known words.
-  std::optional<ColumnMapping> given{};  ///< By the caller's map.
-  std::optional<Signal> signal{};
-  std::string unit{};
-  std::vector<double> raw{};   ///< Cells that are `span`; empty: as they are.
-  std::vector<double> span{};  ///< In `unit`.
-  bool opening{false};
-  std::string guessed{};  ///< Reasons, and what is uncertain.
-
-  /// Quantile of the values, which are not empty; `share` in [0, 1].
-  double Quantile(double share) const;
-};
 
 /// What a file holds, and a map of it.
 struct Sniffed {
   ColumnMap map;  ///< Without signals: those are in `columns`.
   std::vector<SniffedColumn> columns;
   std::size_t rows{0};
+  std::vector<double> times_s{};  ///< Of the rows, by ScanColumns().
   bool dated{false};
   TimeUnit time;
   std::string resample;  ///< Proposed; empty: not needed.
@@ -49,6 +30,11 @@ struct Sniffed {
   /// refuses it; what the record cannot show.
   std::vector<std::string> findings;
 };
+
+/// Reads the form of a table and all of its columns, or the first 4 million
+/// cells of them, without any signal. @throws as Sniff().
+Sniffed ScanColumns(const TextLines& lines, const std::string& source,
+                    ColumnMap map);
 
 /// Analyses a table with the reader of the importer. What `map` sets is taken
 /// over, its signals, too; other signals are guessed from units, ranges, words

@@ -218,6 +218,16 @@ void ReadUnit(TomlReader& table, Signal signal, ColumnMap& map,
     scale = (span[1] - span[0]) / (raw[1] - raw[0]);
     offset = span[0] - scale * raw[0];
   }
+  if (table.Boolean("root").value_or(false)) {
+    if (!flow || raw.size() != 2) {
+      table.Refuse(
+          "root",
+          "is of a flow whose cells are a pressure difference: raw = "
+          "[0, 100] and span = [LOW, HIGH] state its range and that of "
+          "the flow");
+    }
+    mapping.root = std::pair(raw[0], raw[1]);
+  }
   // The linear map of the user is applied first, then the unit: value = u₀ + u₁
   // (offset + scale · cell).
   mapping.scale = unit->scale * scale;
@@ -264,31 +274,6 @@ void ReadSignal(Signal signal, TomlReader table, ColumnMap& map) {
   map.columns.push_back(mapping);
 }
 
-struct TimeName {
-  std::string_view name;
-  TimeUnit unit;
-};
-constexpr TimeName kTimeNames[] = {{"s", {TimeForm::kElapsed, 1.0}},
-                                   {"ms", {TimeForm::kElapsed, 1e-3}},
-                                   {"us", {TimeForm::kElapsed, 1e-6}},
-                                   {"ns", {TimeForm::kElapsed, 1e-9}},
-                                   {"min", {TimeForm::kElapsed, 60.0}},
-                                   {"h", {TimeForm::kElapsed, 3600.0}},
-                                   {"unix", {TimeForm::kUnix, 1.0}},
-                                   {"unix ms", {TimeForm::kUnix, 1e-3}},
-                                   {"unix us", {TimeForm::kUnix, 1e-6}},
-                                   {"unix ns", {TimeForm::kUnix, 1e-9}},
-                                   {"filetime", {TimeForm::kFileTime, 1e-7}},
-                                   {"ticks", {TimeForm::kTicks, 1e-7}},
-                                   {"since 1904", {TimeForm::kSince1904, 1.0}},
-                                   {"serial", {TimeForm::kSerial, 1.0}},
-                                   {"datenum", {TimeForm::kDateNumber, 1.0}},
-                                   {"jd", {TimeForm::kJulian, 1.0}},
-                                   {"mjd", {TimeForm::kModifiedJulian, 1.0}},
-                                   {"text", {TimeForm::kText, 1.0}},
-                                   {"clock", {TimeForm::kClock, 1.0}},
-                                   {"auto", {TimeForm::kFindOut, 1.0}}};
-
 DateOrder ParseDateOrder(const std::string& text) {
   if (text != "d/m/y" && text != "m/d/y" && text != "y/m/d") {
     throw ConfigError("date '" + text + "' is none of d/m/y, m/d/y, y/m/d");
@@ -301,15 +286,14 @@ DateOrder ParseDateOrder(const std::string& text) {
 void ReadTime(TomlReader table, ColumnMap& map) {
   map.time_column = table.Text("column").value_or("");
   map.clock_column = table.Text("clock").value_or("");
+  map.ms_column = table.Text("ms").value_or("");
   map.zone = table.Text("zone").value_or("");
   const std::string unit = table.Text("unit").value_or("auto");
-  const auto form = std::ranges::find(kTimeNames, unit, &TimeName::name);
-  if (form == std::end(kTimeNames)) {
-    table.Refuse("unit", "'" + unit + "' is none of " +
-                             JoinText(kTimeNames, ", ", &TimeName::name));
+  const auto form = FindTimeUnit(unit);
+  if (!form) {
+    table.Refuse("unit", "'" + unit + "' is none of " + TimeUnitNames());
   }
-  map.time_form = form->unit.form;
-  map.time_scale = form->unit.scale;
+  map.time_unit = *form;
   if (const auto date = table.Text("date")) {
     try {
       map.date_order = ParseDateOrder(*date);
@@ -441,13 +425,6 @@ void CheckGasFlow(const ColumnMap& map, double molar_mass_kg_kmol) {
   }
 }
 
-std::string_view TimeUnitName(const TimeUnit& unit) {
-  const auto found = std::ranges::find_if(kTimeNames, [&](const auto& known) {
-    return known.unit.form == unit.form && known.unit.scale == unit.scale;
-  });
-  return found == std::end(kTimeNames) ? "auto" : found->name;
-}
-
 std::string UnitNames(Signal signal) {
   std::string names;
   for (const UnitEntry& unit : kSignalUnits) {
@@ -487,14 +464,24 @@ Resampling ParseResampling(const std::string& text) {
                     "limit on age, 1s:linear:2min");
 }
 
-ColumnMap ReadTagMap(const std::filesystem::path& path) {
-  TomlReader file(path);
+namespace {
+
+ColumnMap MapOf(TomlReader file) {
   ColumnMap map;
   if (auto table = file.Table("file")) {
     ReadFile(std::move(*table), map);
   }
   if (auto time = file.Table("time")) {
     ReadTime(std::move(*time), map);
+  }
+  if (auto table = file.Table("mode")) {
+    map.mode_column = table->Text("column").value_or("");
+    for (const auto& [key, mode] : {std::pair("auto", ValveMode::kAuto),
+                                    std::pair("manual", ValveMode::kManual)}) {
+      for (const std::string& word : table->Texts(key)) {
+        map.mode_words[word] = mode;
+      }
+    }
   }
   if (auto table = file.Table("long")) {
     LongTable& tall = map.long_table.emplace();
@@ -527,6 +514,16 @@ ColumnMap ReadTagMap(const std::filesystem::path& path) {
   return map;
 }
 
+}  // namespace
+
+ColumnMap ReadTagMap(const std::filesystem::path& path) {
+  return MapOf(TomlReader(path));
+}
+
+ColumnMap ReadTagMapText(std::string_view text, const std::string& name) {
+  return MapOf(TomlReader(text, name));
+}
+
 void TableOptions::AddTo(CLI::App& verb) {
   verb.add_option("--map", map,
                   "Names, units, spans and senses of the columns of a file "
@@ -541,25 +538,6 @@ void TableOptions::AddTo(CLI::App& verb) {
                   "are held or interpolated for at most AGE (default: hold, "
                   "ten periods)")
       ->type_name("1s[:hold|linear[:AGE]]");
-  verb.add_option(
-          "--decimal", decimal,
-          "Decimal sign of the file, a point or a comma, where the file "
-          "does not show it")
-      ->check([](const std::string& sign) {
-        return sign == "." || sign == "," ? std::string()
-                                          : sign + " not in {.,}";
-      })
-      ->type_name("SIGN");
-  verb.add_option("--date", date,
-                  "Order of dates with slashes: d/m/y, m/d/y, y/m/d")
-      ->check(CLI::IsMember({"d/m/y", "m/d/y", "y/m/d"}))
-      ->type_name("ORDER");
-  verb.add_option("--skip", skip,
-                  "Lines in front of the names of the columns (default: as "
-                  "found)")
-      ->check(CLI::Range(0, 1000000))
-      ->default_str("")
-      ->type_name("LINES");
 }
 
 // For the zone: the option, then the file, then UTC if `utc`. A zone in the
@@ -574,14 +552,6 @@ ColumnMap TableOptions::Read(bool utc) const {
   if (!resample.empty()) {
     columns.resampling = ParseResampling(resample);
   }
-  if (!decimal.empty()) {
-    columns.decimal = decimal.front();
-    columns.thousands = '\0';
-  }
-  if (!date.empty()) {
-    columns.date_order = ParseDateOrder(date);
-  }
-  columns.skip = skip > 0 ? skip : columns.skip;
   return columns;
 }
 

@@ -19,6 +19,8 @@ namespace fdi::importer {
 /// examples.
 /// @throws ConfigError naming file, line and key; NotFoundError.
 ColumnMap ReadTagMap(const std::filesystem::path& path);
+/// The same for the text of a map; `name` stands for the file in messages.
+ColumnMap ReadTagMapText(std::string_view text, const std::string& name);
 
 /// Parses "1s", "1s:hold", "500ms:linear", "1s:linear:2min": the period, how to
 /// fill between readings (hold), and the longest interval to fill (ten
@@ -53,22 +55,15 @@ bool IsGasUnit(std::string_view name);
 /// @throws ConfigError naming the likeliest cause.
 void CheckGasFlow(const ColumnMap& map, double molar_mass_kg_kmol);
 
-/// The name of a unit of time in a map: "s", "unix ms", "filetime", "serial".
-std::string_view TimeUnitName(const TimeUnit& unit);
-
 /// Options of every verb that reads tables; each overrides the map.
 struct TableOptions {
   std::filesystem::path map;
   std::string zone;
   std::string resample;
-  std::string decimal;
-  std::string date;
-  int skip{0};
 
   void AddTo(CLI::App& verb);
   bool given() const {
-    return !map.empty() || !zone.empty() || !resample.empty() ||
-           !decimal.empty() || !date.empty() || skip > 0;
+    return !map.empty() || !zone.empty() || !resample.empty();
   }
   /// Reads the map, overridden by the other options.
   /// @param utc times without a zone are UTC.

@@ -14,8 +14,8 @@ namespace fdi::monitor {
 /// which they were added, for new events and for those of an earlier session
 /// (FaultEvent::resent) alike.
 ///
-/// A step that only tells somebody fails for itself: that is counted and
-/// logged, and the next one is taken. Add all steps before the first event.
+/// A step fails for itself: what it throws is counted and logged, and the next
+/// one is taken. Add all steps before the first event.
 class AfterCommit : public EventSink {
  public:
   using Tell = std::function<void(const FaultEvent& event, bool persisted)>;
@@ -26,18 +26,21 @@ class AfterCommit : public EventSink {
   void Add(std::string name, Tell tell) {
     steps_.push_back({std::move(name), std::move(tell), nullptr});
   }
-  /// A step whose result, and error, is that of Publish().
-  void Add(EventSink& sink) { steps_.push_back({"", {}, &sink}); }
+  /// A step without which the event is not sent.
+  void Add(EventSink& sink) { steps_.push_back({"bus", {}, &sink}); }
 
   bool Publish(const FaultEvent& event, bool persisted) override {
     bool sent = true;
     for (const Step& step : steps_) {
-      if (step.sink != nullptr) {
-        sent = step.sink->Publish(event, persisted) && sent;
-      } else {
-        Guarded(counters_, log_, step.name,
-                [&] { step.tell(event, persisted); });
-      }
+      bool done = step.sink == nullptr;
+      Guarded(counters_, log_, step.name, [&] {
+        if (step.sink != nullptr) {
+          done = step.sink->Publish(event, persisted);
+        } else {
+          step.tell(event, persisted);
+        }
+      });
+      sent = sent && done;
     }
     return sent;
   }

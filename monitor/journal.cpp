@@ -642,13 +642,7 @@ void Journal::MarkDelivered(Clock::time_point limit,
 
 void Journal::Publish(const PendingEvent& pending, bool persisted) {
   const FaultEvent& event = pending->event;
-  bool sent = false;
-  std::string reason = "refused";
-  try {
-    sent = bus_.Publish(event, persisted);
-  } catch (const std::exception& error) {
-    reason = error.what();
-  }
+  const bool sent = bus_.Publish(event, persisted);
   const auto fields = [&] {
     return "valve=" + LogValue(event.valve_id) +
            " transition=" + std::string(TransitionName(event.transition.kind));
@@ -664,9 +658,8 @@ void Journal::Publish(const PendingEvent& pending, bool persisted) {
     undelivered_.push_back(pending);
   } else {
     counters_.Add(Counter::kEventsUnsent);
-    log_.Report(LogId::kUnsent, "publication_failed", [&] {
-      return "topic=FaultEvent " + fields() + " reason=" + LogValue(reason);
-    });
+    log_.Report(LogId::kUnsent, "publication_failed",
+                [&] { return "topic=FaultEvent " + fields(); });
   }
 }
 

@@ -6,6 +6,9 @@
 #include <exception>
 #include <utility>
 
+#include <malloc.h>
+
+#include "base/error.h"
 #include "base/printable.h"
 #include "diagnosis/loop/loop_watch.h"
 #include "diagnosis/model/quality_count.h"
@@ -361,8 +364,9 @@ void Pipeline::OnSample(std::string_view valve_id, const Sample& sample,
     });
     return;
   }
-  const ValveOutcome outcome =
+  ValveOutcome outcome =
       valve->monitor.Step(sample, writer, received, journal_);
+  outcome.contested = valve->monitor.Contested(received);
   Count(*valve, sample, outcome);
   // A sample out of order did not affect the engine, so its verdict is that of
   // an earlier sample, which is on the bus already.
@@ -428,13 +432,20 @@ void Pipeline::Count(Valve& valve, const Sample& sample,
 
 void Pipeline::Publish(const Valve& valve, const ValveOutcome& outcome) {
   const std::string& id = valve.monitor.id();
-  if (decisions_.Publish(id, outcome.models, outcome.verdict)) {
-    counters_.Add(Counter::kDecisions);
-    return;
+  std::string reason = "refused";
+  try {
+    if (decisions_.Publish(id, outcome.models, outcome.verdict)) {
+      counters_.Add(Counter::kDecisions);
+      return;
+    }
+  } catch (const DataError& error) {
+    reason = error.what();
   }
   counters_.Add(Counter::kDecisionsUnsent);
-  log_.Report(LogId::kUnsent, "publication_failed",
-              [&id] { return "topic=DecisionVector valve=" + LogValue(id); });
+  log_.Report(LogId::kUnsent, "publication_failed", [&] {
+    return "topic=DecisionVector valve=" + LogValue(id) +
+           " reason=" + LogValue(reason);
+  });
 }
 
 void Pipeline::FlushDecisions() {
@@ -491,8 +502,27 @@ void Pipeline::CheckSilentValves(TimePoint now) {
     recovery_deadline_.reset();
     ExpireRecovery();
   }
+  ForgetEnded(now, stale_timeout);
   TakeCheckpoint(true);
-  UpdateCensus();
+  UpdateCensus(now);
+}
+
+// Gives back the memory of unknown valves whose publishers ended their streams
+// and did not come back. A valve that merely fell silent stays: it may be one
+// that is there and is not heard.
+void Pipeline::ForgetEnded(TimePoint now, std::chrono::milliseconds age) {
+  std::vector<Valve*> gone;
+  for (const std::unique_ptr<Valve>& valve : valves_) {
+    if (IsEvictable(*valve) && valve->monitor.EndedSince(now) > age) {
+      gone.push_back(valve.get());
+    }
+  }
+  for (Valve* const valve : gone) {
+    Evict(*valve);
+  }
+  if (!gone.empty()) {
+    malloc_trim(0);  // The library keeps what is freed in small pieces.
+  }
 }
 
 void Pipeline::ExpireRecovery() {
@@ -505,7 +535,7 @@ void Pipeline::ExpireRecovery() {
   }
 }
 
-void Pipeline::UpdateCensus() {
+void Pipeline::UpdateCensus(TimePoint now) {
   ValveCensus census;
   for (const std::unique_ptr<Valve>& valve : valves_) {
     const ValveMonitor& monitor = valve->monitor;
@@ -515,6 +545,18 @@ void Pipeline::UpdateCensus() {
     census.ended += monitor.ended() ? 1 : 0;
     census.open_episodes += monitor.episode_open() ? 1 : 0;
     census.trace_bytes += monitor.trace_bytes();
+    if (monitor.Contested(now) && census.contested++ == 0) {
+      census.contested_valve = monitor.id();
+    }
+  }
+  if (census.contested > 0) {
+    log_.Report(
+        LogId::kTwoPublishers, "two_publishers",
+        [&census] {
+          return "valves=" + std::to_string(census.contested) +
+                 " first=" + LogValue(census.contested_valve);
+        },
+        LogLevel::kError);
   }
   // Counted without the lock: readers wait for the copy, not for all valves.
   const MutexLock lock(mutex_);
@@ -527,7 +569,10 @@ void Pipeline::PublishLast() {
     // A zero stamp: a model set was adopted after the last sample.
     if (monitor.seen() && CountsAsTime(monitor.verdict()) &&
         monitor.verdict().stamp_ns != 0) {
-      decisions_.PublishLast(monitor.id(), monitor.models(), monitor.verdict());
+      Guarded(counters_, log_, "last_decision", [&] {
+        decisions_.PublishLast(monitor.id(), monitor.models(),
+                               monitor.verdict());
+      });
     }
   }
 }

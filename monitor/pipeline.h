@@ -28,7 +28,8 @@ struct PipelineOptions {
   int max_valves{2000};
   /// An unknown valve, one without a model set assigned by id and without an
   /// episode left by the last session, may be evicted in favour of another
-  /// valve after this silence, or at once after its publisher ended the stream.
+  /// valve after this silence, or at once after its publisher ended the stream;
+  /// in favour of nobody, stale_timeout_s after that end.
   std::chrono::milliseconds place_timeout{60'000};
   std::string valve_glob{"*"};
   TraceOptions trace;
@@ -64,6 +65,8 @@ struct ValveCensus {
   std::uint64_t ended{0};
   std::uint64_t open_episodes{0};
   std::uint64_t trace_bytes{0};
+  std::uint64_t contested{0};   ///< ValveMonitor::Contested();
+  std::string contested_valve;  ///< one of them.
 };
 
 /// From samples to decisions, events and records. The thread that takes samples
@@ -175,8 +178,9 @@ class Pipeline {
   void Recover(const std::vector<OpenEpisode>& episodes);
   void AdoptNextResolver();
   void CheckSilentValves(TimePoint now);
+  void ForgetEnded(TimePoint now, std::chrono::milliseconds age);
   void ExpireRecovery();
-  void UpdateCensus();
+  void UpdateCensus(TimePoint now);
   void PublishLast();
   void TakeCheckpoint(bool urgent);
   template <typename Call>

@@ -60,7 +60,8 @@ class DecisionSink {
   virtual ~DecisionSink() = default;
   /// May buffer the vector until Flush().
   /// @param models null for a valve without a model set.
-  /// @returns false if it was not sent.
+  /// @returns false if it was not sent. @throws DataError for a vector that
+  ///   cannot be put on the wire.
   virtual bool Publish(const std::string& valve_id, const ModelSet* models,
                        const Verdict& verdict) = 0;
   /// Sends the buffered vectors; call whenever no sample is waiting. @returns
@@ -82,7 +83,8 @@ class DecisionSink {
 class EventSink {
  public:
   virtual ~EventSink() = default;
-  /// @returns false if it was not sent.
+  /// @returns false if it was not sent. May throw where it is a step of
+  ///   AfterCommit, which does not.
   virtual bool Publish(const FaultEvent& event, bool persisted) = 0;
 };
 
@@ -155,7 +157,8 @@ struct ValveOutcome {
   /// Signals that the model set needs and the sample lacks. Their channels
   /// abstain; if no channel is left, the quality is BAD_INPUT.
   SignalMask missing{0};
-  double period_s{0.0};  ///< The time that the sample stands for.
+  double period_s{0.0};   ///< The time that the sample stands for.
+  bool contested{false};  ///< See ValveMonitor::Contested().
 };
 
 /// Why a valve sends nothing.

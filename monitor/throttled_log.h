@@ -32,6 +32,7 @@ enum class LogId : std::uint8_t {
   kStale = 114,          ///< valve_stale
   kMissingSignal = 116,  ///< sample_rejected reason=missing_signal
   kOverShare = 117,      ///< sample_rejected reason=over_share
+  kTwoPublishers = 118,  ///< two_publishers
   kPartlyJudged = 119,   ///< valve_partly_judged
   kUnsent = 121,         ///< publication_failed
   kUnpersisted = 122,    ///< event_unpersisted

@@ -9,6 +9,11 @@ namespace fdi::monitor {
 namespace {
 
 constexpr double kStalePeriods = 3.0;
+// A superseded source that has sent so many samples is not one that was just
+// restarted, and is there until it was silent as long as costs an unknown valve
+// its place (PipelineOptions::place_timeout).
+constexpr int kRivalSamples = 4;
+constexpr std::chrono::seconds kRivalPatience{60};
 constexpr double kTokensPerSample = 0.5;
 constexpr double kTokensPerSecond = 5.0;
 // Bounds of the period of a valve without a model set, measured from its
@@ -93,13 +98,11 @@ void ValveMonitor::RecordPosition(const Sample& sample) {
 ValveOutcome ValveMonitor::Step(const Sample& sample, std::uint64_t writer,
                                 TimePoint received, EpisodeOutlet& outlet) {
   seen_ = true;
-  received_ = received;
-  stale_counted_ = received;
-  stale_ = false;
-  ended_ = false;
   const bool swapped = std::exchange(swapped_, false);
   if (!decision_) {
-    return StepLoop(sample, writer, swapped, outlet);
+    const Intake intake = order_.Place(sample).intake;
+    Hear(intake, writer, received);
+    return StepLoop(sample, intake == Intake::kSuperseded, swapped, outlet);
   }
   RestoreOnce(sample.source_id);
   for (auto& [task, answer] : pending_.Collect()) {
@@ -111,17 +114,13 @@ ValveOutcome ValveMonitor::Step(const Sample& sample, std::uint64_t writer,
     decision_->Inherit(tracker_.Resumable(sample, *models_));
   }
   const Verdict& verdict = decision_->Step(sample);
+  Hear(verdict.intake, writer, received);
   pending_.Request(decision_->TakeDue(), decision_->simulation());
   tracker_.Advance(sample, verdict, *models_, outlet);
   if (CountsAsTime(verdict)) {
     RecordPosition(sample);
     coverage_.Add(sample.stamp_ns, verdict.quality, 1,
                   verdict.intake == Intake::kAccepted);
-  }
-  // A superseded publisher that goes on sending must not end the stream of its
-  // successor.
-  if (verdict.intake != Intake::kSuperseded) {
-    writer_ = writer;
   }
   StepAudit(sample, verdict, outlet);
   // First the tracker, which opens the episode that looks and strengths belong
@@ -136,9 +135,33 @@ ValveOutcome ValveMonitor::Step(const Sample& sample, std::uint64_t writer,
   return {verdict, models_.get(), swapped, missing, period_s()};
 }
 
-ValveOutcome ValveMonitor::StepLoop(const Sample& sample, std::uint64_t writer,
-                                    bool swapped, EpisodeOutlet& outlet) {
+// A superseded publisher that goes on sending must neither end the stream of
+// its successor nor keep a valve alive of which nothing else is heard.
+void ValveMonitor::Hear(Intake intake, std::uint64_t writer,
+                        TimePoint received) {
+  if (intake == Intake::kSuperseded) {
+    rival_samples_ = received - rival_at_ > kRivalPatience
+                         ? 1
+                         : std::min(rival_samples_ + 1, kRivalSamples);
+    rival_at_ = received;
+    return;
+  }
   writer_ = writer;
+  received_ = received;
+  stale_counted_ = received;
+  stale_ = false;
+  ended_ = false;
+}
+
+bool ValveMonitor::Contested(TimePoint now) const {
+  return rival_samples_ >= kRivalSamples && now - rival_at_ <= kRivalPatience;
+}
+
+ValveOutcome ValveMonitor::StepLoop(const Sample& sample, bool superseded,
+                                    bool swapped, EpisodeOutlet& outlet) {
+  if (superseded) {
+    return {judge_.Supersede(), models_.get(), swapped, 0, period_s()};
+  }
   MeasurePeriod(sample.stamp_ns);
   const Verdict& verdict = judge_.Step(sample, period_s());
   const LoopWatch& watch = judge_.watch();

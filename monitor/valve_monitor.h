@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "diagnosis/decision/decision.h"
+#include "diagnosis/observers/intake.h"
 #include "monitor/checkpoint.h"
 #include "monitor/episode_tracker.h"
 #include "monitor/names/loop_judge.h"
@@ -97,6 +98,10 @@ class ValveMonitor {
   TimePoint::duration Silence(TimePoint now) const {
     return ended_ ? TimePoint::duration::max() : now - received_;
   }
+  /// Time since the last sample of a stream that has ended; 0: it has not.
+  TimePoint::duration EndedSince(TimePoint now) const {
+    return ended_ ? now - received_ : TimePoint::duration::zero();
+  }
 
   const std::string& id() const { return id_; }
   /// Also that of the audit; null: nothing judges the valve.
@@ -109,6 +114,9 @@ class ValveMonitor {
   }
   bool stale() const { return stale_; }
   bool ended() const { return ended_; }
+  /// Two publishers share the id: of the one that the newest source superseded
+  /// samples still come. Only those of the newest are judged.
+  bool Contested(TimePoint now) const;
   bool episode_open() const {
     return (decision_ && decision_->episode_open()) ||
            judge_.watch().episode_open();
@@ -120,11 +128,12 @@ class ValveMonitor {
  private:
   static constexpr double kMaxRestartTokens = 200.0;
 
-  ValveOutcome StepLoop(const Sample& sample, std::uint64_t writer,
-                        bool swapped, EpisodeOutlet& outlet);
+  ValveOutcome StepLoop(const Sample& sample, bool superseded, bool swapped,
+                        EpisodeOutlet& outlet);
   void StepAudit(const Sample& sample, const Verdict& verdict,
                  EpisodeOutlet& outlet);
   void TellOfLoop(const Sample& sample, EpisodeOutlet& outlet);
+  void Hear(Intake intake, std::uint64_t writer, TimePoint received);
   bool RestartsEngine(const Sample& sample) const;
   void RecordPosition(const Sample& sample);
   void MeasurePeriod(std::int64_t stamp_ns);
@@ -146,6 +155,9 @@ class ValveMonitor {
   LoopJudge judge_;
   CoverageBook coverage_;
   std::optional<Accumulator> saved_;
+  SourceOrder order_{1.0};  // Without a model set; an engine has its own.
+  int rival_samples_{0};    // Of superseded sources, so many,
+  TimePoint rival_at_;      // the last one then.
   std::uint64_t source_id_{0};
   std::int64_t stamp_ns_{0};  // Of the last sample in order.
   bool isolation_held_{false};

@@ -34,8 +34,7 @@ struct WorkQuery {
   std::int64_t now_ns{0};       ///< The list is as of then; must be set.
   std::int64_t since_ns{0};     ///< Episodes from then on, and open ones.
   std::vector<HealthLimit> limits{};
-  double horizon_days{180.0};  ///< Trends beyond it do not count.
-  std::string discipline{};    ///< Rows of this one only; empty: any.
+  std::string discipline{};  ///< Rows of this one only; empty: any.
   std::string software{};
   std::vector<PlannedLoop> loops{};
   /// Valves that a model set judges at this moment: the history has the time

@@ -301,7 +301,7 @@ report::Report WorkListReport(Json document, std::size_t top) {
   }
   if (shown < rows.size()) {
     report.Line("and " + std::to_string(rows.size() - shown) +
-                " more (--top 0)");
+                " more (--rows 0)");
   }
   AddCsv(report);
   return report;

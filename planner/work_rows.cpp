@@ -25,6 +25,9 @@ using storage::Episode;
 // An audit has no decision factor: these are the confidence of its verdicts.
 constexpr double kSureAudit = 0.9;
 constexpr double kLikelyAudit = 0.5;
+// A limit that is met later is left out: half a year is what a stop is planned
+// ahead.
+constexpr double kHorizonDays = 180.0;
 
 // "less than a minute", "40 min", "5 h", "3 days"
 std::string SpanText(std::int64_t span_ns) {
@@ -308,8 +311,7 @@ void RowReader::AddHealth(const std::string& valve,
         trend.forecast.answer == HealthForecast::Answer::kReached ? 1.0
         : trend.forecast.answer != HealthForecast::Answer::kTime
             ? 0.0
-            : std::max(0.0,
-                       1.0 - trend.forecast.time->days / query_.horizon_days);
+            : std::max(0.0, 1.0 - trend.forecast.time->days / kHorizonDays);
     if (finding.confidence > 0.0) {
       const std::string why = TrendText(trend);
       rows_.push_back({std::move(finding), why, std::move(trend)});

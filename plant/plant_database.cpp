@@ -300,7 +300,7 @@ PlantDatabase::PlantDatabase(PlantDatabase&&) noexcept = default;
 void PlantDatabase::CheckVersion() {
   if (Run(sql::is_there).Text(0, 0) != "t") {
     Fail(
-        "has no schema fdi: run `fdi-store ship --init --to URL` as its owner");
+        "has no schema fdi: run `fdi-store ship --init --db URL` as its owner");
   }
   const PlantRows plant = Run(sql::plant);
   plant_id_ = plant.Text(0, 0).value_or("");
@@ -312,7 +312,7 @@ void PlantDatabase::CheckVersion() {
         (version < sql::kBaseline
              ? ": it was never released, make another database and ship to it"
          : version < kVersion
-             ? ": run `fdi-store ship --init --to URL` as its owner"
+             ? ": run `fdi-store ship --init --db URL` as its owner"
              : ": update this program");
     Fail(reason.c_str());
   }

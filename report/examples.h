@@ -12,7 +12,7 @@ namespace fdi::report {
 /// A command and its purpose.
 struct Example {
   std::string what;     ///< "What happened in the last two hours"
-  std::string command;  ///< "fdi-store history list --since 2h"
+  std::string command;  ///< "fdi-store history list --from 2h"
 };
 
 /// The examples of a verb, a group or (empty name) the program.

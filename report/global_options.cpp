@@ -12,8 +12,10 @@
 #include "base/csv_cells.h"
 #include "base/error.h"
 #include "base/suggestion.h"
+#include "base/text.h"
 #include "base/toml_limits.h"
 #include "fdi_version_config.h"
+#include "report/removed_words.h"
 
 namespace fdi::report {
 namespace {
@@ -41,14 +43,30 @@ std::string TextOf(const toml::node& node, const std::string& key) {
   Refuse(node, key + ": expected text, a number, true or false");
 }
 
+// "history.list."
+std::string PathText(const std::vector<std::string>& parents) {
+  std::string path;
+  for (const std::string& parent : parents) {
+    path += parent + '.';
+  }
+  return path;
+}
+
 bool IsKey(const CLI::Option& option) {
   return option.get_configurable() && !option.get_lnames().empty();
 }
 
 // Rejects a key that is neither an option nor a verb of `app`. CLI11 would,
-// too, but without the line and the key that was probably meant.
-void RefuseUnknown(const CLI::App& app, const toml::node& node,
-                   const std::string& path, const std::string& key) {
+// too, but without the line, and without the key that replaces it or that was
+// probably meant.
+void RefuseUnknown(const CLI::App& root, const CLI::App& app,
+                   const toml::node& node,
+                   const std::vector<std::string>& parents,
+                   const std::string& key) {
+  if (const auto removed =
+          RemovedWord(root.get_name(), JoinText(parents, " "), "--" + key)) {
+    Refuse(node, *removed);
+  }
   std::vector<std::string> names;
   for (const CLI::Option* option : app.get_options()) {
     if (IsKey(*option)) {
@@ -60,36 +78,34 @@ void RefuseUnknown(const CLI::App& app, const toml::node& node,
     names.push_back(verb->get_name());
   }
   const auto meant = Suggest(key, names);
+  const std::string path = PathText(parents);
   Refuse(node, "unknown key '" + path + key + "'" +
                    (meant ? ": did you mean '" + path + *meant + "'?" : ""));
 }
 
-void Collect(const CLI::App& app, const toml::table& table,
-             std::vector<std::string>& parents,
+void Collect(const CLI::App& root, const CLI::App& app,
+             const toml::table& table, std::vector<std::string>& parents,
              std::vector<CLI::ConfigItem>& items) {
-  std::string path;
-  for (const std::string& parent : parents) {
-    path += parent + '.';
-  }
   for (const auto& [toml_key, node] : table) {
     const std::string key(toml_key.str());
     const auto verbs = app.get_subcommands(
         [&key](const CLI::App* verb) { return verb->get_name() == key; });
     if (const toml::table* inner = node.as_table()) {
       if (verbs.empty()) {
-        RefuseUnknown(app, node, path, key);
+        RefuseUnknown(root, app, node, parents, key);
       }
       parents.push_back(key);
-      Collect(*verbs.front(), *inner, parents, items);
+      Collect(root, *verbs.front(), *inner, parents, items);
       parents.pop_back();
       continue;
     }
     const CLI::Option* option = app.get_option_no_throw("--" + key);
     if (option == nullptr && !verbs.empty()) {
-      Refuse(node, key + " is a verb: expected a table [" + path + key + "]");
+      Refuse(node, key + " is a verb: expected a table [" + PathText(parents) +
+                       key + "]");
     }
     if (option == nullptr || !IsKey(*option)) {
-      RefuseUnknown(app, node, path, key);
+      RefuseUnknown(root, app, node, parents, key);
     }
     CLI::ConfigItem item;
     item.parents = parents;
@@ -205,7 +221,7 @@ std::vector<CLI::ConfigItem> TomlConfig::from_config(std::istream& in) const {
     const toml::table table = toml::parse(text);
     std::vector<CLI::ConfigItem> result;
     std::vector<std::string> parents;
-    Collect(root_, table, parents, result);
+    Collect(root_, root_, table, parents, result);
     return result;
   } catch (const toml::parse_error& error) {
     std::ostringstream message;
@@ -247,6 +263,8 @@ void SetTakeLastPolicy(CLI::App& app) {
 void AddGlobalOptions(CLI::App& app, GlobalOptions& options) {
   app.option_defaults()->always_capture_default();
   app.set_help_flag("-h,--help", "Print this help and exit");
+  app.set_help_all_flag("--help-all",
+                        "Print this help with all options and exit");
   app.set_version_flag("--version", app.get_name() + " " + SoftwareVersion(),
                        "Print the version and exit");
   app.add_option("--data", options.data_dir, "Data directory")

@@ -23,6 +23,8 @@ constexpr std::size_t kTextWidth = 50;  // 80 columns in total.
 constexpr std::size_t kMaxHeadingLength = 26;
 /// The name that PrepareHelp() gives to CLI11's checks for files and folders.
 constexpr const char* kMustExist = "must exist";
+/// The group of options that only --help-all shows.
+constexpr const char* kRare = "Rare";
 
 // A heading in the left column with its text in the right one.
 std::string Entry(const std::string& heading, const std::string& text) {
@@ -78,6 +80,23 @@ class HelpFormatter : public CLI::Formatter {
       heading += " ...";
     }
     return Entry(heading, option->get_description());
+  }
+
+  std::string make_help(const CLI::App* app, std::string name,
+                        CLI::AppFormatMode mode) const override {
+    const bool all = mode == CLI::AppFormatMode::All;
+    // In one section, in the order in which they were added.
+    auto options = app->get_options([](const CLI::Option* option) {
+      return option->nonpositional() && !option->get_group().empty();
+    });
+    const std::size_t rare =
+        all ? 0 : std::erase_if(options, [](const CLI::Option* option) {
+          return option->get_group() == kRare;
+        });
+    return make_description(app) + make_usage(app, std::move(name)) +
+           make_positionals(app) + make_group("Options", false, options) +
+           make_subcommands(app, CLI::AppFormatMode::Normal) + '\n' +
+           make_footer(app) + (rare > 0 ? "\nmore: --help-all\n" : "");
   }
 
   std::string make_subcommand(const CLI::App* verb) const override {
@@ -233,10 +252,20 @@ void PrepareHelp(CLI::App& root) {
   ForEachApp(root, [&formatter](CLI::App& app) {
     app.formatter(formatter);
     app.group("Verbs");
+    // The last line of --help names it, where it shows more.
+    app.get_option("--help-all")->group("");
     for (CLI::Option* option : app.get_options()) {
       Describe(*option);
     }
   });
+}
+
+void ShowInHelpAll(CLI::App& verb, std::initializer_list<const char*> names) {
+  for (const char* name : names) {
+    if (CLI::Option* option = verb.get_option_no_throw(name)) {
+      option->group(kRare);
+    }
+  }
 }
 
 void AllowMissingFiles(CLI::App& root) {

@@ -1,7 +1,6 @@
 #pragma once
 
-#include <string>
-#include <vector>
+#include <initializer_list>
 
 namespace CLI {
 class App;
@@ -18,6 +17,11 @@ namespace fdi::report {
 /// Accepted values, defaults and exclusions are taken from the parser. Call
 /// once, after the last option was added.
 void PrepareHelp(CLI::App& root);
+
+/// Leaves options of a verb that few plants need to --help-all: --help says
+/// that there is more. A name that the verb does not have, because a component
+/// is left out, is ignored.
+void ShowInHelpAll(CLI::App& verb, std::initializer_list<const char*> names);
 
 /// Drops the requirement that files and folders named by options exist.
 void AllowMissingFiles(CLI::App& root);

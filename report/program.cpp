@@ -24,6 +24,7 @@
 #include "report/help.h"
 #include "report/logging.h"
 #include "report/output_patience.h"
+#include "report/removed_words.h"
 
 namespace fdi::report {
 namespace {
@@ -58,6 +59,16 @@ struct ExampleCheckRequest {};
 const CLI::App& Chosen(const CLI::App& app) {
   const auto chosen = app.get_subcommands();
   return chosen.empty() ? app : Chosen(*chosen.front());
+}
+
+// "history list"; empty for the program.
+std::string PathOf(const CLI::App& app) {
+  const CLI::App* parent = app.get_parent();
+  if (parent == nullptr) {
+    return "";
+  }
+  const std::string path = PathOf(*parent);
+  return path + (path.empty() ? "" : " ") + app.get_name();
 }
 
 std::vector<std::string> VerbNames(const CLI::App& app) {
@@ -224,24 +235,21 @@ void Program::AllowCsv(CLI::App& verb, const std::string& description) {
   verb.add_flag("--csv", csv_, description);
 }
 
-void Program::AddRemoved(const std::string& verb, const std::string& name,
-                         const std::string& instead) {
-  removed_[{verb, name}] = name + " is gone: " + instead;
-}
-
 void Program::AddLeftOut(const std::string& verb, const std::string& name,
                          const std::string& option) {
-  removed_[{verb, name}] = LeftOut(name, option);
+  left_out_[{verb, name}] = LeftOut(name, option);
 }
 
-std::optional<std::string> Program::RemovedWord() const {
-  const CLI::App& chosen = Chosen(*app_);
-  const std::string verb = &chosen == app_.get() ? "" : chosen.get_name();
+std::optional<std::string> Program::MissingWord() const {
+  const std::string verb = PathOf(Chosen(*app_));
   for (const std::string& word : app_->remaining(true)) {
     const std::string name = word.substr(0, word.find('='));
-    if (const auto found = removed_.find({verb, name});
-        found != removed_.end()) {
+    if (const auto found = left_out_.find({verb, name});
+        found != left_out_.end()) {
       return found->second;
+    }
+    if (auto removed = RemovedWord(app_->get_name(), verb, name)) {
+      return removed;
     }
   }
   return std::nullopt;
@@ -249,11 +257,11 @@ std::optional<std::string> Program::RemovedWord() const {
 
 void Program::AddExamples(std::vector<VerbExamples> examples) {
   std::erase_if(examples, [this](const VerbExamples& of) {
-    return removed_.contains({"", of.verb.substr(0, of.verb.find(' '))});
+    return left_out_.contains({"", of.verb.substr(0, of.verb.find(' '))});
   });
   for (VerbExamples& of : examples) {
     std::erase_if(of.examples, [this](const Example& example) {
-      return std::ranges::any_of(removed_, [&](const auto& gone) {
+      return std::ranges::any_of(left_out_, [&](const auto& gone) {
         return gone.first.second.starts_with("--") &&
                (example.command + " ").find(" " + gone.first.second + " ") !=
                    std::string::npos;
@@ -310,7 +318,7 @@ int Program::ParseAndRun(int argc, const char* const* argv) {
         "--config " + (option->count() > 0 ? option->results().front() : "") +
         ": " + error.what());
   } catch (const CLI::ParseError& error) {
-    throw fdi::ConfigError(RemovedWord().value_or(Explain(*app_, error)) +
+    throw fdi::ConfigError(MissingWord().value_or(Explain(*app_, error)) +
                            " (see " + app_->get_name() + " --help)");
   }
   return RunVerb(argc, argv);
@@ -323,7 +331,7 @@ void Program::RefuseUnknownVerb() const {
   if (!VerbNames(chosen).empty() && !left.empty() &&
       !left.front().starts_with('-')) {
     throw fdi::ConfigError(
-        RemovedWord().value_or(Unexpected(chosen, left.front())) + " (see " +
+        MissingWord().value_or(Unexpected(chosen, left.front())) + " (see " +
         app_->get_name() + " --help)");
   }
 }

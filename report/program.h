@@ -91,11 +91,9 @@ class Program {
   /// Adds --csv to a verb that returns a Report with a table.
   void AllowCsv(CLI::App& verb, const std::string& description);
 
-  /// A verb or an option of earlier versions, which is refused with what to do
-  /// instead. @param verb that had the option; "" for a verb of the program.
-  void AddRemoved(const std::string& verb, const std::string& name,
-                  const std::string& instead);
-  /// The same for a component that this build was made without; see LeftOut().
+  /// Refuses a verb, or an option of it, of a component that this build was
+  /// made without; see LeftOut(). @param verb that has the option; "" for a
+  /// verb of the program.
   void AddLeftOut(const std::string& verb, const std::string& name,
                   const std::string& option);
 
@@ -131,8 +129,9 @@ class Program {
   int RunVerb(int argc, const char* const* argv);
   int ExitCodeOf(const std::exception& error) const;
   int Print(const Report& report) const;
-  /// Of the first word among those left over that was removed or left out.
-  std::optional<std::string> RemovedWord() const;
+  /// What is to be said about a word of the command line that was removed or
+  /// left out; the first such word counts.
+  std::optional<std::string> MissingWord() const;
   void RefuseUnknownVerb() const;
   void PrintError(const std::string& message) const;
 
@@ -142,7 +141,7 @@ class Program {
   bool help_prepared_{false};
   std::vector<Verb> verbs_;
   std::vector<VerbExamples> examples_;
-  std::map<std::pair<std::string, std::string>, std::string> removed_;
+  std::map<std::pair<std::string, std::string>, std::string> left_out_;
   std::vector<std::function<std::optional<int>(const std::exception&)>>
       mappers_;
 };

@@ -13,8 +13,16 @@
 namespace fdi::report {
 
 void TimeWindow::AddTo(CLI::App& verb) {
-  verb.add_option("--since", since, "From this time on: 2026-11-20, 2h, ...");
-  verb.add_option("--until", until, "Before this time");
+  // Before it was a time, --from was the plant's history.
+  const auto no_url = [](const std::string& text) -> std::string {
+    return text.starts_with("postgresql:")
+               ? "a time is expected; --db URL reads the plant's history"
+               : "";
+  };
+  verb.add_option("--from", since, "From this time on: 2026-11-20, 2h, ...")
+      ->check(no_url)
+      ->type_name("TIME");
+  verb.add_option("--to", until, "Before this time")->type_name("TIME");
 }
 
 std::int64_t TimeWindow::since_ns(const Context& context) const {

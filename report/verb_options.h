@@ -11,15 +11,15 @@ namespace fdi::report {
 
 struct Context;
 
-/// The options --since and --until of a verb.
+/// The options --from and --to of a verb.
 struct TimeWindow {
   std::string since;
   std::string until;
 
   void AddTo(CLI::App& verb);
-  /// The smallest int64 without --since. @throws ConfigError
+  /// The smallest int64 without --from. @throws ConfigError
   std::int64_t since_ns(const Context& context) const;
-  /// The largest int64 without --until. @throws ConfigError
+  /// The largest int64 without --to. @throws ConfigError
   std::int64_t until_ns(const Context& context) const;
 };
 

@@ -45,7 +45,7 @@ expect 'shm' fdi-monitor --transport = s
 expect 'lossless' fdi-monitor run --record l
 expect 'f19' fdi-store history list --fault f19
 expect 'rtn_unack' fdi-store history list --state r
-expect 'unacked unack' fdi-store history ack --all --state un
+expect 'unacked unack' fdi-store history ack --state un
 expect 'lublin-actuator-3 lublin-actuator-3-refit' \
   fdi-simulator run --parameters lub
 expect 'level-loop' fdi-simulator run --excitation le

@@ -44,9 +44,9 @@ refused() {  # OPTION PROGRAM ARGUMENT...
     fail "${*:2} answers: $answer"
 }
 refused FDI_PLANNER fdi-store worklist
-refused FDI_PLANNER fdi-store health show --valve V1
-refused FDI_PLANT fdi-store ship --to postgresql:///plant
-refused FDI_PLANT fdi-store history list --from postgresql:///plant
+refused FDI_PLANNER fdi-store health --valve V1
+refused FDI_PLANT fdi-store ship --db postgresql:///plant
+refused FDI_PLANT fdi-store history list --db postgresql:///plant
 refused FDI_PLANNER fdi-monitor run --groups groups.toml
 refused FDI_CONSOLE fdi-monitor run --console
-refused FDI_PLANT fdi-monitor console --from postgresql:///plant
+refused FDI_PLANT fdi-monitor console --db postgresql:///plant

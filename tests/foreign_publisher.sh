@@ -11,7 +11,7 @@ source "$tests/cyclone.sh"
 "$bin/fdi-simulator" run --no-publish --duration 600 --seed 7 \
   --parameters paper-operating-point --fault f19:abrupt@200:strength=0.5 \
   --set excitation.amplitude_pct=8 --set excitation.period_s=80 \
-  --export valve.csv --log-level error >/dev/null
+  -o valve.csv --log-level error >/dev/null
 start --record --model-set quick
 await() {  # WORD
   for _ in $(seq 200); do

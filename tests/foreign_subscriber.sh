@@ -21,7 +21,7 @@ faults=()
 for ((begin = 200; begin < 100000; begin += 200)); do
   faults+=(--fault "f19:abrupt@$begin:strength=0.5:until=$((begin + 100))")
 done
-"$bin/fdi-simulator" run --domain "$domain" --valves 20 --speed 50 \
+"$bin/fdi-simulator" run --domain "$domain" --count 20 --speed 50 \
   --duration 100000 --parameters paper-operating-point "${faults[@]}" \
   >/dev/null 2>publisher.log &
 publisher=$!

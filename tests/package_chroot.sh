@@ -69,10 +69,10 @@ quietly within sh -ec 'cd /empty
   test -s episode.png
   grep console_listening monitor.log
   fdi-simulator run --excitation sine --duration 1800 --speed max --no-publish \
-    --export own.csv'
+    -o own.csv'
 begin=$(date +%s.%N)
 quietly within sh -ec 'cd /empty
-  fdi-store runs sniff own.csv --map-output tags.toml
+  fdi-store runs sniff own.csv -o tags.toml
   fdi-trainer onboard --valve OWN --file own.csv --map tags.toml'
 taken "$begin" "own file to its models"
 

@@ -8,6 +8,7 @@ int main(int argc, char** argv) {
       "fdi-study", "Measures what docs/results.md says about the diagnosis");
   program.MapError<fdi::storage::SqliteError>(fdi::report::kExitData);
   fdi::trainer::study::AddEvaluateVerb(program);
+  fdi::trainer::study::AddAblateVerb(program);
   fdi::trainer::study::AddScoringVerbs(program);
   fdi::trainer::study::AddReduceVerb(program);
   fdi::trainer::study::AddInjectVerb(program);

@@ -1,5 +1,5 @@
-# bash completion of fdi-monitor and the other programs of fdi. Verbs,
-# options and words come from the programs' --help, ids from fdi-store.
+# bash completion of fdi-monitor and the other programs of fdi. Verbs, options
+# and words come from the programs' --help-all, ids from fdi-store.
 
 # Values of KEY in what fdi-store lists: _fdi_listed KEY ARGUMENTS...
 _fdi_listed() {
@@ -27,7 +27,7 @@ _fdi_offer() {  # WORD [BEFORE]
 
 # The headings in a section of the help of `program $path`.
 _fdi_section() {
-  "$program" $path --help 2>/dev/null |
+  "$program" $path --help-all 2>/dev/null |
     sed -n "/^$1:/,/^\$/ s/^  \([^ ].*\)/\1/p"
 }
 
@@ -40,7 +40,7 @@ _fdi_options() {
 _fdi_entry() {
   local path=$path
   while :; do
-    "$program" $path --help 2>/dev/null | awk -v name="$1" '
+    "$program" $path --help-all 2>/dev/null | awk -v name="$1" '
       /^  [^ ]/ || /^$/ { found = 0 }
       match($0, "^  (-., )?" name "([[ ]|$)") {
         found = 1
@@ -69,7 +69,7 @@ _fdi_candidates() {
     *ID\[@* | run\ * | runs\ *) _fdi_listed run_id runs list ;;
     episode\ * | episodes\ *)
       echo last
-      _fdi_listed episode_id history list --limit 100
+      _fdi_listed episode_id history list --rows 100
       ;;
     type\ *) _fdi_listed name types list ;;
     label\ *)

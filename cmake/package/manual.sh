@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Writes the manual pages of a program, its groups and its verbs from their
-# --help: PROGRAM.1, PROGRAM-VERB.1 ... Usage: manual.sh PROGRAM VERSION FOLDER
+# --help-all: PROGRAM.1, PROGRAM-VERB.1 ... Usage: manual.sh PROGRAM VERSION FOLDER
 set -euo pipefail
 program=$(realpath "$1") version=$2 folder=$3
 name=$(basename "$program")
@@ -44,7 +44,7 @@ imported samples), \fImodels.db\fR (model sets and valves) and \fIhistory.db\fR
 END
     printf '\\fB%s\\fR(1)\n' "${see[@]}" | sed '$!s/$/,/'
   } >"$wrapped/include"
-  help2man --no-info --section=1 --name="$(head -1 <<<"$help")" \
+  help2man --help-option=--help-all --no-info --section=1 --name="$(head -1 <<<"$help")" \
     --source="fdi $version" --version-string="$version" --manual="fdi manual" \
     --include="$wrapped/include" --output="$folder/$page.1" "$wrapped/$page"
   # The lines of the examples stay as they are.

@@ -189,6 +189,27 @@ constexpr double kRefutingMemories = 2.0;
 // Samples after which a finding that comes and goes is forgotten, at most.
 constexpr int kLongestKept = 100000;
 
+struct EpisodeRule {
+  Rule rule;
+  Stage stage;
+};
+
+// The rules of an episode, in the order of kRules.
+constexpr auto kEpisodeRules = [] {
+  constexpr auto kIs = [](const RuleRow& row) {
+    return row.stage >= Stage::kFindings && row.stage <= Stage::kEnd &&
+           row.rule != Rule::kDrift;
+  };
+  std::array<EpisodeRule, std::ranges::count_if(kRules, kIs)> rules{};
+  std::size_t next = 0;
+  for (const RuleRow& row : kRules) {
+    if (kIs(row)) {
+      rules[next++] = {row.rule, row.stage};
+    }
+  }
+  return rules;
+}();
+
 // A stuck transmitter is certain, so observers are not needed.
 void ApplyStuckFindings(FaultSet stuck, Verdict& verdict) {
   verdict.normal_factor = 0.0;
@@ -220,10 +241,6 @@ Episode::Episode(std::shared_ptr<const FaultPlan> plan)
                       static_cast<int>(kRefutingMemories *
                                        models_->decision.evidence_window)),
       shares_(models_->faults.size()) {
-  for (const int fault : models_->undetectable) {
-    const int index = FaultIndex(*models_, fault);
-    hidden_ |= names_last_ && index >= 0 ? FaultSet{1} << index : 0;
-  }
   left_.reserve(static_cast<std::size_t>(models_->decision.detection_samples) +
                 1);
 }
@@ -273,25 +290,125 @@ void Episode::Step(const Sample& sample, const ObserverBank& bank,
     Open(*findings.detected, verdict);
   }
   floor_ |= findings.floor;
-  if (findings.settled) {
-    ForgetFindings(findings.floor, verdict);
+  Proposal proposal{sample, findings, verdict};
+  for (const EpisodeRule& step : kEpisodeRules) {
+    const bool acts = step.stage == Stage::kFloor || findings.settled;
+    if (acts && !(step.stage == Stage::kName && proposal.over) &&
+        Acts(step.rule)) {
+      Apply(step.rule, proposal);
+    }
   }
-  // A fault isolated by this sample takes precedence over the findings of the
-  // floor, so NameFloor() comes after Isolate().
-  if (findings.settled) {
-    Isolate(sample, findings, verdict);
-    ApplyMisfits(verdict);
-    JudgeUnknown(verdict);
-  }
-  NameFloor(verdict);
-  DropFindings(verdict);
-  if (!findings.settled) {
-    return;
-  }
-  clearing_.Push({verdict.residuals.data(), models_->channels.size()},
-                 verdict.normal_factor, findings.abnormal);
-  if (clearing_.Cleared()) {
-    End(verdict);
+}
+
+// One case for each rule of an episode, in any order: kRules has that in which
+// they act.
+void Episode::Apply(Rule rule, Proposal& p) {
+  Verdict& verdict = p.verdict;
+  FaultSet& supported = p.supported;
+  switch (rule) {
+    case Rule::kForgetFindings:
+      ForgetFindings(p.findings.floor, verdict);
+      break;
+    case Rule::kSupport:
+      isolation_.Push(
+          FactorsFrom(models_->decision.isolation_threshold, verdict));
+      supported = isolation_.Supported();
+      break;
+    case Rule::kRecognise:
+      Recognise();
+      break;
+    case Rule::kMisfits:
+      // A stuck transmitter is certain, whatever its observers say.
+      CountMisfits(p.findings.stuck != 0 ? 0 : faults_.misfits(), verdict);
+      break;
+    case Rule::kSecondHolds:
+      HoldName(p);
+      break;
+    case Rule::kWithdraw:
+      Withdraw(verdict);
+      break;
+    case Rule::kCountShares:
+      CountSupport(supported);
+      break;
+    case Rule::kMisfitIsNoName:
+      supported = IsAllOf(supported, misfits_) ? 0 : supported;
+      break;
+    case Rule::kRecognisedAlone:
+      // What is recognised fits over t_k samples, be single ones rare for it.
+      supported = supported == 0 ? recognised_ : supported;
+      break;
+    case Rule::kHeld:
+      if (isolation_held_) {
+        Block(p);
+      }
+      break;
+    case Rule::kDriftBlocks:
+      if (p.findings.drift) {
+        Block(p);
+      }
+      break;
+    case Rule::kNormalGate:
+      if (LooksNormal(verdict)) {
+        Block(p);
+      }
+      break;
+    case Rule::kProven:
+      if (supported == 0) {
+        NameEarly(p.sample, p.findings.beginning, verdict);
+      }
+      break;
+    case Rule::kNothingSupported:
+      p.over = supported == 0;
+      break;
+    case Rule::kGroups:
+      supported = WithGroups(supported, verdict);
+      break;
+    case Rule::kTaughtStands:
+      supported = Recognised(supported);
+      break;
+    case Rule::kFourAtMost:
+      // A set this large is no diagnosis: its faults remain candidates. Sets
+      // without a floor keep their answers.
+      if (models_->floor && std::popcount(supported) > kMaxFaultSetSize) {
+        supported = floor_;
+      }
+      break;
+    case Rule::kLasting:
+      supported = Lasting(supported, verdict);
+      break;
+    case Rule::kLossBeside:
+      supported |= LossBeside(supported, floor_, p.sample, verdict);
+      break;
+    case Rule::kEarlyReplaced:
+      ReplaceEarly(p);
+      break;
+    case Rule::kFirstName:
+      NameFirst(p);
+      break;
+    case Rule::kReisolation:
+      Contend(p);
+      break;
+    case Rule::kMisfitsAreNoCandidates:
+      ApplyMisfits(verdict);
+      break;
+    case Rule::kUnknown:
+      JudgeUnknown(verdict);
+      break;
+    case Rule::kFloorNames:
+      NameFloor(verdict);
+      break;
+    case Rule::kDropFindings:
+      DropFindings(verdict);
+      break;
+    case Rule::kCleared:
+      clearing_.Push({verdict.residuals.data(), models_->channels.size()},
+                     verdict.normal_factor, p.findings.abnormal);
+      if (clearing_.Cleared()) {
+        End(verdict);
+      }
+      break;
+    default:
+      break;  // Of another stage.
   }
 }
 
@@ -421,6 +538,9 @@ FaultSet Episode::FactorsFrom(double threshold, const Verdict& verdict) const {
 // favour one throughout the window. The others of its group join it unless they
 // are refuted, that is, below T/2.
 FaultSet Episode::WithGroups(FaultSet set, const Verdict& verdict) const {
+  if (!Acts(Rule::kGroups)) {
+    return set;
+  }
   FaultSet joined = set;
   const FaultSet close =
       FactorsFrom(0.5 * models_->decision.isolation_threshold, verdict);
@@ -507,7 +627,7 @@ FaultSet Episode::Recognised(FaultSet set) const {
 // has grown, or meets a command that shows it: it explains the loss.
 bool Episode::ExplainsLoss(FaultSet set, const Verdict& verdict) const {
   const FaultSet known = set & ~floor_names_;
-  return faults_.judges_fit() && known != 0 &&
+  return Acts(Rule::kExplainsLoss) && faults_.judges_fit() && known != 0 &&
          (known & ~verdict.isolated) == 0 &&
          (verdict.isolated & floor_names_) == 0 &&
          stood_ >= 0.5 * models_->decision.evidence_window;
@@ -522,7 +642,7 @@ FaultSet Episode::LossBeside(FaultSet set, FaultSet floor, const Sample& sample,
                              const Verdict& verdict) const {
   const int index = FaultIndex(*models_, kLowFlow);
   const FaultSet loss = index < 0 ? 0 : floor & FaultSet{1} << index;
-  if (loss == 0 || ExplainsLoss(set, verdict)) {
+  if (!Acts(Rule::kLossBeside) || loss == 0 || ExplainsLoss(set, verdict)) {
     return 0;
   }
   bool of_process = true;
@@ -649,71 +769,55 @@ FaultSet Episode::Lasting(FaultSet supported, const Verdict& verdict) const {
 }
 
 // What the name does not explain comes on top of it, or may.
-void Episode::KeepName() {
-  contender_run_ = 0;
-  left_.clear();
+void Episode::HoldName(Proposal& proposal) {
+  if (hold_ == NameHold::kNone) {
+    return;
+  }
+  Block(proposal);
   if (hold_ == NameHold::kExplained) {
     misfits_ = 0;
     misfit_counts_.Restart();
   }
 }
 
-void Episode::Isolate(const Sample& sample, const Findings& findings,
-                      Verdict& verdict) {
-  const double threshold = models_->decision.isolation_threshold;
-  // Before any return, so that the window is full when a hold ends or the valve
-  // no longer looks normal.
-  isolation_.Push(FactorsFrom(threshold, verdict));
-  Recognise();
-  // A stuck transmitter is certain, whatever its observers say.
-  CountMisfits(findings.stuck != 0 ? 0 : faults_.misfits(), verdict);
-  if (hold_ != NameHold::kNone) {
-    KeepName();
-    return;
-  }
-  Withdraw(verdict);
-  FaultSet supported = isolation_.Supported();
-  CountSupport(supported);
-  if (IsAllOf(supported, misfits_)) {
-    supported = 0;
-  }
-  // As little as a fault that no limit shows explains no episode: the evidence
-  // is too weak for a name.
-  if ((supported & hidden_) != 0) {
-    supported = 0;
-  }
-  // What is recognised fits over t_k samples, be single ones rare for it.
-  supported = supported == 0 ? recognised_ : supported;
-  if (isolation_held_ || findings.drift || verdict.normal_factor >= threshold) {
+// What contends for the name begins anew when the block ends.
+void Episode::Block(Proposal& proposal) {
+  contender_run_ = 0;
+  left_.clear();
+  proposal.over = true;
+}
+
+bool Episode::LooksNormal(const Verdict& verdict) const {
+  return verdict.normal_factor >= models_->decision.isolation_threshold;
+}
+
+void Episode::NameAtOnce(Proposal& proposal) {
+  if ((proposal.supported & ~floor_names_) != 0) {
     contender_run_ = 0;
-    left_.clear();
-    return;
+    Name(proposal.supported, proposal.verdict);
   }
-  if (supported == 0) {
-    NameEarly(sample, findings.beginning, verdict);
-    return;
+  proposal.over = true;
+}
+
+void Episode::ReplaceEarly(Proposal& proposal) {
+  if (std::exchange(early_, false) &&
+      proposal.supported != proposal.verdict.isolated) {
+    NameAtOnce(proposal);
   }
-  supported = Recognised(WithGroups(supported, verdict));
-  // A set this large is no diagnosis: its faults remain candidates. Older model
-  // sets have no floor and keep their answers.
-  if (models_->floor && std::popcount(supported) > kMaxFaultSetSize) {
-    supported = floor_;
+}
+
+// The first fault replaces findings of the floor.
+void Episode::NameFirst(Proposal& proposal) {
+  if ((proposal.verdict.isolated & ~floor_names_) == 0) {
+    NameAtOnce(proposal);
   }
-  supported = Lasting(supported, verdict);
-  supported |= LossBeside(supported, floor_, sample, verdict);
-  // The first fault replaces findings of the floor at once, and the first set
-  // of equation (6) a name that came before it.
-  const bool early = std::exchange(early_, false);
-  if ((verdict.isolated & ~floor_names_) == 0 ||
-      (early && supported != verdict.isolated)) {
-    if ((supported & ~floor_names_) != 0) {
-      contender_run_ = 0;
-      Name(supported, verdict);
-    }
-    return;
-  }
-  // A different set must persist before it replaces the isolated one. Samples
-  // that support no set, as by noise on one factor, count neither way.
+}
+
+// A different set must persist before it replaces the isolated one. Samples
+// that support no set, as by noise on one factor, count neither way.
+void Episode::Contend(Proposal& proposal) {
+  const FaultSet supported = proposal.supported;
+  Verdict& verdict = proposal.verdict;
   contender_run_ = supported == contender_ ? contender_run_ + 1 : 1;
   contender_ = supported;
   if (supported != verdict.isolated &&

@@ -10,6 +10,7 @@
 #include "diagnosis/decision/fault_bank.h"
 #include "diagnosis/decision/floor.h"
 #include "diagnosis/decision/misfit_counts.h"
+#include "diagnosis/decision/rules.h"
 #include "diagnosis/model/model_set.h"
 #include "diagnosis/model/verdict.h"
 #include "diagnosis/observers/detection.h"
@@ -168,6 +169,16 @@ class Episode {
   void HoldIsolation(bool hold) { isolation_held_ = hold; }
 
  private:
+  // What the rules make of one sample.
+  struct Proposal {
+    const Sample& sample;
+    const Findings& findings;
+    Verdict& verdict;
+    FaultSet supported{0};
+    bool over{false};  // no further rule of Stage::kName acts
+  };
+
+  void Apply(Rule rule, Proposal& proposal);
   void ApplyEvidence(Verdict& verdict) const;
   void Open(std::int64_t stamp_ns, Verdict& verdict);
   FaultSet Proven(const Verdict& verdict);
@@ -179,14 +190,18 @@ class Episode {
   bool IsLong() const;
   void CountSupport(FaultSet supported);
   FaultSet Lasting(FaultSet supported, const Verdict& verdict) const;
-  void KeepName();
+  void HoldName(Proposal& proposal);
+  void Block(Proposal& proposal);
+  bool LooksNormal(const Verdict& verdict) const;
+  void NameAtOnce(Proposal& proposal);
+  void ReplaceEarly(Proposal& proposal);
+  void NameFirst(Proposal& proposal);
+  void Contend(Proposal& proposal);
   void Withdraw(Verdict& verdict);
   bool ExplainsLoss(FaultSet set, const Verdict& verdict) const;
   bool IsAllOf(FaultSet faults, FaultSet misfits) const;
   void ApplyMisfits(Verdict& verdict) const;
   void NameEarly(const Sample& sample, FaultSet beginning, Verdict& verdict);
-  void Isolate(const Sample& sample, const Findings& findings,
-               Verdict& verdict);
   void Name(FaultSet faults, Verdict& verdict);
   void NameFloor(Verdict& verdict);
   void ForgetFindings(FaultSet present, const Verdict& verdict);
@@ -226,7 +241,6 @@ class Episode {
   // What the evidence refutes; counted in sets without a second look, which
   // have no other rule for a name that changes with a growing strength.
   bool names_last_;
-  FaultSet hidden_{0};  // look normal; of the same sets
   MisfitCounts contradictions_;
   std::vector<double> shares_;  // of the episode that supported each fault
   int stood_{0};  // samples that a fault of the present name fitted

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "diagnosis/decision/look_answer.h"
+#include "diagnosis/decision/rules.h"
 
 namespace fdi {
 namespace {
@@ -174,28 +175,55 @@ void EpisodeName::Begin() {
   named_ = inherited_ && inherited_->isolated;
 }
 
-// A second fault is on top of the name, whatever a look at both of them says.
+// The first source that says something is the name.
 EpisodeName::Choice EpisodeName::Choose(const Inputs& inputs) {
-  const SecondFault& second = inputs.engine.second;
-  if ((now_.faults & second.standing) != 0) {
-    return {now_.faults, Unknown::kNone, now_.source, now_.layer};
+  for (const Rule source : kRulesOf<Stage::kSource>) {
+    if (!Acts(source)) {
+      continue;
+    }
+    if (const auto choice = SaidBy(source, inputs)) {
+      return *choice;
+    }
   }
-  if (inputs.look && !TakesTwoForOne(SetOf(inputs.look->faults))) {
-    inherited_.reset();
-    const FaultSet faults = SetOf(inputs.look->faults);
-    return {faults,
-            faults != 0            ? Unknown::kNone
-            : inputs.look->outside ? Unknown::kOutsideKnown
-                                   : Unknown::kTooEarly,
-            NameSource::kLook, Layer::kPhysics};
+  return OfObservers(inputs);
+}
+
+std::optional<EpisodeName::Choice> EpisodeName::SaidBy(Rule source,
+                                                       const Inputs& inputs) {
+  switch (source) {
+    case Rule::kSecondStands:
+      // Whatever a look at both of them says.
+      if ((now_.faults & inputs.engine.second.standing) == 0) {
+        return std::nullopt;
+      }
+      return Choice{now_.faults, Unknown::kNone, now_.source, now_.layer};
+    case Rule::kLook:
+      return OfLook(inputs);
+    case Rule::kInherited:
+      if (!InheritedStands(inputs)) {
+        inherited_.reset();
+        return std::nullopt;
+      }
+      return Choice{
+          inherited_->faults,
+          inherited_->faults != 0 ? Unknown::kNone : Unknown::kTooEarly,
+          NameSource::kRestart, inherited_->layer};
+    default:
+      return std::nullopt;
   }
-  if (InheritedStands(inputs)) {
-    return {inherited_->faults,
-            inherited_->faults != 0 ? Unknown::kNone : Unknown::kTooEarly,
-            NameSource::kRestart, inherited_->layer};
+}
+
+std::optional<EpisodeName::Choice> EpisodeName::OfLook(const Inputs& inputs) {
+  if (!inputs.look || TakesTwoForOne(SetOf(inputs.look->faults))) {
+    return std::nullopt;
   }
   inherited_.reset();
-  return OfObservers(inputs);
+  const FaultSet faults = SetOf(inputs.look->faults);
+  return Choice{faults,
+                faults != 0            ? Unknown::kNone
+                : inputs.look->outside ? Unknown::kOutsideKnown
+                                       : Unknown::kTooEarly,
+                NameSource::kLook, Layer::kPhysics};
 }
 
 EpisodeName::Choice EpisodeName::OfObservers(const Inputs& inputs) const {
@@ -230,7 +258,7 @@ bool EpisodeName::InheritedStands(const Inputs& inputs) const {
 // A second fault has to be found anew, and until then both faults together
 // may look like either of them, at another strength, like a third one or none.
 bool EpisodeName::TakesTwoForOne(FaultSet faults) const {
-  if (!inherited_ || !inherited_->second.open) {
+  if (!Acts(Rule::kTwoForOne) || !inherited_ || !inherited_->second.open) {
     return false;
   }
   return faults == 0 || (faults & ~inherited_->faults) != 0;

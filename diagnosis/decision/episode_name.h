@@ -8,13 +8,15 @@
 #include <vector>
 
 #include "diagnosis/decision/look.h"
-#include "diagnosis/decision/second_fault.h"
+#include "diagnosis/decision/name_beside.h"
 #include "diagnosis/model/severity.h"
 #include "diagnosis/model/verdict.h"
 #include "diagnosis/records/fault_event.h"
 #include "diagnosis/records/strength_point.h"
 
 namespace fdi {
+
+enum class Rule : std::uint8_t;
 
 /// Who gave an episode its name.
 enum class NameSource : std::uint8_t {
@@ -49,7 +51,7 @@ struct EpisodeNow {
 };
 
 /// Decides what the open episode of one valve is called, from one sample to the
-/// next. The inputs, the strongest first:
+/// next. The inputs, the strongest first (Stage::kSource):
 ///
 /// 1. a second look whose answer counts (LookBook);
 /// 2. the name that an earlier session gave: one by a look until a look of this
@@ -116,6 +118,8 @@ class EpisodeName {
 
   void Begin();
   Choice Choose(const Inputs& inputs);
+  std::optional<Choice> SaidBy(Rule source, const Inputs& inputs);
+  std::optional<Choice> OfLook(const Inputs& inputs);
   Choice OfObservers(const Inputs& inputs) const;
   bool InheritedStands(const Inputs& inputs) const;
   bool TakesTwoForOne(FaultSet faults) const;

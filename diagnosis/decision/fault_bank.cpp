@@ -5,6 +5,7 @@
 #include <limits>
 #include <numeric>
 
+#include "diagnosis/decision/rules.h"
 #include "diagnosis/observers/observer_kernels.h"
 
 namespace fdi {
@@ -107,6 +108,9 @@ double FaultBank::Allowance() const {
 }
 
 double FaultBank::AllowanceOf(double interpolation) const {
+  if (!Acts(Rule::kAllowance)) {
+    return 0.0;
+  }
   return plan_->models().decision.interpolation_allowance * interpolation *
          std::accumulate(effects_.begin(), effects_.end(), 0.0);
 }
@@ -133,7 +137,9 @@ void FaultBank::Update(const ObserverBank& bank) {
   const double least =
       BestEvidence() - std::max(kMemoryOfContradiction * support,
                                 allowance_ + kBeyondAllowance * support);
-  RaiseTo(least);
+  if (Acts(Rule::kShortMemory)) {
+    RaiseTo(least);
+  }
 }
 
 void FaultBank::RaiseTo(double least) {
@@ -170,8 +176,10 @@ void FaultBank::PushInputs(const Sample& sample) {
 // acts on it, and a fault that always moved one has moved it.
 bool FaultBank::SuitsInputs(const StrengthTracker& tracker) const {
   const StrengthPath& path = tracker.path();
-  return !plan_->judges_fit() || ((odd_ & ~(path.inputs | excused_)) == 0 &&
-                                  (usual_ & path.moved) == 0);
+  const bool odd =
+      Acts(Rule::kInputsOdd) && (odd_ & ~(path.inputs | excused_)) != 0;
+  const bool usual = Acts(Rule::kInputsMoved) && (usual_ & path.moved) != 0;
+  return !plan_->judges_fit() || (!odd && !usual);
 }
 
 bool FaultBank::Fits(const StrengthTracker& tracker) const {
@@ -184,11 +192,23 @@ double FaultBank::EvidenceMembership(double behind) const {
   return std::clamp((support - behind) / (support - core), 0.0, 1.0);
 }
 
+// The most that d_f may be by one rule. `instant` is the factor of the fault's
+// observers in this sample.
+double FaultBank::Cap(Rule rule, const StrengthTracker& tracker, double instant,
+                      double behind) const {
+  const double isolation = plan_->models().decision.isolation_threshold;
+  switch (rule) {
+    case Rule::kMemberships:
+      return std::max(instant, tracker.factor());
+    case Rule::kTolerates:
+      return tracker.tolerates() ? 0.5 * (1.0 + isolation) : 1.0;
+    default:  // Rule::kEvidence
+      return EvidenceMembership(behind);
+  }
+}
+
 void FaultBank::ApplyEvidence(Verdict& verdict) const {
   const double best = BestEvidence();
-  const double isolation = plan_->models().decision.isolation_threshold;
-  const double candidate = 0.5 * isolation;
-  const double tolerated = 0.5 * (1.0 + isolation);
   verdict.normal_factor = std::min(
       verdict.normal_factor, EvidenceMembership(best - trained_.total(0)));
   const std::array<double, kMaxFaults> instant = verdict.fault_factors;
@@ -199,11 +219,13 @@ void FaultBank::ApplyEvidence(Verdict& verdict) const {
   for (const StrengthTracker& tracker : trackers_) {
     const std::size_t i = tracker.path().fault_index;
     const double evidence = tracker.evidence(trained_);
-    const double factor =
-        std::min({std::max(instant[i], tracker.factor()),
-                  tracker.refutable() ? 1.0 : candidate,
-                  tracker.tolerates() ? tolerated : 1.0,
-                  EvidenceMembership(best - evidence - allowance_)});
+    double factor = 1.0;
+    for (const Rule rule : kRulesOf<Stage::kFactors>) {
+      if (Acts(rule)) {
+        factor = std::min(factor, Cap(rule, tracker, instant[i],
+                                      best - evidence - allowance_));
+      }
+    }
     verdict.fault_factors[i] = std::max(verdict.fault_factors[i], factor);
     if (evidence > leading[i]) {
       leading[i] = evidence;
@@ -270,8 +292,7 @@ FaultSet FaultBank::Recognised(double margin, bool fitting) const {
   }
   for (const StrengthTracker& tracker : trackers_) {
     const StrengthPath& path = tracker.path();
-    if (path.taught && tracker.refutable() &&
-        best - tracker.evidence(trained_) <= margin &&
+    if (path.taught && best - tracker.evidence(trained_) <= margin &&
         (!fitting || Fits(tracker))) {
       recognised |= FaultSet{1} << path.fault_index;
     }

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "diagnosis/decision/observer_evidence.h"
+#include "diagnosis/decision/rules.h"
 #include "diagnosis/decision/strength_tracker.h"
 #include "diagnosis/model/verdict.h"
 #include "diagnosis/observers/fit_window.h"
@@ -19,9 +20,7 @@ namespace fdi {
 ///     d_f = min( max(γ_observers, γ_tracker), μ_L(L_best − L_f − a) ),
 ///
 /// μ_L falling from 1 to 0 between the evidence core and support. Normal
-/// operation competes in the same way with d_0, without a. A fault that no
-/// reading since the detection could have refuted has at most d_f = T/2: it is
-/// a candidate, but absence of contrary evidence does not isolate it. One that
+/// operation competes in the same way with d_0, without a. A fault that
 /// tolerates what is seen, but does not account for it, has at most (1 + T)/2:
 /// it can be isolated, but is not sure.
 ///
@@ -101,6 +100,8 @@ class FaultBank {
   double Allowance() const;
   double AllowanceOf(double interpolation) const;
   double EvidenceMembership(double behind) const;
+  double Cap(Rule rule, const StrengthTracker& tracker, double instant,
+             double behind) const;
   bool SuitsInputs(const StrengthTracker& tracker) const;
   bool Fits(const StrengthTracker& tracker) const;
 

@@ -7,6 +7,7 @@
 #include <limits>
 #include <utility>
 
+#include "diagnosis/decision/rules.h"
 #include "diagnosis/model/fault_catalogue.h"
 #include "diagnosis/model/taught.h"
 
@@ -48,7 +49,8 @@ bool IsAlike(Alike alike, const SecondLook& look, const Explanation& e,
 bool IsExhausted(const SecondLook& look) {
   constexpr double kLargest = 0.99;
   const Explanation& best = look.ranked.front();
-  return !look.complete && look.misfit > kGoodMisfit && IsFault(best.fault) &&
+  return Acts(Rule::kExhausted) && !look.complete &&
+         look.misfit > kGoodMisfit && IsFault(best.fault) &&
          std::abs(best.strength) > kLargest &&
          FaultFactsOf(best.fault).onset == Onset::kGradual;
 }

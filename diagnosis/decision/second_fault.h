@@ -7,22 +7,11 @@
 
 #include "diagnosis/decision/engine_plan.h"
 #include "diagnosis/decision/episode.h"
+#include "diagnosis/decision/name_beside.h"
 #include "diagnosis/decision/standing_fault.h"
 #include "diagnosis/model/verdict.h"
 
 namespace fdi {
-
-/// A name that counts beside the engine's, by a simulation of the valve.
-struct NameBeside {
-  static constexpr std::size_t kMost = 4;
-  struct Fault {
-    std::size_t bit{0};
-    double strength{0.0};  ///< Signed.
-  };
-
-  FaultSet faults{0};                 ///< Empty: there is none.
-  std::array<Fault, kMost> likely{};  ///< Those faults, likeliest first.
-};
 
 /// Finds what comes on top of the fault that an open episode is named after.
 ///

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "diagnosis/decision/rules.h"
 #include "diagnosis/model/fault_catalogue.h"
 
 namespace fdi {
@@ -13,8 +14,6 @@ constexpr int kSearchSamples = 40;  // initial samples with a grid search
 // A fault rarely develops faster than to full strength in 10 minutes: at 1 Hz
 // that is 1/600 per sample, 2.5 of these deviations.
 constexpr double kRateDeviation = 1.0 / 1500.0;
-// An effect on a channel counts from this share of the deviation on.
-constexpr double kMinEffect = 0.25;
 constexpr double kAccounted = 0.5;    // of the normal observer's residual
 constexpr double kOnsetError = 0.5;   // of the effect, while a fault begins
 constexpr double kUnaccounted = 2.0;  // misfit of what only tolerates
@@ -45,7 +44,6 @@ void StrengthTracker::Restart() {
   age_ = 0;
   strength_ = path_->lowest;
   rate_ = 0.0;
-  refutable_ = false;
   accounts_ = false;
   total_ = 0.0;
   evidence_.fill(0.0);
@@ -68,7 +66,10 @@ const StrengthPath::Node& StrengthTracker::BestNode(
 }
 
 double StrengthTracker::evidence(const ObserverEvidence& trained) const {
-  return std::max(total_, trained.total(BestNode(trained).observer));
+  const double best = trained.total(BestNode(trained).observer);
+  return !Acts(Rule::kTrackedStrength)    ? best
+         : !Acts(Rule::kTrainedStrengths) ? total_
+                                          : std::max(total_, best);
 }
 
 double StrengthTracker::strength(const ObserverEvidence& trained) const {
@@ -166,7 +167,6 @@ StrengthTracker::Prediction StrengthTracker::At(const ObserverBank& bank,
 }
 
 void StrengthTracker::Step(const ObserverBank& bank) {
-  refutable_ = refutable_ || IsRefutable(bank);
   if (age_ < kSearchSamples) {
     Search(bank);
   } else {
@@ -174,29 +174,6 @@ void StrengthTracker::Step(const ObserverBank& bank) {
   }
   ++age_;
   UpdateFactor(bank);
-}
-
-// True if a reading can distinguish this fault from normal operation: one of
-// its observers makes a different prediction, unless the transmitter's limit
-// hides both. A reading at the limit that normal operation does not explain
-// counts as a test passed.
-bool StrengthTracker::IsRefutable(const ObserverBank& bank) const {
-  for (std::size_t c = 0; c < channels_; ++c) {
-    const int channel = static_cast<int>(c);
-    if (!bank.active(channel) || std::isnan(bank.residual(0, channel))) {
-      continue;
-    }
-    for (std::size_t j = 1; j < path_->nodes.size(); ++j) {
-      const StrengthPath::Point& point = path_->points[j * channels_ + c];
-      const double effect =
-          std::abs(Lane(bank.state().outputs->predictions, point.slot) -
-                   bank.prediction(0, channel));
-      if (effect > kMinEffect * point.sd) {
-        return true;
-      }
-    }
-  }
-  return false;
 }
 
 // The best of a grid of constant strengths: the filter is only valid locally,
@@ -380,7 +357,8 @@ void StrengthTracker::JudgeAccount(const ObserverBank& bank,
 // what that one says of it is no part of an effect to interpolate.
 double StrengthTracker::Between(std::size_t channel, const Segment& segment,
                                 const PathPlace& place, double residual) const {
-  if (place.segment == 0 || !plan_->takes_position(channel)) {
+  if (!Acts(Rule::kBetween) || place.segment == 0 ||
+      !plan_->takes_position(channel)) {
     return residual;
   }
   const double low = residual + segment.slope * place.from_low;
@@ -412,16 +390,20 @@ void StrengthTracker::PushFit(const ObserverBank& bank,
       const double normal = bank.residual(0, static_cast<int>(c));
       // An error of interpolation excuses a part of an effect, not one that is
       // not there: nearer to normal operation, there is none.
-      const bool apart = std::abs(normal) < std::abs(p.residual);
+      const bool apart =
+          Acts(Rule::kApart) && std::abs(normal) < std::abs(p.residual);
       p.residual = apart ? Between(c, segment, place, p.residual) : p.residual;
       const double effect =
           apart || std::isnan(normal) ? 0.0 : normal - p.residual;
-      const double onset = begins ? kOnsetError * effect : 0.0;
-      const double spread =
-          std::sqrt(std::min(p.variance - p.error, kMaxFitVariance * sd * sd) +
-                    (apart ? 0.0 : p.error) + onset * onset);
+      const double onset =
+          begins && Acts(Rule::kOnset) ? kOnsetError * effect : 0.0;
+      const double most = Acts(Rule::kFitVariance)
+                              ? kMaxFitVariance * sd * sd
+                              : std::numeric_limits<double>::infinity();
+      const double spread = std::sqrt(std::min(p.variance - p.error, most) +
+                                      (apart ? 0.0 : p.error) + onset * onset);
       z[c] = p.residual / spread;
-      u[c] = effect / spread;
+      u[c] = Acts(Rule::kShareOff) ? effect / spread : 0.0;
       PushAccount(bank, c, p.residual);
     }
   }
@@ -429,7 +411,7 @@ void StrengthTracker::PushFit(const ObserverBank& bank,
   misfit_ = 0.0;
   // Normal operation, the first node, has no limits.
   const std::size_t node = std::max<std::size_t>(place.nearest, 1);
-  for (std::size_t c = 0; c < channels_; ++c) {
+  for (std::size_t c = 0; c < channels_ && Acts(Rule::kFitLimits); ++c) {
     const FitBounds& limits = path_->points[node * channels_ + c].fit;
     misfit_ = std::max(misfit_, fit_.Excess(c, limits));
   }
@@ -441,7 +423,7 @@ void StrengthTracker::PushFit(const ObserverBank& bank,
   if (early || age_ > 2 * t_k) {
     tolerates_ = account.tolerates;
   }
-  if (!early && (account.lacks & explains) != 0) {
+  if (Acts(Rule::kAccounted) && !early && (account.lacks & explains) != 0) {
     misfit_ = std::max(misfit_, kUnaccounted);
   }
 }

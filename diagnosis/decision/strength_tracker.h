@@ -57,11 +57,6 @@ class StrengthTracker {
   /// The same of the tracked strength, whichever explains better.
   double TrackedInterpolation() const;
 
-  /// True once a reading since the detection could have refuted the fault: on a
-  /// channel where it differs from normal operation and the transmitter's limit
-  /// does not hide both. A fault that is not yet refutable is not isolated.
-  bool refutable() const { return refutable_; }
-
   /// Of the first t_k samples, of the best explanation, tracked or trained:
   /// whether it accounts for what is seen. Call after Step().
   void JudgeAccount(const ObserverBank& bank, const ObserverEvidence& trained);
@@ -123,7 +118,6 @@ class StrengthTracker {
   double Gain(const ObserverBank& bank, std::size_t channel, double residual,
               double variance) const;
   double Sum(const double* parts) const;
-  bool IsRefutable(const ObserverBank& bank) const;
   void Search(const ObserverBank& bank);
   void SearchChannel(const ObserverBank& bank, std::size_t channel);
   void Track(const ObserverBank& bank);
@@ -148,7 +142,6 @@ class StrengthTracker {
   double total_{0.0};  // of the evidence
   Parts evidence_{};
   double factor_{0.0};
-  bool refutable_{false};
   bool accounts_{false};
   FitWindow fit_;
   double misfit_{0.0};  // 1 at the limit

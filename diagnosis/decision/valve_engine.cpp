@@ -8,6 +8,7 @@
 
 #include "diagnosis/decision/episode.h"
 #include "diagnosis/decision/floor.h"
+#include "diagnosis/decision/rules.h"
 #include "diagnosis/decision/second_fault.h"
 #include "diagnosis/model/fault_catalogue.h"
 #include "diagnosis/model/model_set.h"
@@ -19,6 +20,7 @@
 #include "diagnosis/observers/detection.h"
 #include "diagnosis/observers/drift_watch.h"
 #include "diagnosis/observers/intake.h"
+#include "diagnosis/observers/lone_readings.h"
 #include "diagnosis/observers/observer_bank.h"
 
 namespace fdi {
@@ -113,6 +115,7 @@ struct Diagnosis {
       : plan(std::move(parts.plan)),
         trained(TrainedSignals(plan->models())),
         bank(plan->observers(), std::move(parts.outputs), parts.instructions),
+        lone(plan->models()),
         coverage(plan->models()),
         detection(plan->models()),
         drift(plan->models()),
@@ -125,6 +128,7 @@ struct Diagnosis {
   std::shared_ptr<const EnginePlan> plan;
   TrainedSignals trained;
   ObserverBank bank;
+  LoneReadings lone;
   Coverage coverage;
   Detection detection;
   DriftWatch drift;
@@ -189,22 +193,22 @@ void ValveEngine::Impl::ClearVerdict() {
 }
 
 const Verdict& ValveEngine::Impl::Step(const Sample& measured) {
-  const Sample sample = diagnosis_->trained.Of(measured);
-  verdict_.stamp_ns = sample.stamp_ns;
-  verdict_.source_id = sample.source_id;
-  verdict_.seq = sample.seq;
+  const Sample trained = diagnosis_->trained.Of(measured);
+  verdict_.stamp_ns = trained.stamp_ns;
+  verdict_.source_id = trained.source_id;
+  verdict_.seq = trained.seq;
   verdict_.initialised = false;
   verdict_.transition_count = 0;
-  const SourceOrder::Placement placement = order_.Place(sample);
+  const SourceOrder::Placement placement = order_.Place(trained);
   verdict_.intake = placement.intake;
   if (OutOfOrder(placement.intake)) {
     return verdict_;
   }
-  stamp_ns_ = sample.stamp_ns;
+  stamp_ns_ = trained.stamp_ns;
   // A newer source takes over by its first sample, even if its values are then
   // rejected.
   if (placement.new_source) {
-    TakeSource(sample);
+    TakeSource(trained);
   }
   if (placement.intake != Intake::kAccepted) {
     Reject(placement.intake);
@@ -218,20 +222,21 @@ const Verdict& ValveEngine::Impl::Step(const Sample& measured) {
   }
   // The bank chooses the channels that it can evaluate when it is initialised,
   // so other signals than before need that as much as a gap does.
-  if (needs_initialisation_ || placement.gap || sample.present != present_) {
-    Initialise(sample);
+  if (needs_initialisation_ || placement.gap || trained.present != present_) {
+    Initialise(trained);
   }
-  diagnosis_->bank.Step(sample);
+  const Sample& sample = diagnosis_->lone.Step(diagnosis_->bank, trained);
   diagnosis_->stuck.Push(sample);
   diagnosis_->floor.Push(sample);
   ReadResiduals();
   const ObserverBank& bank = diagnosis_->bank;
-  const bool uncertain =
+  const bool unread =
       bank.active_channels() > 0 && bank.measured_channels() == 0;
+  const bool uncertain = unread && !diagnosis_->lone.holds();
   uncertain_ = uncertain ? std::min(uncertain_ + 1, kMaxUncertainRun + 1) : 0;
   // With nothing measured, Score() would set every factor to 0, as if each
   // fault and normal operation were refuted. So the last factors stand.
-  if (!uncertain) {
+  if (!unread) {
     diagnosis_->episode.Score(bank, verdict_);
   }
   verdict_.quality = Judge(sample);
@@ -297,6 +302,7 @@ void ValveEngine::Impl::Reject(Intake intake) {
 
 void ValveEngine::Impl::Initialise(const Sample& sample) {
   diagnosis_->bank.Initialise(sample);
+  diagnosis_->lone.Restart();
   present_ = sample.present;
   needs_initialisation_ = false;
   // Windows outlast a short interruption; runs of consecutive samples do not.
@@ -364,7 +370,8 @@ void ValveEngine::Impl::Decide(const Sample& sample) {
     findings.stuck = diagnosis_->stuck.faults();
     // Push() comes first: after another operand, || could skip it and the
     // windows would miss the sample.
-    findings.abnormal = detection.Push(diagnosis_->bank, sample) ||
+    findings.abnormal = detection.Push(diagnosis_->bank, sample, {},
+                                       diagnosis_->lone.residuals()) ||
                         findings.stuck != 0 || findings.abnormal || suspected_;
     const auto suspicion =
         suspected_ ? std::optional(sample.stamp_ns) : std::nullopt;
@@ -391,7 +398,7 @@ void ValveEngine::Impl::Decide(const Sample& sample) {
 // A finding beside those of the floor, which do not come slowly.
 void ValveEngine::Impl::FindDrift(Findings& findings) {
   DriftWatch& drift = diagnosis_->drift;
-  if (!drift.watches()) {
+  if (!Acts(Rule::kDrift) || !drift.watches()) {
     return;
   }
   const std::uint32_t beyond = diagnosis_->detection.beyond();
@@ -424,8 +431,8 @@ void ValveEngine::Impl::StepEpisode(const Sample& sample,
                                     const Findings& findings) {
   Episode& episode = diagnosis_->episode;
   SecondFaultWatch& second = diagnosis_->second;
-  const bool watched =
-      episode_open() && findings.settled && findings.stuck == 0;
+  const bool watched = Acts(Rule::kSecondHolds) && episode_open() &&
+                       findings.settled && findings.stuck == 0;
   if (watched) {
     second.Judge(sample, diagnosis_->bank);
   } else {

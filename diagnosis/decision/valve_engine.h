@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "diagnosis/decision/engine_plan.h"
-#include "diagnosis/decision/second_fault.h"
+#include "diagnosis/decision/name_beside.h"
 #include "diagnosis/model/model_set.h"
 #include "diagnosis/model/sample.h"
 #include "diagnosis/model/verdict.h"

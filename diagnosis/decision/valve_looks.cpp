@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "diagnosis/decision/look_answer.h"
+#include "diagnosis/decision/rules.h"
 
 namespace fdi {
 
@@ -92,7 +93,7 @@ const LookAnswer* ValveLooks::SecondAnswer() const {
 FaultSet ValveLooks::Observed(const ModelSet& models, FaultSet isolated) const {
   const FaultSet known = ~FindingsOf(models);
   const FaultSet faults = memory_.faults() & known;
-  if (!open_ || faults == (isolated & known)) {
+  if (!Acts(Rule::kMemory) || !open_ || faults == (isolated & known)) {
     return isolated;
   }
   return std::popcount(faults) > static_cast<int>(kMaxNamedFaults) ? 0 : faults;

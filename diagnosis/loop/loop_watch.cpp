@@ -112,6 +112,14 @@ bool LoopWatch::IsInOrder(const Sample& sample) {
   return true;
 }
 
+const Verdict& LoopWatch::Supersede() {
+  verdict_.transition_count = 0;
+  at_point_ = false;
+  found_normal_ = false;
+  verdict_.intake = Intake::kSuperseded;
+  return verdict_;
+}
+
 const Verdict& LoopWatch::Step(const Sample& sample, double period_s) {
   verdict_.transition_count = 0;
   at_point_ = false;

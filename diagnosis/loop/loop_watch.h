@@ -61,6 +61,8 @@ class LoopWatch {
 
   /// Takes the next sample. @param period_s of the samples.
   const Verdict& Step(const Sample& sample, double period_s);
+  /// The next sample is of a source that a newer one has superseded.
+  const Verdict& Supersede();
 
   /// The window that is to be audited; nothing if none is due. It stays due
   /// until it is taken.

@@ -23,7 +23,8 @@ void Detection::Restart() {
 }
 
 bool Detection::Push(const ObserverBank& bank, const Sample& sample,
-                     std::span<const double> margins) {
+                     std::span<const double> margins,
+                     std::span<const double> held) {
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   const std::int64_t stamp_ns = sample.stamp_ns;
   const std::size_t channels = models_->channels.size();
@@ -40,16 +41,22 @@ bool Detection::Push(const ObserverBank& bank, const Sample& sample,
   bool abnormal = false;
   for (std::size_t c = 0; c < channels; ++c) {
     const int index = static_cast<int>(c);
-    if (bank.active(index) && !bank.measured(index)) {
+    const bool unread = bank.active(index) && !bank.measured(index);
+    const bool held_out = unread && !held.empty() && !std::isnan(held[c]);
+    if (unread && !held_out) {
       continue;  // Neither goes on nor interrupts.
     }
     const ChannelSpec& channel = models_->channels[c];
     std::size_t test = c * kTestsPerChannel;
-    const bool below = certain[c] < channel.lower_threshold;
-    const bool above = certain[c] > channel.upper_threshold;
+    const double residual = held_out ? held[c] : certain[c];
+    const bool below = residual < channel.lower_threshold;
+    const bool above = residual > channel.upper_threshold;
     abnormal = abnormal || below || above;
     Count(test++, below, stamp_ns);
     Count(test++, above, stamp_ns);
+    if (held_out) {
+      continue;
+    }
     for (std::size_t w = 0; w < channel.windows.size(); ++w) {
       const WindowLimits& limits = channel.windows[w];
       const ResidualWindow& window = windows_.window(c, w);

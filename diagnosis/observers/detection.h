@@ -36,8 +36,11 @@ class Detection {
   /// Takes one sample and its residuals. Returns whether a single residual is
   /// beyond its threshold.
   /// @param margins that residuals of each channel may have anyway; empty: 0.
+  /// @param held residuals of readings that are held out (LoneReadings), by
+  ///   channel, else NaN: they count against thresholds and enter no window.
   bool Push(const ObserverBank& bank, const Sample& sample,
-            std::span<const double> margins = {});
+            std::span<const double> margins = {},
+            std::span<const double> held = {});
 
   void Save(SnapshotWriter& writer) const;
   /// @returns false, leaving it undefined, if there is nothing to be read.

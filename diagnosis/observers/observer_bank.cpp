@@ -88,6 +88,20 @@ void ObserverBank::Step(const Sample& sample) {
   kernels_->predict(*plan_, state_);
 }
 
+void ObserverBank::StepAgain(const Sample& sample) {
+  state_.head = (state_.head + state_.depth - 1) % state_.depth;
+  Step(sample);
+}
+
+void ObserverBank::Amend(int lag,
+                         const std::array<double, kSignalCount>& values,
+                         SignalMask uncertain) {
+  if (lag < state_.depth) {
+    state_.measured[state_.Row(lag)] = values;
+    state_.uncertain[state_.Row(lag)] = uncertain;
+  }
+}
+
 void ObserverBank::TakeReadings(const ObserverBank& bank) {
   state_.active = bank.state_.active;
   state_.outputs->readings = bank.state_.outputs->readings;

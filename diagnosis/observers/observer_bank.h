@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cmath>
 #include <memory>
 #include <span>
@@ -41,6 +42,13 @@ class ObserverBank {
   /// Predicts the outputs of `sample` and stores it as the past. Call after
   /// Initialise(); the signals of active channels must be present.
   void Step(const Sample& sample);
+
+  /// Puts `sample` in the place of the last one.
+  void StepAgain(const Sample& sample);
+  /// Replaces the measured past `lag` samples ago; what parallel observers
+  /// predicted from it stays.
+  void Amend(int lag, const std::array<double, kSignalCount>& values,
+             SignalMask uncertain);
 
   /// Takes over what `bank`, of the same plan, has read of the last sample, and
   /// which channels are active. SetPrediction() then says what is predicted.

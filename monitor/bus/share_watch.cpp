@@ -66,7 +66,7 @@ ShareWatch::ShareWatch(idl::Participant& participant, MonitorShare own,
                        ThrottledLog& log)
     : own_(std::move(own)), log_(log), out_(participant), in_(participant) {
   if (own_.valves.size() > idl::kMaxTextLength) {
-    throw ConfigError("--valves: expected a glob of at most " +
+    throw ConfigError("--valve: expected a glob of at most " +
                       std::to_string(idl::kMaxTextLength) + " characters");
   }
 }

@@ -22,6 +22,7 @@ class LoopJudge {
             std::shared_ptr<const SeverityCatalogue> severities);
 
   const Verdict& Step(const Sample& sample, double period_s);
+  const Verdict& Supersede() { return watch_.Supersede(); }
 
   /// Whether a valve is judged that has a model set.
   bool beside_models() const {

@@ -95,11 +95,6 @@ int IntakeValves(int max_valves) {
   return std::min(max_valves + kSpareSlots, kMaxSlots);
 }
 
-// Notifies the service manager (systemd, Type=notify), if there is one.
-void Notify(const std::string& state) {
-  sd_notify(0, state.c_str());
-}
-
 std::string MonotonicMicroseconds() {
   return std::to_string(std::chrono::duration_cast<std::chrono::microseconds>(
                             Clock::now().time_since_epoch())
@@ -107,6 +102,10 @@ std::string MonotonicMicroseconds() {
 }
 
 }  // namespace
+
+void NotifyManager(const std::string& state) {
+  sd_notify(0, state.c_str());
+}
 
 // Members are initialised in the order in which they use each other. The
 // session in the history begins only in Start(), so that an error in options or
@@ -292,9 +291,10 @@ void Service::Start() {
 // Publishes what an earlier session committed but may not have sent.
 void Service::ResendEvents() {
   for (const FaultEvent& event : history_.UnsentEvents()) {
-    if (after_commit_.Publish(event, true)) {
+    const bool sent = after_commit_.Publish(event, true);
+    counters_.Add(sent ? Counter::kEventsResent : Counter::kEventsUnsent);
+    if (sent) {
       pipeline_.MarkPublished(event);
-      counters_.Add(Counter::kEventsResent);
     }
   }
 }
@@ -394,7 +394,8 @@ void Service::Serve(report::StopSignals& signals) {
       " max_valves=" + std::to_string(options_.pipeline.max_valves) +
       " domain=" + std::to_string(context_.options.domain) + "\n";
   report::WriteToStderr(ready);
-  Notify("READY=1");
+  options_.on_ready();
+  NotifyManager("READY=1");
   TimePoint next_tick = Clock::now();
   std::uint64_t limit_us = 0;
   if (sd_watchdog_enabled(0, &limit_us) > 0) {
@@ -423,9 +424,9 @@ void Service::Serve(report::StopSignals& signals) {
     if (event == report::StopSignals::Event::kReload) {
       // Under Type=notify-reload the manager requires the time stamp, and takes
       // the reload as finished at READY=1.
-      Notify("RELOADING=1\nMONOTONIC_USEC=" + MonotonicMicroseconds());
+      NotifyManager("RELOADING=1\nMONOTONIC_USEC=" + MonotonicMicroseconds());
       Reload("signal");
-      Notify("READY=1");
+      NotifyManager("READY=1");
     }
   }
 }
@@ -437,7 +438,7 @@ Service::TimePoint Service::FeedWatchdog(TimePoint next_tick) {
   }
   const TimePoint now = Clock::now();
   if (watchdog_->Due(now)) {
-    Notify("WATCHDOG=1");
+    NotifyManager("WATCHDOG=1");
   }
   return watchdog_->next() > now ? std::min(watchdog_->next(), next_tick)
                                  : next_tick;
@@ -582,13 +583,13 @@ void Service::PublishStatus() {
   status_topic_.Write(status);
   const std::string line = ManagerLine(status);
   if (line != std::exchange(notified_status_, line)) {
-    Notify("STATUS=" + line);
+    NotifyManager("STATUS=" + line);
   }
 }
 
 void Service::Stop() {
   context_.log(LogLevel::kInfo, "monitor_stopping");
-  Notify("STOPPING=1");
+  NotifyManager("STOPPING=1");
   FirstError errors;
   if (http_) {
     errors.Try([this] { http_->Stop(); });

@@ -3,6 +3,7 @@
 #include <atomic>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <stop_token>
@@ -48,9 +49,14 @@ struct ServiceOptions {
   std::string on_event;
   int on_event_per_minute{60};
   double on_event_timeout_s{10.0};
+  /// Called once, before the service manager is told that it is ready.
+  std::function<void()> on_ready{[] {}};
   /// Optional parts, which follow valves and events in this order.
   std::vector<std::shared_ptr<ServicePart>> parts{};
 };
+
+/// Tells the service manager (systemd, Type=notify), if there is one.
+void NotifyManager(const std::string& state);
 
 /// The monitor as a service: DDS on one side, the databases on the other, the
 /// pipeline between them. The thread of Run() handles signals, status, watchdog

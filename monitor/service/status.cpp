@@ -159,7 +159,7 @@ void AddRefusals(const StatusFacts& facts, std::vector<Measure>& measures) {
 
 }  // namespace
 
-// The status on the bus has room for idl::kMaxCounters = 64 names and uses 63
+// The status on the bus has room for idl::kMaxCounters = 64 names and uses all
 // of them, so what is added here gets a family and no name. Values of one
 // family are adjacent, and the page shows the help of the first.
 // NOLINTNEXTLINE(readability-function-size): a table.
@@ -217,7 +217,10 @@ std::vector<Measure> MeasuresOf(const StatusFacts& facts) {
       {"valves_ended", "fdi_valves_silent", kGauge, kSilentHelp, "reason",
        "ended", census.ended},
       {"valves_contested", "fdi_valves_contested", kGauge,
-       "Valves that another monitor takes, too", "", "", facts.contested.count},
+       "Valves that another monitor takes, too, or that two publishers send",
+       "by", "monitor", facts.contested.count},
+      {"valves_two_publishers", "fdi_valves_contested", kGauge, "", "by",
+       "publisher", census.contested},
       {"open_episodes", "fdi_open_episodes", kGauge, "Fault episodes now", "",
        "", census.open_episodes},
       {"trace_bytes", "fdi_trace_bytes", kGauge,
@@ -258,6 +261,15 @@ idl::MonitorStatusMessage StatusOf(const StatusFacts& facts) {
         Printable(facts.contested.monitor) + " takes " +
         std::to_string(facts.contested.count) +
         " of these valves, too: " + Printable(facts.contested.example);
+  }
+  if (facts.census.contested > 0) {
+    status.text += (status.text.empty() ? "two publishers send "
+                                        : "; two publishers send ") +
+                   Printable(facts.census.contested_valve);
+    if (facts.census.contested > 1) {
+      status.text +=
+          " and " + std::to_string(facts.census.contested - 1) + " more valves";
+    }
   }
   status.health =
       status.text.empty() ? idl::Health::kOk : idl::Health::kDegraded;

@@ -9,11 +9,11 @@
 
 namespace fdi::monitor {
 
-void AddPageOptions(report::Program& program, CLI::App& run,
+void AddPageOptions(report::Program& /*program*/, CLI::App& run,
                     PageOptions& options) {
   AddHttpOption(run, "--console", options.address, "127.0.0.1:8080",
                 "Serve the live page and its API; port 0: any free one");
-  AddPageFiles(program, run, options);
+  AddPageFiles(run, options);
 }
 
 std::shared_ptr<ServicePart> MakePage(const PageOptions& options,
@@ -35,8 +35,7 @@ std::shared_ptr<ServicePart> MakePage(const PageOptions& options,
       valves, context.options, context.log);
 }
 
-void AddPageFiles(report::Program& program, CLI::App& verb,
-                  PageOptions& options) {
+void AddPageFiles(CLI::App& verb, PageOptions& options) {
   verb.add_option("--console-files", options.files,
                   "Folder of the page instead of the installed one")
       ->type_name("DIR");
@@ -44,18 +43,6 @@ void AddPageFiles(report::Program& program, CLI::App& verb,
                   "File of the secret by which nginx in front proves itself; "
                   "it names users, who may then act")
       ->type_name("FILE");
-  const std::string page = " (docs/console.md, The page beyond this host)";
-  const std::string users =
-      "nginx asks for names and passwords, and proves itself by "
-      "--console-proxy FILE" +
-      page;
-  const std::string tls = "nginx has the certificate" + page;
-  for (const char* name : {"--console-users", "--console-proxy-user",
-                           "--console-proxy-from", "--console-write"}) {
-    program.AddRemoved(verb.get_name(), name, users);
-  }
-  program.AddRemoved(verb.get_name(), "--console-tls", tls);
-  program.AddRemoved(verb.get_name(), "--console-key", tls);
 }
 
 }  // namespace fdi::monitor

@@ -29,9 +29,7 @@ std::shared_ptr<ServicePart> MakePage(const PageOptions& options,
                                       const std::string& valves,
                                       const report::Context& context);
 
-/// --console-files and --console-proxy of `verb`, and what users and TLS had
-/// before nginx.
-void AddPageFiles(report::Program& program, CLI::App& verb,
-                  PageOptions& options);
+/// --console-files and --console-proxy of `verb`.
+void AddPageFiles(CLI::App& verb, PageOptions& options);
 
 }  // namespace fdi::monitor

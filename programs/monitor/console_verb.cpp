@@ -28,7 +28,7 @@ namespace fdi::monitor {
 namespace {
 
 struct PlantConsoleOptions {
-  std::string from;
+  std::string url;
   PageOptions page{.address = "127.0.0.1:8081"};
   BusOptions bus{.program = "fdi-monitor console"};
 };
@@ -62,7 +62,7 @@ void ExpectSeenValves(const std::stop_token& stop,
   constexpr std::chrono::seconds kRetry{10};
   while (!stop.stop_requested()) {
     try {
-      storage::PlantReader plant(options.from, "", Limits(stop));
+      storage::PlantReader plant(options.url, "", Limits(stop));
       for (const auto& [valve, last_ns] : plant.SeenValves(NowNs() - kAgeNs)) {
         if (GlobMatches(options.bus.valves, valve)) {
           board.Expect(valve, last_ns);
@@ -94,7 +94,7 @@ int RunConsole(const PlantConsoleOptions& options,
                  started_ns,
                  [&feed] { return FactsOf(feed->monitors()); },
                  NowNs,
-                 [url = options.from, stop = stopping.get_token()] {
+                 [url = options.url, stop = stopping.get_token()] {
                    return std::make_unique<storage::PlantReader>(url, "",
                                                                  Limits(stop));
                  },
@@ -133,7 +133,7 @@ void AddConsoleVerb(report::Program& program) {
       "the plant's history (fdi-store ship). It diagnoses nothing",
       RunConsole);
   console
-      .add_option("--from", options.from,
+      .add_option("--db", options.url,
                   "The plant's history: postgresql://user@host/database")
       ->required()
       ->type_name("URL");
@@ -143,9 +143,9 @@ void AddConsoleVerb(report::Program& program) {
                   "free one")
       ->capture_default_str()
       ->type_name("ADDRESS:PORT");
-  AddPageFiles(program, console, options.page);
-  console.add_option("--valves", options.bus.valves,
-                     "Only ids that match GLOB");
+  AddPageFiles(console, options.page);
+  console.add_option("--valve", options.bus.valves, "Only ids that match GLOB")
+      ->type_name("GLOB");
   console
       .add_option("--max-valves", options.bus.max_valves,
                   "Maximum number of valves")

@@ -21,22 +21,22 @@ std::vector<fdi::report::VerbExamples> Examples() {
        {{"Every valve with the set that is assigned to it; store the samples",
          "fdi-monitor run --record"},
         {"One set for the valves FV-1..., open to the plant network",
-         "fdi-monitor run --model-set paper@2 --valves 'FV-1*' --interface "
+         "fdi-monitor run --model-set paper@2 --valve 'FV-1*' --interface "
          "all"},
         {"A page behind nginx, through which people acknowledge and label",
          "fdi-monitor run --console --console-proxy proxy-secret"}}},
       {"watch",
        {{"All fault events as JSON lines", "fdi-monitor watch --events --json"},
         {"How many vectors come in ten seconds",
-         "fdi-monitor watch --count --for 10"},
+         "fdi-monitor watch --totals --for 10"},
         {"A table of the valves, the worst first; for a script",
-         "fdi-monitor watch --table --for 3 --valves 'FV-1*'"}}},
+         "fdi-monitor watch --table --for 3 --valve 'FV-1*'"}}},
       {"console",
        {{"One page of all monitors, with the plant's history",
-         "fdi-monitor console --from postgresql://screen@db.example/plant"},
+         "fdi-monitor console --db postgresql://screen@db.example/plant"},
         {"On another port, of one hall",
-         "fdi-monitor console --from postgresql://screen@db.example/plant "
-         "--listen 8082 --valves 'H1-*'"}}},
+         "fdi-monitor console --db postgresql://screen@db.example/plant "
+         "--listen 8082 --valve 'H1-*'"}}},
   };
 }
 
@@ -51,12 +51,7 @@ int main(int argc, char** argv) {
   program.MapError<fdi::idl::TransportError>(fdi::report::kExitTransport);
   fdi::monitor::AddRunVerb(program);
   fdi::monitor::AddWatchVerb(program);
-  program.AddRemoved("", "top", "fdi-monitor watch --table shows the valves");
   fdi::monitor::AddConsoleVerb(program);
-  program.AddRemoved("", "console-user",
-                     "users are in a file of nginx, which htpasswd makes, and "
-                     "their roles in a second one (docs/console.md, The page "
-                     "beyond this host)");
   program.AddExamples(Examples());
   return program.Run(argc, argv);
 }

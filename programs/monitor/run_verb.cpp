@@ -7,11 +7,13 @@
 #include "base/error.h"
 #include "base/headroom.h"
 #include "monitor/service/service.h"
+#include "monitor/service/start_notice.h"
 #include "monitor/throttled_log.h"
 #include "programs/monitor/console.h"
 #include "programs/monitor/http_option.h"
 #include "programs/monitor/planner.h"
 #include "programs/monitor/verbs.h"
+#include "report/help.h"
 #include "report/program.h"
 #include "report/stop_signals.h"
 
@@ -57,10 +59,6 @@ void AddOnEventOptions(CLI::App& run, ServiceOptions& service) {
                  "At most this many a minute; the rest is counted")
       ->check(CLI::Range(1, 6000))
       ->capture_default_str();
-  run.add_option("--on-event-timeout", service.on_event_timeout_s,
-                 "Abandon a delivery after this time [s]")
-      ->check(CLI::Range(0.1, 600.0))
-      ->capture_default_str();
 }
 
 int Run(const RunArguments& arguments, const report::Context& context) {
@@ -91,6 +89,9 @@ int Run(const RunArguments& arguments, const report::Context& context) {
       options.parts.push_back(part);
     }
   }
+  StartNotice starting(NotifyManager);
+  starting.Start();
+  options.on_ready = [&starting] { starting.Stop(); };
   Service service(options, limited);
   return service.Run(signals);
 }
@@ -126,9 +127,10 @@ void AddRunVerb(report::Program& program) {
       ->type_name("[=on|lossless|off]");
   ServiceOptions& service = arguments.service;
   PipelineOptions& pipeline = service.pipeline;
-  run.add_option("--valves", pipeline.valve_glob,
+  run.add_option("--valve", pipeline.valve_glob,
                  "Serve only ids that match GLOB")
-      ->capture_default_str();
+      ->capture_default_str()
+      ->type_name("GLOB");
   run.add_option("--max-valves", pipeline.max_valves,
                  "Serve at most N valves, count the others")
       ->check(CLI::Range(1, 100000))
@@ -143,34 +145,18 @@ void AddRunVerb(report::Program& program) {
                  "Close an episode when its valve was silent for this time [s]")
       ->check(CLI::Range(1.0, 1e7))
       ->capture_default_str();
-  run.add_option("--trace-before", pipeline.trace.before_s,
-                 "Evidence kept from before a detection [s], at most 1800 "
-                 "samples")
-      ->check(CLI::Range(0.0, 1800.0))
-      ->capture_default_str();
   AddGroupsOption(program, run, arguments.groups);
   AddOnEventOptions(run, service);
   AddHttpOption(run, "--http", arguments.http, "127.0.0.1:9464",
                 "Serve /metrics, /healthz and /readyz; port 0: any free one");
   AddPageOptions(program, run, arguments.page);
-  program.AddRemoved("run", "--allow-host",
-                     "nginx answers under other names (docs/console.md, The "
-                     "page beyond this host)");
-  for (const char* option : {"--shadow", "--shadow-valves"}) {
-    program.AddRemoved("run", option,
-                       "record with --record, then compare the two sets with "
-                       "fdi-trainer compare SET@1 SET@2 --runs ID,...");
-  }
-  for (const char* gone : {"--pair", "--rank", "--pair-patience"}) {
-    program.AddRemoved("run", gone,
-                       "let a cluster manager start the monitor on another "
-                       "host with a copy of its data folder: "
-                       "docs/operations.md, Another host takes over");
-  }
   run.add_option("--status-period", service.status_period_s,
                  "Time between status lines in the log [s]")
       ->check(CLI::Range(1.0, 86400.0))
       ->capture_default_str();
+  report::ShowInHelpAll(
+      run, {"--lossless-decisions", "--best-effort", "--audit-all-loops",
+            "--on-event-rate", "--console-files", "--status-period"});
 }
 
 }  // namespace fdi::monitor

@@ -26,12 +26,11 @@ using Clock = WatchRecords::Clock;
 
 struct WatchOptions {
   BusOptions bus{.program = "fdi-monitor watch"};
-  bool count{false};
+  bool totals{false};
   bool table{false};
   bool lossless{false};
   bool events_only{false};
-  double for_s{0.0};   // 0: no limit
-  double idle_s{0.0};  // 0: no limit
+  double for_s{0.0};  // 0: no limit
   std::uint64_t expect{0};
 };
 
@@ -116,8 +115,7 @@ class TableOutput {
 // even if it is shown on a terminal.
 bool IsInPlace(const WatchOptions& options, bool json) {
   return options.table && !json && options.for_s == 0.0 &&
-         options.idle_s == 0.0 && options.expect == 0 &&
-         isatty(STDOUT_FILENO) != 0;
+         options.expect == 0 && isatty(STDOUT_FILENO) != 0;
 }
 
 int RunWatch(const WatchOptions& given, const report::Context& context) {
@@ -151,20 +149,15 @@ int RunWatch(const WatchOptions& given, const report::Context& context) {
   });
   WatchCounts counts;
   const Clock::time_point start = Clock::now();
-  Clock::time_point last_message = start;
   const auto satisfied = [&] {
     return options.expect > 0 && counts.decisions >= options.expect;
   };
   while (!signals.stop_requested() && !Passed(start, options.for_s) &&
-         !Passed(last_message, options.idle_s) && !satisfied()) {
+         !satisfied()) {
     bus.Take(
         [&](const auto& message, const auto&) {
           counts.Add(message);
-          // Only what is of a valve: the status of a monitor comes each second.
-          if constexpr (requires { message.valve_id; }) {
-            last_message = Clock::now();
-          }
-          if (!options.count) {
+          if (!options.totals) {
             records.Add(message, Clock::now());
           }
         },
@@ -184,7 +177,7 @@ int RunWatch(const WatchOptions& given, const report::Context& context) {
   if (output && !in_place) {
     output->Show(Clock::now());
   }
-  if (options.count) {
+  if (options.totals) {
     PrintCounts(counts, bus.lost(), json);
   }
   return options.expect == 0 || satisfied() ? report::kExitOk
@@ -197,16 +190,17 @@ void AddWatchVerb(report::Program& program) {
   auto [watch, options] = AddVerb(
       program, "watch",
       "Print what monitors publish: decision vectors, fault events", RunWatch);
-  CLI::Option* const count =
-      watch.add_flag("--count", options.count,
+  CLI::Option* const totals =
+      watch.add_flag("--totals", options.totals,
                      "Print only how many messages came, at the end");
   CLI::Option* const table =
       watch
           .add_flag("--table", options.table,
                     "Show a table of valves each second instead, the worst "
                     "first")
-          ->excludes(count);
-  watch.add_option("--valves", options.bus.valves, "Only ids that match GLOB");
+          ->excludes(totals);
+  watch.add_option("--valve", options.bus.valves, "Only ids that match GLOB")
+      ->type_name("GLOB");
   watch.add_flag("--lossless", options.lossless,
                  "Every decision vector of monitors that run with "
                  "--lossless-decisions");
@@ -218,11 +212,6 @@ void AddWatchVerb(report::Program& program) {
       ->check(CLI::Range(1, 100000));
   watch
       .add_option("--for", options.for_s, "Stop after this time [s]; 0: never")
-      ->check(CLI::NonNegativeNumber);
-  watch
-      .add_option("--idle", options.idle_s,
-                  "Stop after this time without a vector or event [s]; 0: "
-                  "never")
       ->check(CLI::NonNegativeNumber);
   watch.add_option("--expect", options.expect,
                    "Stop after N decision vectors; exit code 1 if fewer came");

@@ -1,4 +1,5 @@
 #include "idl/participant.h"
+#include "import/tag_map.h"
 #include "programs/simulator/sample_publisher.h"
 #include "programs/simulator/verbs.h"
 #include "report/program.h"
@@ -14,7 +15,9 @@ std::vector<report::VerbExamples> Examples() {
        {{"A valve whose flow transmitter goes wrong after a minute",
          "fdi-simulator run --valve FV-101 --duration 600 --fault "
          "f19:abrupt@60:strength=0.5"},
-        {"Which faults there are", "fdi-simulator faults"}}},
+        {"The same into a run to train on, without a bus",
+         "fdi-simulator run --valve FV-101 --duration 600 --fault "
+         "f19:abrupt@60:strength=0.5 --record --no-publish"}}},
       {"run",
        {{"A seat that erodes over 20 minutes, ten times faster than real",
          "fdi-simulator run --valve FV-101 --duration 3600 --fault "
@@ -23,16 +26,13 @@ std::vector<report::VerbExamples> Examples() {
          "fdi-simulator run --valve FV-101 --duration 36000 --record "
          "--no-publish"},
         {"A hundred valves for a load test",
-         "fdi-simulator run --valve FV --valves 100 --duration 600"}}},
+         "fdi-simulator run --valve FV --count 100 --duration 600"}}},
       {"replay",
        {{"A record of the plant as it was, ten times faster",
-         "fdi-simulator replay --csv fv101.csv --valve FV-101 --speed 10"},
+         "fdi-simulator replay --file fv101.csv --valve FV-101 --speed 10"},
         {"Part of a stored run", "fdi-simulator replay --run 1a2b@600:1200"},
         {"From any gateway that writes JSON lines",
-         "fdi-simulator replay --csv - --valve FV-101"}}},
-      {"faults",
-       {{"Names, kinds and strengths", "fdi-simulator faults"},
-        {"For a script", "fdi-simulator faults --json"}}},
+         "fdi-simulator replay --file - --valve FV-101"}}},
   };
 }
 
@@ -47,7 +47,6 @@ int main(int argc, char** argv) {
   program.AddBusOptions();
   fdi::simulator::AddRunVerb(program);
   fdi::simulator::AddReplayVerb(program);
-  fdi::simulator::AddFaultsVerb(program);
   program.MapError<fdi::storage::SqliteError>(report::kExitData);
   program.MapError<fdi::idl::TransportError>(report::kExitTransport);
   program.MapError<fdi::simulator::NoReaderError>(report::kExitTransport);

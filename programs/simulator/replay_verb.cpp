@@ -13,6 +13,7 @@
 #include "programs/simulator/delivery.h"
 #include "programs/simulator/recorded_feed.h"
 #include "programs/simulator/verbs.h"
+#include "report/help.h"
 #include "simulator/second_look/valve_physics.h"
 #include "simulator/valve_equations.h"
 #include "storage/database/data_directory.h"
@@ -25,7 +26,7 @@ namespace {
 constexpr const char* kStdinName = "-";
 
 struct ReplayOptions {
-  std::string csv;
+  std::string file;
   std::string run;
   std::string valve;
   bool keep_stamps{false};
@@ -77,16 +78,16 @@ std::optional<FlowTarget> FlowTargetOf(const std::string& valve,
 Recording LoadCsv(const ReplayOptions& options,
                   const report::Context& context) {
   importer::CsvTable table = importer::ReadCsvFile(
-      options.csv, {.map = options.stream.map,
-                    .required = MaskOf(Signal::kCv),
-                    .split_gaps = options.stream.split_gaps,
-                    .log = context.log});
+      options.file, {.map = options.stream.map,
+                     .required = MaskOf(Signal::kCv),
+                     .split_gaps = options.stream.split_gaps,
+                     .log = context.log});
   Recording recording;
   const FlowUnit own = table.header.flow_unit;
   const FlowTarget to =
       FlowTargetOf(options.valve, context).value_or(FlowTarget{own});
   if ((table.header.signals & MaskOf(Signal::kF)) != 0) {
-    ReportConversion(context.log, options.csv, own, to.unit);
+    ReportConversion(context.log, options.file, own, to.unit);
   }
   FlowConversion conversion(to);
   for (SampleSeries& run : table.runs) {
@@ -99,8 +100,8 @@ Recording LoadCsv(const ReplayOptions& options,
 }
 
 void Check(const ReplayOptions& options) {
-  if (options.csv.empty() == options.run.empty()) {
-    throw ConfigError("replay takes one of --csv FILE|- and --run ID");
+  if (options.file.empty() == options.run.empty()) {
+    throw ConfigError("replay takes one of --file FILE|- and --run ID");
   }
   if (options.run.empty() && options.valve.empty()) {
     throw ConfigError("--valve ID is missing: whose samples are these?");
@@ -109,13 +110,14 @@ void Check(const ReplayOptions& options) {
     throw ConfigError("--keep-stamps and --start exclude each other");
   }
   if (options.delivery.end_now &&
-      (options.keep_stamps || options.csv == kStdinName)) {
+      (options.keep_stamps || options.file == kStdinName)) {
     throw ConfigError(
-        "--end-now goes neither with --keep-stamps nor with --csv -, whose end "
+        "--end-now goes neither with --keep-stamps nor with --file -, whose "
+        "end "
         "is not known");
   }
-  if (options.csv.empty() && options.table.given()) {
-    throw ConfigError("--map, --zone and --resample are of --csv");
+  if (options.file.empty() && options.table.given()) {
+    throw ConfigError("--map, --zone and --resample are of --file");
   }
   StartOf(options.delivery, 0.0, 1.0);  // An invalid one is rejected first.
 }
@@ -126,10 +128,10 @@ std::unique_ptr<Feed> OpenFeed(const ReplayOptions& options, double speed,
                                const report::Context& context,
                                report::StopSignals& signals,
                                std::string& valve_id) {
-  if (options.csv == kStdinName) {
+  if (options.file == kStdinName) {
     if (options.stream.map.resampling || options.stream.map.long_table) {
       throw ConfigError(
-          "--csv -: what is resampled or long is read as a whole; try a file");
+          "--file -: what is resampled or long is read as a whole; try a file");
     }
     StreamOptions stream = options.stream;
     stream.flow = FlowTargetOf(options.valve, context);
@@ -162,7 +164,7 @@ report::Report Replay(const ReplayOptions& given,
   if (const auto target = FlowTargetOf(options.valve, context)) {
     importer::CheckGasFlow(options.stream.map, MolarMass(target->medium));
   }
-  const bool at_once = options.csv == kStdinName && !options.delivery.speed;
+  const bool at_once = options.file == kStdinName && !options.delivery.speed;
   const double speed =
       ParseSpeed(options.delivery.speed.value_or(at_once ? "max" : "1"));
   SamplePublisherOptions publishing =
@@ -200,7 +202,7 @@ void AddReplayVerb(report::Program& program) {
   auto [verb, options] = AddVerb(
       program, "replay",
       "Publish a stored run, a CSV file or what comes on stdin", Replay);
-  verb.add_option("--csv", options.csv,
+  verb.add_option("--file", options.file,
                   "CSV file; - reads CSV or JSON lines from stdin and passes "
                   "each on at once, unless --speed is given")
       ->type_name("FILE|-");
@@ -223,6 +225,8 @@ void AddReplayVerb(report::Program& program) {
       ->check(CLI::Range(1e-3, 3600.0))
       ->default_str("")
       ->type_name("S");
+  report::ShowInHelpAll(verb, {"--resample", "--decimal", "--date", "--skip",
+                               "--wait-reader", "--keep-alive"});
 }
 
 }  // namespace fdi::simulator

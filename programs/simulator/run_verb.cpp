@@ -12,6 +12,7 @@
 #include "base/time_text.h"
 #include "programs/simulator/delivery.h"
 #include "programs/simulator/verbs.h"
+#include "report/help.h"
 #include "simulator/scenario/scenario_toml.h"
 
 namespace fdi::simulator {
@@ -29,8 +30,7 @@ struct RunOptions {
   std::vector<std::string> settings;
   std::optional<double> duration_s;
   std::optional<std::uint64_t> seed;
-  bool cold_start{false};
-  int valves{1};
+  int count{1};
   bool record{false};
   bool no_publish{false};
   std::filesystem::path export_file;
@@ -61,7 +61,6 @@ Scenario BaseScenario(const RunOptions& options, double speed) {
   }
   config.duration_s = options.duration_s.value_or(config.duration_s);
   config.seed = options.seed.value_or(config.seed);
-  config.cold_start = config.cold_start || options.cold_start;
   for (const std::string& setting : options.settings) {
     ApplySetting(setting, scenario);
   }
@@ -83,23 +82,23 @@ std::string ValveIdOf(const std::string& base, int index) {
 
 // One scenario per valve, each with its own seed and source.
 std::vector<Scenario> Scenarios(const RunOptions& options, double speed) {
-  if (!options.export_file.empty() && options.valves > 1) {
-    throw ConfigError("--export takes one valve, not " +
-                      std::to_string(options.valves));
+  if (!options.export_file.empty() && options.count > 1) {
+    throw ConfigError("--output takes one valve, not " +
+                      std::to_string(options.count));
   }
   const Scenario base = BaseScenario(options, speed);
-  const auto others = static_cast<std::uint64_t>(options.valves) - 1;
+  const auto others = static_cast<std::uint64_t>(options.count) - 1;
   if (base.config.seed > kMaxSeed - others) {
-    throw ConfigError("--valves " + std::to_string(options.valves) +
+    throw ConfigError("--count " + std::to_string(options.count) +
                       ": seeds that count up from " +
                       std::to_string(base.config.seed) + " exceed " +
                       std::to_string(kMaxSeed));
   }
-  std::vector<Scenario> scenarios(static_cast<std::size_t>(options.valves),
+  std::vector<Scenario> scenarios(static_cast<std::size_t>(options.count),
                                   base);
-  for (int i = 0; i < options.valves; ++i) {
+  for (int i = 0; i < options.count; ++i) {
     Scenario& scenario = scenarios[static_cast<std::size_t>(i)];
-    if (options.valves > 1) {
+    if (options.count > 1) {
       scenario.valve_id = ValveIdOf(base.valve_id, i);
     }
     scenario.config.seed += static_cast<std::uint64_t>(i);
@@ -229,18 +228,18 @@ void AddScenarioOptions(CLI::App& verb, RunOptions& options) {
   verb.add_option("--excitation", options.excitation,
                   "What moves it (default: operating-point)")
       ->type_name("operating-point|sine|level-loop|inventory-loop|csv:FILE");
-  verb.add_option("--set", options.settings,
-                  "A scenario key, e.g. excitation.amplitude_pct=5, "
-                  "noise=false, parameters.trim.kv_m3_h=72; may be repeated")
+  verb.add_option(
+          "--set", options.settings,
+          "A scenario key, e.g. excitation.amplitude_pct=5, "
+          "noise=false, cold_start=true, parameters.trim.kv_m3_h=72; may be "
+          "repeated")
       ->type_name("KEY=VALUE")
       ->default_str("")
       ->allow_extra_args(false);
-  verb.add_flag("--cold-start", options.cold_start,
-                "Start at X = 0 with the actuator vented, not in equilibrium");
   verb.add_option("--seed", options.seed, "Seed (default: 1)")
       ->check(CLI::Range(std::uint64_t{0}, kMaxSeed))
       ->type_name("N");
-  verb.add_option("--valves", options.valves,
+  verb.add_option("--count", options.count,
                   "Number of valves, named ID-1, ID-2, ...; their seeds "
                   "count up from --seed")
       ->check(CLI::Range(1, 100'000))
@@ -258,8 +257,10 @@ void AddRunVerb(report::Program& program) {
                 "Store the runs, with their truth, in runs.db");
   verb.add_flag("--no-publish", options.no_publish,
                 "Simulate only, as fast as possible");
-  verb.add_option("--export", options.export_file, "Write the run as CSV")
+  verb.add_option("-o,--output", options.export_file, "Write the run as CSV")
       ->type_name("FILE.csv");
+  report::ShowInHelpAll(verb, {"--start", "--end-now", "--wait-reader",
+                               "--keep-alive", "--output"});
 }
 
 }  // namespace fdi::simulator

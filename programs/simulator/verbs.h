@@ -6,6 +6,5 @@ namespace fdi::simulator {
 
 void AddRunVerb(report::Program& program);
 void AddReplayVerb(report::Program& program);
-void AddFaultsVerb(report::Program& program);
 
 }  // namespace fdi::simulator

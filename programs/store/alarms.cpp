@@ -1,9 +1,11 @@
 // fdi-store history: operator actions on episodes (ack, label) and on alarms
-// (shelve, unshelve, shelf).
+// (shelve).
+#include <limits>
 #include <set>
 
 #include "base/error.h"
 #include "base/suggestion.h"
+#include "diagnosis/records/valve_glob.h"
 #include "programs/store/verbs.h"
 #include "storage/history/history_editor.h"
 #include "storage/history/history_reader.h"
@@ -15,7 +17,6 @@ using report::Format;
 
 struct AckOptions {
   std::vector<std::string> ids;
-  bool all{false};
   EpisodeOptions filter;
   NoteOptions note;
 };
@@ -24,13 +25,13 @@ struct AckOptions {
 // filter.
 std::vector<Episode> Chosen(const AckOptions& options, HistoryReader& reader,
                             const Context& context) {
-  if (options.all != options.ids.empty()) {
+  if (options.filter.given() != options.ids.empty()) {
     throw ConfigError(
-        "name episodes, or give --all (and --valve, --fault, "
-        "--state, --since, --until to narrow it)");
+        "name episodes, or say which: --valve GLOB ('*': all), --fault, "
+        "--state, --from, --to");
   }
   std::vector<Episode> episodes;
-  if (options.all) {
+  if (options.filter.given()) {
     episodes = reader.List(options.filter.Filter(context));
     std::erase_if(episodes, [](const Episode& episode) {
       return episode.acked_by.has_value();
@@ -124,6 +125,7 @@ Report ShelfReport(const std::vector<Shelf>& shelves, const Context& context) {
 struct ShelveOptions {
   std::string valve;
   std::string fault;
+  bool off{false};
   std::string from;
   std::string duration{"8h"};
   NoteOptions note;
@@ -147,7 +149,30 @@ void WarnIfUnknown(const std::string& valve, HistoryReader& reader,
   }
 }
 
+// Takes the alarms of the valve, or those of one fault, off the shelf early.
+Report EndShelves(const ShelveOptions& options, const Context& context) {
+  const auto path = DataOf(context).history();
+  HistoryReader reader(path);
+  const OperatorNote note = options.note.Note();
+  std::vector<Shelf> shelves = reader.Shelves(note.now_ns);
+  std::erase_if(shelves, [&options](const Shelf& shelf) {
+    return shelf.valve_id != options.valve ||
+           (!options.fault.empty() && shelf.fault != options.fault);
+  });
+  if (shelves.empty()) {
+    throw NotFoundError("nothing of " + options.valve + " is shelved");
+  }
+  HistoryEditor editor(path);
+  for (Shelf& shelf : shelves) {
+    shelf = editor.EndShelf(shelf.shelf_id, note);
+  }
+  return ShelfReport(shelves, context);
+}
+
 Report Shelve(const ShelveOptions& options, const Context& context) {
+  if (options.off) {
+    return EndShelves(options, context);
+  }
   const OperatorNote note = options.note.Note();
   if (options.duration.find_first_not_of("0123456789.") == std::string::npos) {
     throw ConfigError("--for " + options.duration +
@@ -172,59 +197,29 @@ Report Shelve(const ShelveOptions& options, const Context& context) {
   return ShelfReport({shelf}, context);
 }
 
-struct UnshelveOptions {
-  std::vector<std::int64_t> ids;
-  std::string valve;
-  NoteOptions note;
-};
-
-Report Unshelve(const UnshelveOptions& options, const Context& context) {
-  if (options.ids.empty() == options.valve.empty()) {
-    throw ConfigError(
-        "name shelved alarms by id (see history shelf), or give "
-        "--valve");
-  }
-  const auto path = DataOf(context).history();
-  HistoryReader reader(path);
-  const OperatorNote note = options.note.Note();
-  std::vector<std::int64_t> ids = options.ids;
-  for (const Shelf& shelf : reader.Shelves(note.now_ns)) {
-    if (shelf.valve_id == options.valve) {
-      ids.push_back(shelf.shelf_id);
-    }
-  }
-  if (ids.empty()) {
-    throw NotFoundError("nothing of " + options.valve + " is shelved");
-  }
-  HistoryEditor editor(path);
-  std::vector<Shelf> ended;
-  for (const std::int64_t id : ids) {
-    ended.push_back(editor.EndShelf(id, note));
-  }
-  return ShelfReport(ended, context);
-}
-
-struct ShelfOptions {
-  bool all{false};
-};
-
-Report ListShelf(const ShelfOptions& options, const Context& context) {
-  HistoryReader reader(DataOf(context).history());
-  return ShelfReport(options.all ? reader.Shelves() : reader.Shelves(NowNs()),
-                     context);
-}
-
 }  // namespace
+
+Report ListShelf(History& history, const EpisodeFilter& filter,
+                 const Context& context) {
+  const bool former =
+      filter.since_ns > std::numeric_limits<std::int64_t>::min();
+  std::vector<Shelf> shelves =
+      history.Shelves(former ? std::nullopt : std::optional(NowNs()));
+  std::erase_if(shelves, [&filter](const Shelf& shelf) {
+    return !GlobMatches(filter.valve_glob, shelf.valve_id) ||
+           shelf.ended_ns.value_or(shelf.until_ns) < filter.since_ns;
+  });
+  return ShelfReport(shelves, context);
+}
 
 void AddAlarmVerbs(report::Program& program, CLI::App& group) {
   auto [ack, acked] =
       AddVerb(program, group, "ack",
-              "Acknowledge episodes: somebody has seen them", Acknowledge);
+              "Acknowledge episodes: those named, or all that the options find "
+              "and that nobody has acknowledged yet",
+              Acknowledge);
   ack.add_option("episodes", acked.ids,
                  "IDs, unique beginnings of them, or last");
-  ack.add_flag("--all", acked.all,
-               "All that the options below find and that nobody has "
-               "acknowledged yet");
   acked.filter.AddTo(ack);
   acked.note.AddTo(ack);
 
@@ -247,24 +242,18 @@ void AddAlarmVerbs(report::Program& program, CLI::App& group) {
   shelve.add_option("valve", shelved.valve, "Valve id")->required();
   shelve.add_option("--fault", shelved.fault,
                     "Only alarms of this fault: f19, 'f3|f6', unknown");
-  shelve.add_option("--from", shelved.from,
-                    "Planned: from this time on, '2026-11-27 06:00' (default "
-                    "now; 90 days ahead at most)");
-  shelve.add_option("--for", shelved.duration,
-                    "How long: 8h, 30min, 3d; 90 days at most");
+  CLI::Option* const from =
+      shelve
+          .add_option("--from", shelved.from,
+                      "Planned: from this time on, '2026-11-27 06:00' (default "
+                      "now; 90 days ahead at most)")
+          ->type_name("TIME");
+  CLI::Option* const duration = shelve.add_option(
+      "--for", shelved.duration, "How long: 8h, 30min, 3d; 90 days at most");
+  shelve.add_flag("--off", shelved.off, "Take them off the shelf early")
+      ->excludes(from)
+      ->excludes(duration);
   shelved.note.AddTo(shelve);
-
-  auto [unshelve, ended] = AddVerb(program, group, "unshelve",
-                                   "Take alarms off the shelf early", Unshelve);
-  unshelve.add_option("id", ended.ids, "Ids that history shelf shows");
-  unshelve.add_option("--valve", ended.valve, "All of this valve")
-      ->type_name("ID");
-  ended.note.AddTo(unshelve);
-
-  auto [shelf, listed] = AddVerb(
-      program, group, "shelf",
-      "List what is shelved or planned to be, by whom and why", ListShelf);
-  shelf.add_flag("--all", listed.all, "Also what was shelved before");
 }
 
 }  // namespace fdi::storage

@@ -14,9 +14,10 @@
 #include "base/csv_cells.h"
 #include "base/error.h"
 #include "import/csv.h"
-#include "import/layout.h"
+#include "import/sniff.h"
 #include "import/tag_map.h"
 #include "programs/store/verbs.h"
+#include "report/help.h"
 #include "report/plot/loop_figure.h"
 #include "storage/runs/runs.h"
 
@@ -32,93 +33,13 @@ struct AuditOptions {
   std::vector<std::string> files;
   std::vector<std::string> runs;
   std::string valve;
-  std::string op;
-  std::string pv;
-  std::string sp;
-  std::string x;
-  std::string mode;
+  importer::LoopNames names;
   std::string service;
-  bool ignore_x{false};
   double period_s{0.0};
   double window_s{7200.0};
   std::string plot;
   importer::TableOptions table;
 };
-
-// A signal of a loop, and the names that it has in exports: alone, or behind
-// the tag of the loop ("FIC101.OP").
-struct Role {
-  Signal signal;
-  const char* option;
-  std::string AuditOptions::*column;
-  std::vector<const char*> names;
-};
-const std::array<Role, 4>& Roles() {
-  static const std::array<Role, 4> roles{{
-      {Signal::kCv,
-       "--op",
-       &AuditOptions::op,
-       {"OP_pct", "OP", "CV_pct", "CV", "CO", "OUT", "MV"}},
-      {Signal::kF,
-       "--pv",
-       &AuditOptions::pv,
-       {"PV", "F_t_h", "F_m3_h", "F", "MEAS"}},
-      {Signal::kSp, "--sp", &AuditOptions::sp, {"SP", "SV", "SETPOINT"}},
-      {Signal::kX, "--x", &AuditOptions::x, {"X_pct", "X", "ZT", "POS"}},
-  }};
-  return roles;
-}
-
-bool IsNamed(std::string_view column, std::string_view name) {
-  if (SameName(column, name)) {
-    return true;
-  }
-  if (column.size() <= name.size() + 1 ||
-      !SameName(column.substr(column.size() - name.size()), name)) {
-    return false;
-  }
-  return std::string_view("./: ").find(
-             column[column.size() - name.size() - 1]) != std::string_view::npos;
-}
-
-// "FIC101." of "FIC101.OP", else empty.
-std::string_view TagOf(std::string_view column) {
-  return column.substr(0, column.find_last_of("./: ") + 1);
-}
-
-// The column as the user `asked`, else the only one with a usual name, or of
-// several the one with the tag of `op`, where the user has named that.
-std::optional<std::string> ColumnOf(std::span<const char* const> names,
-                                    const char* option,
-                                    const std::string& asked,
-                                    const std::string& op,
-                                    const std::vector<std::string>& header,
-                                    const std::string& source) {
-  if (!asked.empty()) {
-    return asked;
-  }
-  const std::string_view tag = TagOf(op);
-  for (const char* name : names) {
-    std::vector<std::string> found;
-    std::ranges::copy_if(
-        header, std::back_inserter(found),
-        [name](const std::string& column) { return IsNamed(column, name); });
-    if (found.size() > 1 && !tag.empty()) {
-      std::erase_if(found, [tag](const std::string& column) {
-        return TagOf(column) != tag;
-      });
-    }
-    if (found.size() > 1) {
-      throw DataError(source + ": columns " + Quoted(Listed(found)) +
-                      " all look like " + option +
-                      "; name one of them with it");
-    }
-    if (found.size() == 1) {
-      return found.front();
-    }
-  }
-  return std::nullopt;
-}
 
 // The record of one loop, cut into stretches without a gap. `gain_sign` is that
 // of the loop, from OP to what is judged: 0 if only the record can tell.
@@ -131,45 +52,20 @@ struct LoopRecord {
   std::vector<SampleSeries> stretches;
 };
 
-// A map of the loop's columns, so that the importer reads loops, too.
+// A map of the loop's columns, so that the importer reads loops, too. What the
+// user's map leaves open but the signals is left to the reader, which refuses
+// what it cannot know.
 importer::ColumnMap LoopMap(const TextLines& lines, const AuditOptions& options,
                             const std::string& source) {
   importer::ColumnMap map = options.table.Read(false);
-  map.mode_column = options.mode;
-  if (!map.columns.empty() || map.long_table) {
+  if (!map.columns.empty()) {
+    map.mode_column =
+        options.names.mode.empty() ? map.mode_column : options.names.mode;
     return map;
   }
-  const std::vector<std::string> header =
-      importer::FindLayout(lines, map, source, false).names;
-  for (const Role& role : Roles()) {
-    if (role.signal == Signal::kX && options.ignore_x) {
-      continue;
-    }
-    if (const auto column =
-            ColumnOf(role.names, role.option, options.*(role.column),
-                     options.op, header, source)) {
-      map.columns.push_back({*column, role.signal});
-    }
-  }
-  const auto require = [&](Signal signal, Signal instead) {
-    const auto has = [&](const importer::ColumnMapping& mapping) {
-      return mapping.signal == signal || mapping.signal == instead;
-    };
-    if (std::ranges::none_of(map.columns, has)) {
-      const Role& role = *std::ranges::find(Roles(), signal, &Role::signal);
-      throw DataError(source + ": no column for " + (role.option + 2) +
-                      "; the header is " + Quoted(Listed(header)) + "; try " +
-                      role.option + " COLUMN");
-    }
-  };
-  require(Signal::kCv, Signal::kCv);
-  require(Signal::kF, Signal::kX);
-  static constexpr const char* kMode[] = {"MODE"};
-  map.mode_column =
-      ColumnOf(kMode, "--mode", options.mode, options.op, header, source)
-          .value_or("");
-  // PV keeps its own unit: nothing here depends on it.
-  map.flow_unit = FlowUnit::kM3PerHour;
+  const importer::Sniffed found = importer::ScanColumns(lines, source, map);
+  map.long_table = found.map.long_table;
+  importer::GuessLoop(found.columns, options.names, source, map);
   return map;
 }
 
@@ -323,7 +219,7 @@ std::optional<loop::Window> WindowOf(Samples part, double period_s,
   loop::Window window;
   window.period_s = period_s;
   window.op = Series(part, Signal::kCv);
-  if (!options.ignore_x) {
+  if (!options.names.ignore_x) {
     window.x = Series(part, Signal::kX);
   }
   const bool of_valve = record.gain_sign != 0;
@@ -803,16 +699,15 @@ void AddAuditVerb(report::Program& program) {
   verb.add_option("--valve", options.valve,
                   "All stored runs of these valves: 'FV-1*'")
       ->type_name("GLOB");
-  verb.add_option("--op", options.op, "Column of the controller output [%]");
-  verb.add_option("--pv", options.pv, "Column of the controlled variable");
-  verb.add_option("--sp", options.sp, "Column of the set point [as PV]");
-  verb.add_option("--x", options.x, "Column of the position [%]");
-  program.AddRemoved("audit", "--ps",
-                     "stroke tests are no longer evaluated; fdi-store health "
-                     "show has dead time, T63 and T86 of ordinary steps");
-  verb.add_option("--mode", options.mode,
+  verb.add_option("--op", options.names.op,
+                  "Column of the controller output [%]");
+  verb.add_option("--pv", options.names.pv,
+                  "Column of the controlled variable");
+  verb.add_option("--sp", options.names.sp, "Column of the set point [as PV]");
+  verb.add_option("--x", options.names.x, "Column of the position [%]");
+  verb.add_option("--mode", options.names.mode,
                   "Column of the mode (MODE, or auto with 1 and 0)");
-  verb.add_flag("--ignore-x", options.ignore_x,
+  verb.add_flag("--ignore-x", options.names.ignore_x,
                 "Judge PV although the position is there");
   verb.add_option("--service", options.service,
                   "First letter of the tag: F, P, T or A, or L for levels and "
@@ -830,6 +725,8 @@ void AddAuditVerb(report::Program& program) {
       "FILE-2.png, ... by rank");
   options.table.AddTo(verb);
   program.AllowCsv(verb, "One line per window");
+  report::ShowInHelpAll(verb, {"--ignore-x", "--service", "--window",
+                               "--resample", "--decimal", "--date", "--skip"});
 }
 
 }  // namespace fdi::storage

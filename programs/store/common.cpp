@@ -31,7 +31,7 @@ ModelStore WritableModels(const Context& context) {
 }
 
 void EpisodeOptions::AddTo(CLI::App& verb) {
-  verb.add_option("--valve", valve, "Glob over valve ids: 'FV-1*'")
+  verb.add_option("--valve", valve, "Only valves whose ids match: 'FV-1*'")
       ->type_name("GLOB");
   verb.add_option("--fault", fault,
                   std::string(kFaultNames) + ", paper1..paper5 or unknown");
@@ -40,15 +40,16 @@ void EpisodeOptions::AddTo(CLI::App& verb) {
                   "open, detected, isolated or closed of the episode; the "
                   "others of the alarm; unacked: unack or rtn_unack")
       ->type_name(JoinText(EpisodeStateNames(), "|"));
-  AddLimit(verb, limit);
 }
 
 void PlantOptions::AddTo(CLI::App& verb) {
-  verb.add_option("--from", url,
+  verb.add_option("--db", url,
                   "Read the history of the whole plant instead: "
-                  "postgresql://user@host/database");
+                  "postgresql://user@host/database")
+      ->type_name("URL");
   verb.add_option("--monitor", monitor,
-                  "With --from: only what this monitor recorded");
+                  "With --db: only what this monitor recorded")
+      ->type_name("NAME");
 }
 
 std::unique_ptr<History> OpenHistory(const PlantOptions& plant,
@@ -70,12 +71,11 @@ EpisodeFilter EpisodeOptions::Filter(const Context& context) const {
                       std::string(kFaultNames) + ", paper1..paper5 or unknown");
   }
   EpisodeFilter filter;
-  filter.valve_glob = valve;
+  filter.valve_glob = valve.empty() ? "*" : valve;
   filter.fault = fault;
   filter.since_ns = window.since_ns(context);
   filter.until_ns = window.until_ns(context);
   filter.state = ParseEpisodeState(state);
-  filter.limit = limit;
   filter.now_ns = NowNs();
   return filter;
 }
@@ -107,13 +107,8 @@ void AddEpisode(CLI::App& verb, std::string& id, bool required) {
 
 void AddOutput(CLI::App& verb, std::string& output) {
   output = "-";
-  verb.add_option("-o,--output", output, "File, or - for stdout");
-}
-
-void AddLimit(CLI::App& verb, std::int64_t& limit) {
-  verb.add_option("--limit", limit,
-                  "At most this many, the newest ones; 0: all")
-      ->check(CLI::NonNegativeNumber);
+  verb.add_option("-o,--output", output, "Where to write it; - is stdout")
+      ->type_name("FILE");
 }
 
 Json TimeJson(const std::optional<std::int64_t>& stamp_ns) {

@@ -80,7 +80,12 @@ std::string FaultText(const Json& row) {
 
 Report ListEpisodes(const HistoryOptions& options, const Context& context) {
   const auto history = OpenHistory(options.plant, context);
-  auto episodes = history->List(options.filter.Filter(context));
+  EpisodeFilter filter = options.filter.Filter(context);
+  if (options.shelved) {
+    return ListShelf(*history, filter, context);
+  }
+  filter.limit = options.rows;
+  auto episodes = history->List(filter);
   NameFaults(episodes, context);
   const std::vector<Alarm> alarms =
       history->Alarms(std::move(episodes), NowNs());
@@ -447,7 +452,7 @@ struct EpisodeExportOptions {
 int ExportEpisodes(const EpisodeExportOptions& options,
                    const Context& context) {
   if (options.id.empty()) {
-    const Report report = ListEpisodes({options.filter, {}}, context);
+    const Report report = ListEpisodes({.filter = options.filter}, context);
     report::WriteOutput(options.output,
                         [&](std::ostream& out) { report.PrintCsv(out); });
   } else {
@@ -464,7 +469,7 @@ int ExportEpisodes(const EpisodeExportOptions& options,
 struct PlotOptions {
   std::string id;
   std::string output;
-  plot::EpisodeFigureOptions figure;
+  report::TimeWindow window;
 };
 
 Report PlotEpisode(const PlotOptions& options, const Context& context) {
@@ -473,7 +478,16 @@ Report PlotEpisode(const PlotOptions& options, const Context& context) {
   const plot::EpisodeEvidence evidence =
       plot::LoadEvidence(reader, options.id, data.models());
   const Episode& episode = evidence.episode;
-  plot::EpisodeFigureOptions figure = options.figure;
+  plot::EpisodeFigureOptions figure;
+  const auto after_detection = [&episode](std::int64_t stamp_ns) {
+    return static_cast<double>(stamp_ns - episode.detected_ns) * 1e-9;
+  };
+  if (!options.window.since.empty()) {
+    figure.from_s = after_detection(options.window.since_ns(context));
+  }
+  if (!options.window.until.empty()) {
+    figure.to_s = after_detection(options.window.until_ns(context));
+  }
   figure.fault_name =
       plot::PlainName(episode, report::LoadFaultTexts(context.options));
   const std::filesystem::path path =
@@ -494,7 +508,15 @@ void AddHistoryVerbs(report::Program& program) {
   auto [list, list_options] =
       AddVerb(program, group, "list", "List the episodes, the newest last",
               ListEpisodes);
-  list_options.AddTo(list);
+  list_options.filter.AddTo(list);
+  list.add_option("--rows", list_options.rows,
+                  "At most this many, the newest ones; 0: all")
+      ->check(CLI::NonNegativeNumber)
+      ->type_name("N");
+  list.add_flag("--shelved", list_options.shelved,
+                "List what is shelved or planned to be instead, by whom and "
+                "why; with --from also what was shelved since then");
+  list_options.plant.AddTo(list);
   program.AllowCsv(list, "The columns of fault_history as CSV");
 
   auto [show, shown] =
@@ -502,14 +524,6 @@ void AddHistoryVerbs(report::Program& program) {
               "Show an episode, what to check, and its events", ShowEpisode);
   AddEpisode(show, shown.id);
   shown.plant.AddTo(show);
-  program.AddRemoved("history", "shadow",
-                     "fdi-trainer compare compares two model sets on recorded "
-                     "runs");
-  program.AddRemoved("history", "stats",
-                     "`fdi-store worklist` has the figures of the alarms "
-                     "(--json, --html)");
-  program.AddRemoved("history", "causes",
-                     "`fdi-store worklist` has common causes (--json, --html)");
   AddAlarmVerbs(program, group);
 
   auto [exporting, exported] =
@@ -525,17 +539,9 @@ void AddHistoryVerbs(report::Program& program) {
               "Draw the evidence of an episode for a report, with gnuplot",
               PlotEpisode);
   AddEpisode(plot, plotted.id);
-  plot.add_option("-o,--output", plotted.output,
-                  "FILE.png or FILE.svg (ID.png)");
-  plot.add_option("--from", plotted.figure.from_s,
-                  "Start of the picture in s after detection");
-  plot.add_option("--to", plotted.figure.to_s,
-                  "End of the picture in s after detection");
-
-  program.AddRemoved("history", "report",
-                     "print the episode on the page of the monitor; "
-                     "fdi-store history show says the same in text, and "
-                     "history plot draws its picture");
+  plot.add_option("-o,--output", plotted.output, "Default: ID.png")
+      ->type_name("FILE.png|FILE.svg");
+  plotted.window.AddTo(plot);
 }
 
 }  // namespace fdi::storage

@@ -18,7 +18,11 @@ void AddShipVerb(report::Program& program) {
 }
 
 std::unique_ptr<History> OpenPlant(const PlantOptions& /*plant*/) {
-  throw ConfigError(report::LeftOut("--from", "FDI_PLANT"));
+  throw ConfigError(report::LeftOut("--db", "FDI_PLANT"));
+}
+
+Report PrunePlant(const PlantPrune& /*options*/, const Context& /*context*/) {
+  throw ConfigError(report::LeftOut("--db", "FDI_PLANT"));
 }
 #endif
 

@@ -1,3 +1,4 @@
+#include "import/tag_map.h"
 #include "programs/store/verbs.h"
 #include "storage/database/database.h"
 
@@ -16,8 +17,6 @@ int main(int argc, char** argv) {
   fdi::storage::AddFaultsVerb(program);
   fdi::storage::AddPlannerVerbs(program);
   fdi::storage::AddMaintenanceVerbs(program);
-  program.AddRemoved("", "keys",
-                     "the script fdi-keys makes, renews and lists keys");
   fdi::storage::AddShipVerb(program);
   fdi::storage::AddAuditVerb(program);
   program.AddExamples(fdi::storage::Examples());

@@ -268,6 +268,7 @@ std::int64_t NewestNs(const char* name, const std::filesystem::path& path) {
 }
 
 struct PruneOptions {
+  std::string url;  ///< Of the plant's history, or empty.
   AgeAndSize runs;
   AgeAndSize history;
   AgeAndSize health;
@@ -322,6 +323,11 @@ Json PruneAll(const PruneOptions& options, const DataDirectory& data) {
 }
 
 Report Prune(const PruneOptions& options, const Context& context) {
+  if (!options.url.empty()) {
+    return PrunePlant({options.url, options.history.age, options.health.age,
+                       options.dry_run, options.trust_clock},
+                      context);
+  }
   const Json databases = PruneAll(options, DataOf(context));
   if (databases.empty()) {
     throw ConfigError(
@@ -366,6 +372,11 @@ void AddPrune(report::Program& program) {
       "Delete old recorded runs, old episodes that are closed, acknowledged "
       "and not labelled, and old hours of health",
       Prune);
+  CLI::Option* const url =
+      verb.add_option("--db", options.url,
+                      "Delete from the plant's history instead, as its owner: "
+                      "postgresql:///database")
+          ->type_name("URL");
   for (auto& [what, limits] :
        {std::pair<std::string, AgeAndSize*>("--runs", &options.runs),
         {"--history", &options.history}}) {
@@ -380,12 +391,13 @@ void AddPrune(report::Program& program) {
   verb.add_option("--health-age", options.health.age,
                   "Delete hours of health that are older than this: 1000d, "
                   "...");
-  program.AddRemoved("prune", "--shadow-age",
-                     "differences of a candidate are no longer recorded");
   verb.add_flag("--dry-run", options.dry_run,
                 "Only print what would be deleted");
   verb.add_flag("--trust-clock", options.trust_clock,
                 "Delete by age also if nothing was recorded for a month");
+  for (const char* here : {"--runs-age", "--runs-size", "--history-size"}) {
+    url->excludes(verb.get_option(here));
+  }
 }
 
 }  // namespace
@@ -402,8 +414,6 @@ void AddMaintenanceVerbs(report::Program& program) {
       .add_option("folder", target,
                   "Folder to copy to; made if it does not exist")
       ->required();
-  program.AddRemoved("", "migrate",
-                     "fdi-store doctor brings the databases up to date");
   AddPrune(program);
 }
 

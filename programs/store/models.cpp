@@ -1,5 +1,4 @@
-// fdi-store models: list, show, activate, export, import; types: list, show,
-// delete.
+// fdi-store models: list, show, activate, export, import; types: list, show.
 #include "storage/models/models.h"
 
 #include <algorithm>
@@ -62,37 +61,9 @@ Report ListModels(const NoOptions&, const Context& context) {
                                      {"content hash", "content_hash"}});
 }
 
-Json ObserverJson(const ModelSet& models, const Observer& observer) {
-  Json channels = Json::array();
-  for (std::size_t c = 0; c < observer.channels.size(); ++c) {
-    const ChannelObserver& channel = observer.channels[c];
-    const ValidationFigures& v = channel.validation;
-    channels.push_back({{"name", models.channels[c].name},
-                        {"rules", channel.model.rules.size()},
-                        {"mse", NumberJson(v.mse)},
-                        {"vaf", VafJson(v.vaf)},
-                        {"bias", NumberJson(v.bias)},
-                        {"samples", v.samples}});
-  }
-  return {{"name", observer.name},
-          {"fault", FaultName(observer.fault)},
-          {"strength", observer.strength},
-          {"channels", channels}};
-}
-
 Json ModelJson(const ModelSet& models, const ModelSummary& summary,
                const Lineage& lineage) {
   Json object = SummaryJson(summary);
-  object["observers"] =
-      Rows(models.observers, [&models](const Observer& observer) {
-        return ObserverJson(models, observer);
-      });
-  object["thresholds"] =
-      Rows(models.channels, [](const ChannelSpec& channel) -> Json {
-        return {{"channel", channel.name},
-                {"lower", channel.lower_threshold},
-                {"upper", channel.upper_threshold}};
-      });
   object["undetectable"] = Rows(models.undetectable, FaultName);
   object["training_runs"] = models.training_runs;
   object["lineage"] = report::LineageJson(lineage);
@@ -108,43 +79,6 @@ std::string DecisionText(const DecisionParameters& d) {
          std::to_string(d.detection_samples) + ", t_k " +
          std::to_string(d.isolation_samples) + ", t_c " +
          std::to_string(d.clearing_samples) + " samples";
-}
-
-// One row per channel of each observer.
-void AddObservers(const ModelSet& models, Report& report) {
-  using report::Align;
-  report::TextTable table({{"observer"},
-                           {"fault"},
-                           {"strength [-]", Align::kRight},
-                           {"channel"},
-                           {"rules", Align::kRight},
-                           {"MSE [unit^2]", Align::kRight},
-                           {"VAF [%]", Align::kRight},
-                           {"bias [unit]", Align::kRight}});
-  std::string constant;
-  for (const Observer& observer : models.observers) {
-    for (std::size_t c = 0; c < observer.channels.size(); ++c) {
-      const ChannelObserver& channel = observer.channels[c];
-      const ValidationFigures& v = channel.validation;
-      const bool varies = IsVafMeaningful(v.vaf);
-      table.AddRow(
-          {observer.name, FaultName(observer.fault),
-           FormatNumber(observer.strength, 2), models.channels[c].name,
-           std::to_string(channel.model.rules.size()), FormatNumber(v.mse, 6),
-           varies ? FormatNumber(v.vaf, 2) : "-", FormatNumber(v.bias, 4)});
-      if (!varies) {
-        constant += (constant.empty() ? "" : ", ") + models.channels[c].name +
-                    " of " + observer.name;
-      }
-    }
-  }
-  AddTextTable(report, table);
-  if (!constant.empty()) {
-    report.Line(
-        "no VAF: the output did not vary in the validation data, so there is "
-        "no variance to account for (" +
-        constant + ")");
-  }
 }
 
 Report ShowModel(const std::string& reference, const Context& context) {
@@ -176,15 +110,9 @@ Report ShowModel(const std::string& reference, const Context& context) {
                                     {"strength [-]", "strength"},
                                     {"samples", "samples"},
                                     {"run", "run"}});
-  for (const ChannelSpec& channel : models.channels) {
-    report.Line("abnormal where r_" + channel.name + " < " +
-                FormatNumber(channel.lower_threshold, 4) + " or > " +
-                FormatNumber(channel.upper_threshold, 4) + ' ' +
-                std::string(channel.output == Signal::kF
-                                ? FlowUnitName(models.flow_unit)
-                                : SignalUnit(channel.output)));
-  }
-  AddObservers(models, report);
+  report.Line("fdi-trainer show " + NameText(summary) +
+              " has limits, observers and how well they fit, with --rules "
+              "their rules");
   return report;
 }
 
@@ -302,13 +230,6 @@ Report ShowType(const std::string& name, const Context& context) {
   return report.Fields("", kTypeColumns);
 }
 
-Report DeleteType(const std::string& name, const Context& context) {
-  WritableModels(context).DeleteTemplate(name);
-  Report report;
-  report.document["deleted"] = name;
-  return report.Line(name + " deleted");
-}
-
 }  // namespace
 
 void AddModelsVerbs(report::Program& program) {
@@ -316,8 +237,8 @@ void AddModelsVerbs(report::Program& program) {
   AddVerb(program, group, "list", "List the model sets", ListModels);
 
   auto [show, shown] =
-      AddVerb(program, group, "show", "Show a model set with its validation",
-              ShowModel);
+      AddVerb(program, group, "show",
+              "Show a model set, and what it was made from", ShowModel);
   show.add_option("model-set", shown, "NAME[@VERSION]")->required();
 
   auto [activate, activated] =
@@ -330,7 +251,8 @@ void AddModelsVerbs(report::Program& program) {
   exporting.add_option("model-set", exported.reference, "NAME[@VERSION]")
       ->required();
   exporting.add_option("-o,--output", exported.output, "File to write")
-      ->required();
+      ->required()
+      ->type_name("FILE");
 
   auto [importing, imported] =
       AddVerb(program, group, "import",
@@ -352,9 +274,6 @@ void AddTypesVerbs(report::Program& program) {
   auto [show, shown] =
       AddVerb(program, group, "show", "Show a valve type", ShowType);
   show.add_option("type", shown, "Name")->required();
-  auto [remove, removed] =
-      AddVerb(program, group, "delete", "Delete a valve type", DeleteType);
-  remove.add_option("type", removed, "Name")->required();
 }
 
 }  // namespace fdi::storage

@@ -1,4 +1,4 @@
-// fdi-store health show|trend, worklist: for maintenance planners.
+// fdi-store health, worklist: for maintenance planners.
 #include <algorithm>
 #include <filesystem>
 #include <memory>
@@ -39,7 +39,7 @@ std::vector<HealthHour> Hours(const HealthOptions& options,
                     options.window.until_ns(context)});
   if (hours.empty()) {
     throw NotFoundError("no health of valve '" + options.valve +
-                        "' in that time; `fdi-store worklist --top 0` and "
+                        "' in that time; `fdi-store worklist --rows 0` and "
                         "`fdi-store history list` name valves");
   }
   return hours;
@@ -98,7 +98,24 @@ Report CsvOf(const Json& hours, bool of_plant) {
   return report.Csv("hours", std::move(keys));
 }
 
-Report ShowHealth(const HealthOptions& options, const Context& context) {
+Report Trend(const HealthOptions& options, const Context& context) {
+  const auto limits = planner::ParseLimits(options.limits);
+  Report report;
+  report.document = {{"valve_id", options.valve},
+                     {"trends", planner::TrendsJson(planner::TrendsOf(
+                                    Hours(options, context), limits))}};
+  return report.Table("trends", {{"limit", "limit"},
+                                 {"unit", "unit"},
+                                 {"now", "now", Format::kPlain, 3},
+                                 {"a day", "per_day", Format::kPlain, 4},
+                                 {"days seen", "rests_on_days"},
+                                 {"answer", "text"}});
+}
+
+Report Health(const HealthOptions& options, const Context& context) {
+  if (!options.limits.empty()) {
+    return Trend(options, context);
+  }
   std::vector<HealthHour> hours = Hours(options, context);
   if (!options.hourly) {
     hours = planner::DaysOf(hours);
@@ -133,27 +150,12 @@ Report ShowHealth(const HealthOptions& options, const Context& context) {
   return report.Table("hours", std::move(columns));
 }
 
-Report Trend(const HealthOptions& options, const Context& context) {
-  const auto limits = planner::ParseLimits(options.limits);
-  Report report;
-  report.document = {{"valve_id", options.valve},
-                     {"trends", planner::TrendsJson(planner::TrendsOf(
-                                    Hours(options, context), limits))}};
-  return report.Table("trends", {{"limit", "limit"},
-                                 {"unit", "unit"},
-                                 {"now", "now", Format::kPlain, 3},
-                                 {"a day", "per_day", Format::kPlain, 4},
-                                 {"days seen", "rests_on_days"},
-                                 {"answer", "text"}});
-}
-
 struct WorkListOptions {
   std::string valve{"*"};
-  std::string since{std::to_string(findings::kPeriodDays) + "d"};
+  std::string from{std::to_string(findings::kPeriodDays) + "d"};
   std::string discipline;
   std::vector<std::string> limits;
-  std::size_t top{10};
-  double horizon_days{180.0};
+  std::size_t rows{10};
   int audit_windows{0};
   std::string html;
   PlantOptions plant;
@@ -189,11 +191,10 @@ Report WorkList(const WorkListOptions& options, const Context& context) {
   query.valve_glob = options.valve;
   // Whole seconds, as people read them.
   query.now_ns = NowNs() / kNsPerSecond * kNsPerSecond;
-  query.horizon_days = options.horizon_days;
   query.since_ns =
-      ParseTimeOrAgo(options.since, context.options.utc, query.now_ns);
+      ParseTimeOrAgo(options.from, context.options.utc, query.now_ns);
   if (query.since_ns >= query.now_ns) {
-    throw ConfigError("--since " + options.since +
+    throw ConfigError("--from " + options.from +
                       " is not in the past; try 7d or 2026-10-01");
   }
   query.discipline = options.discipline;
@@ -226,63 +227,52 @@ Report WorkList(const WorkListOptions& options, const Context& context) {
   if (!html.empty()) {
     WritePage(document, html, json, context);
   }
-  return planner::WorkListReport(std::move(document), options.top);
+  return planner::WorkListReport(std::move(document), options.rows);
 }
 
 }  // namespace
 
 void AddPlannerVerbs(report::Program& program) {
-  CLI::App& group = program.AddGroup(
-      "health",
-      "How a valve has changed over months, and when it may reach a limit");
-  auto [show, shown] = AddVerb(
-      program, group, "show",
-      "Days or hours of a valve: time, travel, dead band, status (NAMUR NE "
-      "107), d_0, residuals of the normal model, means and (rms)",
-      ShowHealth);
-  auto [trend, limits] =
-      AddVerb(program, group, "trend",
-              "How long until a limit is met, with a 90 % interval where there "
-              "is a significant trend",
-              Trend);
-  for (auto [verb, options] : {std::pair(&show, &shown), {&trend, &limits}}) {
-    verb->add_option("--valve", options->valve, "Id of the valve")
-        ->required()
-        ->type_name("ID");
-    options->window.AddTo(*verb);
-    options->plant.AddTo(*verb);
-  }
-  show.add_flag("--hourly", shown.hourly, "Hours instead of days");
-  program.AllowCsv(show, "CSV, one line per time and signal");
-  shown.csv = show.get_option("--csv");
-  trend
-      .add_option("--limit", limits.limits,
-                  "F=-10% (of the flow expected), X=3 (its unit), f19=0.5 "
-                  "(strength), travel=100000 (strokes), reversals=1000000; may "
-                  "be repeated")
+  auto [health, shown] = AddVerb(
+      program, program.root(), "health",
+      "How a valve has changed over months, and when it may reach a limit. "
+      "Days or hours: time, travel, dead band, status (NAMUR NE 107), d_0, "
+      "residuals of the normal model, means and (rms)",
+      Health);
+  health.add_option("--valve", shown.valve, "Id of the valve")
       ->required()
+      ->type_name("ID");
+  shown.window.AddTo(health);
+  shown.plant.AddTo(health);
+  health.add_flag("--hourly", shown.hourly, "Hours instead of days");
+  health
+      .add_option("--limit", shown.limits,
+                  "Show how long until a limit is met instead, with a 90 % "
+                  "interval where there is a significant trend: F=-10% (of the "
+                  "flow expected), X=3 (its unit), f19=0.5 (strength), "
+                  "travel=100000 (strokes), reversals=1000000; may be repeated")
       ->type_name("NAME=VALUE");
+  program.AllowCsv(health, "CSV, one line per time and signal");
+  shown.csv = health.get_option("--csv");
 
   auto [list, options] = AddVerb(
       program, program.root(), "worklist",
       "What is wrong, the worst first, and what to do about it", WorkList);
-  list.add_option("--top", options.top, "Rows of the text; 0: all");
+  list.add_option("--rows", options.rows, "Rows of the text; 0: all")
+      ->type_name("N");
   list.add_option("--valve", options.valve,
                   "Only rows of valves whose ids match this glob")
       ->type_name("GLOB");
-  list.add_option("--since", options.since,
+  list.add_option("--from", options.from,
                   "Episodes, trends and figures from this time on: 90d, "
-                  "2026-10-01");
+                  "2026-10-01")
+      ->type_name("TIME");
   list.add_option("--discipline", options.discipline,
                   "Only work for operator, instrument, air or mechanical");
   list.add_option("--limit", options.limits,
-                  "Limits of trends, as in `health trend`; may be repeated "
+                  "Limits of trends, as of `health`; may be repeated "
                   "(default: F=-10% and F=10%)")
       ->type_name("NAME=VALUE");
-  list.add_option("--horizon", options.horizon_days,
-                  "Leave out trends that reach their limit later than this")
-      ->check(CLI::Range(1.0, 36500.0))
-      ->type_name("DAYS");
   list.add_option("--audit-windows", options.audit_windows,
                   "Windows of two hours to audit of each loop's newest stored "
                   "run")
@@ -295,8 +285,6 @@ void AddPlannerVerbs(report::Program& program) {
       ->type_name("FILE.html");
   options.plant.AddTo(list);
   program.AllowCsv(list, "CSV, one line per row");
-  program.AddRemoved("", "report",
-                     "`fdi-store worklist --html FILE` writes the page");
 }
 
 }  // namespace fdi::storage

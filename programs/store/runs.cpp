@@ -380,9 +380,6 @@ void AddRunsVerbs(report::Program& program) {
 
   auto [remove, ids] = AddVerb(program, group, "delete", "Delete runs", Delete);
   remove.add_option("run", ids, "IDs")->required();
-
-  program.AddRemoved("runs", "plot",
-                     "fdi-store runs export writes its samples as CSV");
 }
 
 }  // namespace fdi::storage

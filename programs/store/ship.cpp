@@ -1,5 +1,5 @@
 // fdi-store ship: copies the history to the plant history in PostgreSQL. And
-// --from of the verbs that read a history: opens that one.
+// --db of other verbs: reads that history, or deletes what is old there.
 #include <algorithm>
 #include <chrono>
 #include <set>
@@ -27,11 +27,6 @@ struct ShipOptions {
   std::string every;
   bool init{false};
   bool forget{false};
-  bool prune{false};
-  std::string history_age;
-  std::string health_age;
-  bool dry_run{false};
-  bool trust_clock{false};
 };
 
 std::string HostName() {
@@ -159,7 +154,40 @@ Report ShipReport(const ShipOptions& options, const std::string& plant,
   }
 }
 
-Report PrunePlant(const ShipOptions& options, const Context& context) {
+Report Ship(const ShipOptions& given, const Context& context) {
+  ShipOptions options = given;
+  if (options.host.empty()) {
+    options.host = HostName();
+  }
+  const DataDirectory data = DataOf(context);
+  if (!options.init && (options.every.empty() || options.forget) &&
+      !std::filesystem::exists(data.history())) {
+    throw NotFoundError("no database " + data.history().string());
+  }
+  if (options.forget) {
+    StopShipping(data);
+    Report report;
+    report.document = {{"forgotten", true}};
+    return report.Line(
+        "changes are logged for no plant any more, and prune waits for none");
+  }
+  if (options.url.empty()) {
+    throw ConfigError("ship: say where to: --db postgresql://user@host/plant");
+  }
+  if (options.init) {
+    return InitPlant(options, context);
+  }
+  if (!options.every.empty()) {
+    ShipForEver(options, context);
+  }
+  Shipper shipper(data, options.url, {options.host, options.monitor},
+                  Limits(context, kShipping));
+  return ShipReport(options, shipper.plant().name(), shipper.Ship());
+}
+
+}  // namespace
+
+Report PrunePlant(const PlantPrune& options, const Context& context) {
   struct Rule {
     const std::string& age;
     const char* items;
@@ -167,7 +195,7 @@ Report PrunePlant(const ShipOptions& options, const Context& context) {
   };
   if (options.history_age.empty() && options.health_age.empty()) {
     throw ConfigError(
-        "ship --prune: choose what may be deleted: --history-age or "
+        "prune --db: choose what may be deleted: --history-age or "
         "--health-age");
   }
   PlantDatabase plant(options.url, Limits(context, kOwnerWork));
@@ -201,43 +229,6 @@ Report PrunePlant(const ShipOptions& options, const Context& context) {
                                  {"protected", "protected"}});
 }
 
-Report Ship(const ShipOptions& given, const Context& context) {
-  ShipOptions options = given;
-  if (options.host.empty()) {
-    options.host = HostName();
-  }
-  const DataDirectory data = DataOf(context);
-  if (!options.init && !options.prune &&
-      (options.every.empty() || options.forget) &&
-      !std::filesystem::exists(data.history())) {
-    throw NotFoundError("no database " + data.history().string());
-  }
-  if (options.forget) {
-    StopShipping(data);
-    Report report;
-    report.document = {{"forgotten", true}};
-    return report.Line(
-        "changes are logged for no plant any more, and prune waits for none");
-  }
-  if (options.url.empty()) {
-    throw ConfigError("ship: say where to: --to postgresql://user@host/plant");
-  }
-  if (options.init) {
-    return InitPlant(options, context);
-  }
-  if (options.prune) {
-    return PrunePlant(options, context);
-  }
-  if (!options.every.empty()) {
-    ShipForEver(options, context);
-  }
-  Shipper shipper(data, options.url, {options.host, options.monitor},
-                  Limits(context, kShipping));
-  return ShipReport(options, shipper.plant().name(), shipper.Ship());
-}
-
-}  // namespace
-
 std::unique_ptr<History> OpenPlant(const PlantOptions& plant) {
   return std::make_unique<PlantReader>(plant.url, plant.monitor);
 }
@@ -246,9 +237,11 @@ void AddShipVerb(report::Program& program) {
   auto [verb, options] = AddVerb(
       program, program.root(), "ship",
       "Copy the history to that of the whole plant, in PostgreSQL", Ship);
-  verb.add_option("--to", options.url, "postgresql://user@host/database");
+  verb.add_option("--db", options.url, "postgresql://user@host/database")
+      ->type_name("URL");
   verb.add_option("--host", options.host, "This host's name there");
   verb.add_option("--monitor", options.monitor, "This monitor's name there")
+      ->type_name("NAME")
       ->capture_default_str();
   verb.add_option("--every", options.every,
                   "Repeat at this interval: 10s, 1min, ... (default: ship "
@@ -256,26 +249,10 @@ void AddShipVerb(report::Program& program) {
   CLI::Option* init =
       verb.add_flag("--init", options.init,
                     "Make the schema and the roles, or bring them up to date");
-  CLI::Option* prune = verb.add_flag(
-      "--prune", options.prune,
-      "Delete there, as prune does here: --history-age, --health-age");
-  verb.add_option("--history-age", options.history_age,
-                  "Delete episodes that ended longer ago than this: 1500d, ...")
-      ->needs(prune);
-  verb.add_option("--health-age", options.health_age,
-                  "Delete hours of health that are older than this")
-      ->needs(prune);
-  verb.add_flag("--dry-run", options.dry_run,
-                "Only print what would be deleted")
-      ->needs(prune);
-  verb.add_flag("--trust-clock", options.trust_clock,
-                "Delete also if nothing came for a month")
-      ->needs(prune);
   verb.add_flag("--forget", options.forget,
                 "Stop shipping for good: changes are no longer logged, and "
                 "prune may delete what was not shipped")
-      ->excludes(init, prune);
-  init->excludes(prune);
+      ->excludes(init);
 }
 
 }  // namespace fdi::storage

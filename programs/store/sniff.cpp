@@ -105,8 +105,7 @@ void AddSniffVerb(report::Program& program, CLI::App& group) {
               SniffFile);
   verb.add_option("file", options.file, "CSV file, also gzipped")->required();
   options.table.AddTo(verb);
-  verb.add_option("--map-output", options.output,
-                  "Write a tag map to this file")
+  verb.add_option("-o,--output", options.output, "Write a tag map to this file")
       ->type_name("FILE.toml");
 }
 

@@ -1,4 +1,4 @@
-// fdi-store valves: list, show, add, assign, event, remove.
+// fdi-store valves: list, show, add, assign, repaired, move, remove.
 #include <algorithm>
 #include <cerrno>
 #include <cstdio>
@@ -258,9 +258,7 @@ struct AddOptions {
   std::string flow_unit{"m3/h"};
   std::string sense{"closing"};
   std::string signals{"CV,P1,P2,T1,X,F"};
-  std::string model_set;
   double period_s{1.0};
-  std::uint32_t epoch{0};
   std::string plant;
 };
 
@@ -378,12 +376,7 @@ Report AddValves(const AddOptions& options, const Context& context) {
   entry.sense = options.sense == "opening" ? Sense::kOpening : Sense::kClosing;
   entry.signals = report::ParseSignals(options.signals);
   entry.period_s = options.period_s;
-  entry.epoch = options.epoch;
   ModelStore store = WritableModels(context);
-  if (!options.model_set.empty()) {
-    entry.model_set = ParseModelReference(options.model_set);
-    store.Summary(*entry.model_set);  // Throws if it does not exist.
-  }
   store.PutValve(entry);
   return Changed(entry);
 }
@@ -408,21 +401,20 @@ Report Assign(const AssignOptions& options, const Context& context) {
   return Changed(*entry);
 }
 
-struct EventOptions {
+struct RepairedOptions {
   std::string pattern;
   std::string kind;
-  std::string note;
   std::string at;
-  std::string who{report::UserName()};
+  NoteOptions note;
 };
 
 // To the models, a replaced, repacked or recalibrated valve is a different one.
-Report Event(const EventOptions& options, const Context& context) {
+Report Repaired(const RepairedOptions& options, const Context& context) {
   ValveEvent event;
   event.kind = ParseValveEventKind(options.kind);
-  event.note = options.note;
+  event.note = options.note.comment;
   event.at_ns = options.at.empty() ? NowNs() : ParseTime(options.at, true);
-  event.who = options.who;
+  event.who = options.note.who;
   return Changed(WritableModels(context).AddValveEvent(options.pattern, event));
 }
 
@@ -469,7 +461,8 @@ Report Move(const MoveOptions& options, const Context& context) {
   const DataDirectory to{options.target};
   std::error_code error;
   if (std::filesystem::equivalent(from.path, to.path, error)) {
-    throw ConfigError("--to is the data directory that the valves are in");
+    throw ConfigError(options.target +
+                      " is the data directory that the valves are in");
   }
   if (!std::filesystem::exists(from.history())) {
     throw NotFoundError("no monitor has run in " + from.path.string());
@@ -525,7 +518,7 @@ void AddMove(report::Program& program, CLI::App& group) {
               "stopped: model set, entry, accumulators, open episodes, shelves",
               Move);
   verb.add_option("valve", options.pattern, "Id or glob")->required();
-  verb.add_option("--to", options.target,
+  verb.add_option("folder", options.target,
                   "Data directory of the other monitor, or a new one to "
                   "carry there")
       ->type_name("DIR")
@@ -551,25 +544,21 @@ void AddAdd(report::Program& program, CLI::App& group) {
   verb.add_option("--signals", options.signals, "Signals it delivers");
   verb.add_option("--period", options.period_s, "Sample period in s")
       ->check(CLI::PositiveNumber);
-  verb.add_option("--epoch", options.epoch,
-                  "Replacements and recalibrations so far");
-  verb.add_option("--model-set", options.model_set, "NAME[@VERSION]");
 }
 
-void AddEvent(report::Program& program, CLI::App& group) {
+void AddRepaired(report::Program& program, CLI::App& group) {
   auto [verb, options] = AddVerb(
-      program, group, "event",
+      program, group, "repaired",
       "Note what was done to a valve; this begins its next epoch, in which no "
       "fault is isolated until the valve is onboarded again",
-      Event);
+      Repaired);
   verb.add_option("valve", options.pattern, "Id, or the glob of an entry")
       ->required();
-  verb.add_option("--kind", options.kind, "replaced, repacked, recalibrated")
+  verb.add_option("what", options.kind, "replaced, repacked, recalibrated")
       ->required();
-  verb.add_option("--note", options.note, "Free text");
   verb.add_option("--at", options.at, "When, RFC 3339 in UTC (default: now)")
       ->type_name("UTC");
-  verb.add_option("--by", options.who, "Who did this");
+  options.note.AddTo(verb);
 }
 
 }  // namespace
@@ -589,7 +578,7 @@ void AddValvesVerbs(report::Program& program) {
   assign.add_option("valve", assigned.pattern, "Id or glob")->required();
   assign.add_option("model-set", assigned.set, "NAME[@VERSION] or none")
       ->required();
-  AddEvent(program, group);
+  AddRepaired(program, group);
   AddMove(program, group);
   auto [remove, removed] =
       AddVerb(program, group, "remove", "Remove an entry", Remove);

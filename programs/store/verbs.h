@@ -54,6 +54,11 @@ void AddMaintenanceVerbs(report::Program& program);
 void AddPlannerVerbs(report::Program& program);  ///< health, worklist
 void AddShipVerb(report::Program& program);
 
+/// What is shelved or planned to be; with filter.since_ns also what was shelved
+/// since then.
+Report ListShelf(History& history, const EpisodeFilter& filter,
+                 const Context& context);
+
 /// Examples for --help and the manual pages.
 std::vector<report::VerbExamples> Examples();
 
@@ -69,18 +74,22 @@ ModelStore WritableModels(const Context& context);
 
 /// Options that filter a list of episodes.
 struct EpisodeOptions {
-  std::string valve{"*"};
+  std::string valve;  ///< Glob; empty: all.
   std::string fault;
   std::string state{"any"};
-  std::int64_t limit{0};
   report::TimeWindow window;
 
   void AddTo(CLI::App& verb);
+  /// Whether one of them narrows the list.
+  bool given() const {
+    return !valve.empty() || !fault.empty() || state != "any" ||
+           !window.since.empty() || !window.until.empty();
+  }
   /// @throws ConfigError
   EpisodeFilter Filter(const Context& context) const;
 };
 
-/// --from, --monitor: selects a history other than that of --data.
+/// --db, --monitor: selects a history other than that of --data.
 struct PlantOptions {
   std::string url;
   std::string monitor;
@@ -93,12 +102,19 @@ struct PlantOptions {
 struct HistoryOptions {
   EpisodeOptions filter;
   PlantOptions plant;
-
-  void AddTo(CLI::App& verb) {
-    filter.AddTo(verb);
-    plant.AddTo(verb);
-  }
+  std::int64_t rows{0};  ///< At most; 0: all.
+  bool shelved{false};   ///< The shelf instead.
 };
+
+/// What `prune --db` deletes from the plant's history.
+struct PlantPrune {
+  std::string url;
+  std::string history_age;
+  std::string health_age;
+  bool dry_run{false};
+  bool trust_clock{false};
+};
+Report PrunePlant(const PlantPrune& options, const Context& context);
 
 /// The plant's history; of an optional component, too.
 std::unique_ptr<History> OpenPlant(const PlantOptions& plant);
@@ -120,8 +136,6 @@ struct NoteOptions {
 void AddEpisode(CLI::App& verb, std::string& id, bool required = true);
 /// -o, --output with "-" for stdout.
 void AddOutput(CLI::App& verb, std::string& output);
-/// --limit.
-void AddLimit(CLI::App& verb, std::int64_t& limit);
 
 // JSON values; null where there is none.
 Json TimeJson(const std::optional<std::int64_t>& stamp_ns);  ///< RFC 3339, UTC

@@ -50,39 +50,6 @@ report::Report RunEvaluate(const EvaluateOptions& options,
                           Evaluate(models, runs, options.assume_normal));
 }
 
-// Our own evidence is measured with a program of the source tree.
-void RefuseStudies(report::Program& program) {
-  const std::string study =
-      "it is in fdi-study, which the source tree builds with -DFDI_BENCH=ON: "
-      "fdi-study ";
-  for (const char* option : {"--campaign", "--seed-offset", "--report",
-                             "--vectors", "--no-second-look"}) {
-    program.AddRemoved("evaluate", option, study + "evaluate " + option);
-  }
-  program.AddRemoved("compare", "--campaign",
-                     study +
-                         "evaluate --campaign scores one set after the "
-                         "other, and stores the runs, which --runs compares");
-  program.AddRemoved("compare", "--seed-offset",
-                     study + "evaluate --seed-offset");
-  program.AddRemoved("evaluate", "--leave-one-out", study + "leave-one-out");
-  program.AddRemoved("evaluate", "--seeds", study + "seeds");
-  program.AddRemoved("evaluate", "--verdicts", study + "verdicts");
-  program.AddRemoved("evaluate", "--baseline", study + "baseline");
-  program.AddRemoved("evaluate", "--train-runs", study + "baseline");
-  program.AddRemoved("evaluate", "--train-file", study + "baseline");
-  program.AddRemoved("evaluate", "--without", study + "reduce");
-  program.AddRemoved("evaluate", "--without-channels", study + "reduce");
-  for (const char* option : {"--history", "--work-orders", "--horizon"}) {
-    program.AddRemoved(
-        "evaluate", option,
-        "score each file with --file, or replay it into a monitor "
-        "(fdi-simulator "
-        "replay --csv FILE) and compare fdi-store history list with the work "
-        "orders");
-  }
-}
-
 }  // namespace
 
 void AddEvaluateVerb(report::Program& program) {
@@ -99,7 +66,6 @@ void AddEvaluateVerb(report::Program& program) {
   verb.add_flag("--assume-normal", options.assume_normal,
                 "Samples without truth count as free of faults");
   program.AllowCsv(verb, "One line per run instead of tables");
-  RefuseStudies(program);
 }
 
 }  // namespace fdi::trainer

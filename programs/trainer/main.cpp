@@ -1,3 +1,4 @@
+#include "import/tag_map.h"
 #include "programs/trainer/verbs.h"
 #include "report/program.h"
 #include "storage/database/database.h"
@@ -14,10 +15,6 @@ int main(int argc, char** argv) {
   fdi::trainer::AddShowVerb(program);
   fdi::trainer::AddOnboardVerb(program);
   fdi::trainer::AddRelearnVerb(program);
-  fdi::trainer::AddCoverageVerb(program);
-  program.AddRemoved("", "inject",
-                     "it is fdi-study inject, which the source tree builds "
-                     "with -DFDI_BENCH=ON");
   program.AddExamples(
       {{"",
         {{"Train the paper's observers",

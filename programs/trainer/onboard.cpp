@@ -15,6 +15,7 @@
 #include "programs/trainer/model_report.h"
 #include "programs/trainer/onboard_plant.h"
 #include "programs/trainer/verbs.h"
+#include "report/help.h"
 #include "report/program.h"
 #include "report/progress.h"
 #include "report/report.h"
@@ -36,8 +37,8 @@
 #include "trainer/rule_text.h"
 #include "trainer/scoring/evaluated_run.h"
 
-// The verbs `onboard` and `coverage`: both make difference observers for a
-// valve type, one from the data of a valve, the other from a simulation.
+// The verb `onboard` makes difference observers for a valve type: from the data
+// of a valve, or, to say what could be seen of one, from a simulation.
 
 namespace fdi::trainer {
 namespace {
@@ -49,24 +50,18 @@ using report::Align;
 using report::FormatNumber;
 using report::Json;
 
-// What the two verbs have in common.
-struct TypeOptions {
+struct OnboardOptions {
   std::vector<std::string> signals;
   std::string type{"lublin-actuator-3"};
   OnboardingOptions onboarding;
-};
-
-struct CoverageOptions : TypeOptions {
-  bool gains{true};
-};
-
-struct OnboardOptions : TypeOptions {
+  int jobs{0};
   std::string valve;
   std::vector<std::string> runs;
   std::vector<std::string> files;
   importer::TableOptions table;
   std::string save_type;
   bool gains{false};
+  bool dry_run{false};
   PlantVerbOptions plant;
 };
 
@@ -410,6 +405,7 @@ OnboardingJob NewJob(const OnboardOptions& options, storage::ModelStore& store,
   const FoundType found = FindType(options.type, &store);
   OnboardingJob job{LoadRuns(options, found.type, context), options.onboarding};
   job.settings.name = NameOfSet(options);
+  job.settings.threads = options.jobs;
   job.settings.type = found.type;
   job.settings.fit = job.settings.fit && !found.stored;
   job.settings.of_type = SetOf(found, store);
@@ -464,8 +460,15 @@ report::Report OnboardValve(const OnboardOptions& options,
   return report;
 }
 
-report::Report Assess(const CoverageOptions& options,
+// What could be seen of a valve of the type with these signals.
+report::Report Assess(const OnboardOptions& options,
                       const report::Context& context) {
+  if (options.signals.empty() || !options.runs.empty() ||
+      !options.files.empty()) {
+    throw ConfigError(
+        "onboard --dry-run: --plant FILE says what would be done, --signals "
+        "without data what could be seen");
+  }
   const SignalMask signals =
       report::ParseSignals(options.signals, kBasicSignals);
   const storage::DataDirectory directory{context.options.data_dir};
@@ -476,6 +479,7 @@ report::Report Assess(const CoverageOptions& options,
   }
   OnboardingOptions settings = options.onboarding;
   settings.name = "coverage";
+  settings.threads = options.jobs;
   report::StopSignals stop;
   stop.EndWithin(kOnboardPatience, "\nfdi-trainer: error: interrupted\n");
   report::Progress bar("coverage");
@@ -489,25 +493,21 @@ report::Report Assess(const CoverageOptions& options,
   return report;
 }
 
-CLI::Option* AddTypeOptions(CLI::App& verb, const char* signals,
-                            const char* type, TypeOptions& options) {
-  verb.add_option("--type", options.type, type)
-      ->type_name("NAME|FILE.toml")
-      ->capture_default_str();
-  verb.add_option("--threads", options.onboarding.threads,
-                  "Number of threads; 0 uses all cores")
-      ->check(CLI::Range(0, 1024))
-      ->type_name("N");
-  return verb.add_option("--signals", options.signals, signals)
-      ->delimiter(',')
-      ->type_name("CV,X,...");
-}
-
 void AddOptions(CLI::App& verb, OnboardOptions& options) {
   verb.add_option("--valve", options.valve,
-                  "Id of the valve that the set is assigned to")
-      ->type_name("ID");
+                  "Id of the valve that the set is assigned to; with --plant, "
+                  "rows with matching names only")
+      ->type_name("ID|GLOB");
   options.plant.AddTo(verb);
+  verb.add_flag("--dry-run", options.dry_run,
+                "Store nothing. With --plant: list matched, unmatched and "
+                "ambiguous tags and what is wrong with a row. With --signals "
+                "and without data: simulate the type, and show which faults "
+                "could be seen");
+  verb.add_option("--jobs", options.jobs,
+                  "Threads, or with --plant rows at a time; 0: one per core")
+      ->check(CLI::Range(0, 1024))
+      ->type_name("N");
   verb.add_option("--runs", options.runs,
                   "Healthy runs, or stretches of them [s]")
       ->delimiter(',')
@@ -516,11 +516,15 @@ void AddOptions(CLI::App& verb, OnboardOptions& options) {
                   "Healthy CSV file, not stored; repeatable")
       ->type_name("FILE.csv[@from:to]");
   options.table.AddTo(verb);
-  AddTypeOptions(verb,
-                 "Use these signals alone, as if the others were not measured",
-                 "Valve type: a stored one, whose fault effects are taken as "
-                 "they are, or parameters that are fitted to the valve",
-                 options);
+  verb.add_option("--type", options.type,
+                  "Valve type: a stored one, whose fault effects are taken as "
+                  "they are, or parameters that are fitted to the valve")
+      ->type_name("NAME|FILE.toml")
+      ->capture_default_str();
+  verb.add_option("--signals", options.signals,
+                  "Use these signals alone, as if the others were not measured")
+      ->delimiter(',')
+      ->type_name("CV,X,...");
   verb.add_option("--save-type", options.save_type,
                   "Store the fitted parameters as a valve type for others of "
                   "its kind")
@@ -533,13 +537,14 @@ void AddOptions(CLI::App& verb, OnboardOptions& options) {
                   "Rate that the thresholds are set for")
       ->check(CLI::Range(1e-9, 3600.0))
       ->type_name("R");
-  verb.add_flag("!--no-fit", options.onboarding.fit,
-                "Take the parameters of the type as they are");
   verb.add_flag("!--no-coverage", options.onboarding.assess,
                 "Leave out the table of faults that can be detected");
   verb.add_flag("--gains", options.gains,
                 "Compute what each missing transmitter would add; takes the "
                 "time of an onboarding for each");
+  report::ShowInHelpAll(
+      verb, {"--resample", "--decimal", "--date", "--skip", "--save-type",
+             "--false-alarms-per-hour", "--no-coverage", "--gains"});
 }
 
 }  // namespace
@@ -551,26 +556,24 @@ void AddOnboardVerb(report::Program& program) {
       "Make models for a valve that has only ever been healthy, and assign "
       "them",
       [options](const report::Context& context) -> report::Report {
-        return options->plant.plant.empty()
-                   ? OnboardValve(*options, context)
-                   : OnboardFromTable(options->plant, options->files,
-                                      options->table, options->onboarding,
-                                      context);
+        if (!options->plant.plant.empty()) {
+          PlantVerbOptions plant = options->plant;
+          plant.jobs = options->jobs;
+          plant.dry_run = options->dry_run;
+          plant.valve = options->valve.empty() ? "*" : options->valve;
+          return OnboardFromTable(plant, options->files, options->table,
+                                  options->onboarding, context);
+        }
+        return options->dry_run ? Assess(*options, context)
+                                : OnboardValve(*options, context);
       });
   AddOptions(verb, *options);
   // The rows of a table state these, or leave nothing to choose: a type is
   // fitted once, and no row gets a table of faults.
-  for (const char* option :
-       {"--valve", "--runs", "--type", "--signals", "--save-type", "--name",
-        "--gains", "--no-fit", "--no-coverage", "--threads"}) {
+  for (const char* option : {"--runs", "--type", "--signals", "--save-type",
+                             "--name", "--gains", "--no-coverage"}) {
     verb.get_option("--plant")->excludes(verb.get_option(option));
   }
-  for (const char* option : {"--dry-run", "--jobs", "--rows"}) {
-    verb.get_option(option)->needs("--plant");
-  }
-  program.AddRemoved("onboard", "--shard",
-                     "--rows GLOB takes a part of the table, and processes may "
-                     "work on one data directory at a time");
   program.AddExamples(
       {{"onboard",
         {{"A valve of the plant that has only ever been healthy",
@@ -579,28 +582,10 @@ void AddOnboardVerb(report::Program& program) {
           "fdi-trainer onboard --valve FV-101 --file fv101.csv --gains"},
          {"All loops of a plant: what the table matches, then the work",
           "fdi-trainer onboard --plant plant.toml --dry-run"},
+         {"What could be seen of a valve with three transmitters",
+          "fdi-trainer onboard --dry-run --signals CV,X,F --gains"},
          {"The work; after an interruption the same command goes on",
           "fdi-trainer onboard --plant plant.toml"}}}});
-}
-
-void AddCoverageVerb(report::Program& program) {
-  auto options = std::make_shared<CoverageOptions>();
-  CLI::App& verb = program.AddVerb(
-      "coverage",
-      "Show which faults of a valve type can be seen with some transmitters",
-      [options](const report::Context& context) -> report::Report {
-        return Assess(*options, context);
-      });
-  AddTypeOptions(verb, "Signals that the valve measures", "Valve type",
-                 *options)
-      ->required();
-  verb.add_flag("!--no-gains", options->gains,
-                "Leave out what one more transmitter would add");
-  program.AddExamples({{"coverage",
-                        {{"What a valve with three transmitters can tell",
-                          "fdi-trainer coverage --signals CV,X,F"},
-                         {"Without what one more transmitter would add",
-                          "fdi-trainer coverage --signals CV,X --no-gains"}}}});
 }
 
 }  // namespace fdi::trainer

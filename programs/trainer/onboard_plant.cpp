@@ -184,7 +184,7 @@ report::Report ReportOf(const importer::PlantTable& table,
                      {"dry_run", options.dry_run},
                      {"counts", CountsJson(rows)},
                      {"rows", std::move(rows)},
-                     {"unused_tags", options.dry_run && options.rows == "*"
+                     {"unused_tags", options.dry_run && options.valve == "*"
                                          ? UnusedTags(jobs, files)
                                          : Json::array()}};
   std::vector<report::Column> columns = {
@@ -218,18 +218,6 @@ void PlantVerbOptions::AddTo(CLI::App& verb) {
                   "Table of valves and loops, a row each: onboards every row "
                   "with a type, audits the others (docs/plant.md)")
       ->type_name("FILE.toml|FILE.csv");
-  verb.add_flag("--dry-run", dry_run,
-                "With --plant: list matched, unmatched and ambiguous tags and "
-                "what is wrong with a row; store nothing");
-  verb.add_option("--jobs", jobs,
-                  "With --plant: rows at a time (default: one per core)")
-      ->check(CLI::Range(1, 1024))
-      ->type_name("N");
-  verb.add_option(
-          "--rows", rows,
-          "With --plant: rows with matching names only, for the jobs of "
-          "a scheduler")
-      ->type_name("GLOB");
 }
 
 report::Report OnboardFromTable(const PlantVerbOptions& options,
@@ -239,11 +227,11 @@ report::Report OnboardFromTable(const PlantVerbOptions& options,
                                 const report::Context& context) {
   importer::PlantTable table = importer::ReadPlantTable(options.plant);
   std::erase_if(table.rows, [&](const importer::PlantRow& row) {
-    return !GlobMatches(options.rows, row.name);
+    return !GlobMatches(options.valve, row.name);
   });
   if (table.rows.empty()) {
-    throw ConfigError("--rows " + options.rows + ": no row of " + table.source +
-                      " has a name like that");
+    throw ConfigError("--valve " + options.valve + ": no row of " +
+                      table.source + " has a name like that");
   }
   const auto folder = options.plant.parent_path();
   PlantSettings settings;

@@ -18,8 +18,8 @@ namespace fdi::trainer {
 /// Options of `onboard --plant`.
 struct PlantVerbOptions {
   std::filesystem::path plant;
-  int jobs{0};            ///< Rows at a time; 0: one per core.
-  std::string rows{"*"};  ///< Glob of names.
+  int jobs{0};             ///< Rows at a time; 0: one per core.
+  std::string valve{"*"};  ///< Glob of names.
   bool dry_run{false};
 
   void AddTo(CLI::App& verb);

@@ -20,6 +20,7 @@
 #include "import/tag_map.h"
 #include "programs/trainer/model_report.h"
 #include "programs/trainer/verbs.h"
+#include "report/help.h"
 #include "report/models/lineage_text.h"
 #include "report/program.h"
 #include "report/progress.h"
@@ -568,13 +569,9 @@ void AddOptions(CLI::App& verb, RelearnOptions& options) {
                   "Id of the valve; a glob where several share a set")
       ->required()
       ->type_name("VALVE");
-  verb.add_option("--from", options.window.since,
-                  "Recorded samples and labelled episodes from then on "
-                  "(default: since the observers were made)")
-      ->type_name("TIME");
-  verb.add_option("--to", options.window.until,
-                  "Recorded samples and labelled episodes before then")
-      ->type_name("TIME");
+  // Recorded samples and labelled episodes, by default all since the observers
+  // were made.
+  options.window.AddTo(verb);
   verb.add_option("--runs", options.runs,
                   "Healthy runs, or stretches of them [s] (default: all of the "
                   "valve that fdi-monitor run --record stored); for a set of "
@@ -603,13 +600,15 @@ void AddOptions(CLI::App& verb, RelearnOptions& options) {
                 "runs that are gone");
   verb.add_flag("--activate", options.activate,
                 "Take the new version into use even if it is worse");
-  verb.add_option("--threads", options.threads,
-                  "Number of threads; 0 uses all cores")
+  verb.add_option("--jobs", options.threads,
+                  "Number of threads; 0: one per core")
       ->check(CLI::Range(0, 1024))
       ->type_name("N");
   verb.add_flag("--dry-run", options.dry_run,
                 "Show what would be learnt and exit")
       ->configurable(false);
+  report::ShowInHelpAll(verb, {"--resample", "--decimal", "--date", "--skip",
+                               "--type", "--jobs"});
 }
 
 }  // namespace
@@ -621,16 +620,6 @@ void AddRelearnVerb(report::Program& program) {
       "take the better one",
       Relearn);
   AddOptions(verb, options);
-  const std::string instead = "fdi-trainer relearn VALVE ";
-  program.AddRemoved("", "limits",
-                     instead + "sets the limits by what was recorded since");
-  program.AddRemoved("train", "--from-labels",
-                     instead + "learns from what episodes were labelled");
-  program.AddRemoved(
-      "onboard", "--extend",
-      instead + "--models makes the models anew with more hours");
-  program.AddRemoved("onboard", "--accept",
-                     instead + "--activate takes a set that is worse");
   program.AddExamples(
       {{"relearn",
         {{"All that was recorded since, and what episodes were labelled",

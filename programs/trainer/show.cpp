@@ -165,9 +165,6 @@ void AddShowVerb(report::Program& program) {
       ->required()
       ->type_name("NAME[@VERSION]");
   verb.add_flag("--rules", options.rules, "Print the rules in words");
-  program.AddRemoved("show", "--pictures",
-                     "it is fdi-study pictures, which the source tree builds "
-                     "with -DFDI_BENCH=ON");
   program.AddExamples(
       {{"show",
         {{"Fit of every observer", "fdi-trainer show paper"},

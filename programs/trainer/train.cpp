@@ -205,8 +205,8 @@ void AddOptions(CLI::App& verb, TrainOptions& options) {
                   "Rate that the thresholds are set for")
       ->check(CLI::Range(1e-9, 3600.0))
       ->type_name("R");
-  verb.add_option("--threads", options.threads,
-                  "Number of threads; 0 uses all cores")
+  verb.add_option("--jobs", options.threads,
+                  "Number of threads; 0: one per core")
       ->check(CLI::Range(0, 1024))
       ->type_name("N");
   verb.add_flag("--activate", options.activate,

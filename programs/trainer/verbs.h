@@ -13,6 +13,5 @@ void AddCompareVerb(report::Program& program);
 void AddShowVerb(report::Program& program);
 void AddOnboardVerb(report::Program& program);
 void AddRelearnVerb(report::Program& program);
-void AddCoverageVerb(report::Program& program);
 
 }  // namespace fdi::trainer

@@ -9,7 +9,6 @@
 #include <SQLiteCpp/SQLiteCpp.h>
 #include <fcntl.h>
 #include <sqlite3.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include "base/headroom.h"
@@ -93,6 +92,31 @@ bool IsImmutable(const std::filesystem::path& path, Access access) {
   std::error_code error;
   return access == Access::kReader && ::access(folder.c_str(), W_OK) != 0 &&
          !std::filesystem::exists(WalPath(path), error) && !error;
+}
+
+// Whether SQLite finds the room for its shared memory.
+bool HasRoomToRead(SQLite::Database& connection) {
+  try {
+    connection.execAndGet("PRAGMA user_version");
+    return true;
+  } catch (const SQLite::Exception& error) {
+    return error.getErrorCode() != SQLITE_IOERR &&
+           error.getErrorCode() != SQLITE_FULL;
+  }
+}
+
+// SQLite calls a disk that is full an I/O error.
+void RefuseLackOfRoom(const std::filesystem::path& path) {
+  // The shared memory of a database (32 KiB) and the first pages of its log.
+  constexpr std::uintmax_t kNeeded = 65536;
+  const auto folder = path.has_parent_path() ? path.parent_path() : ".";
+  std::error_code error;
+  const auto room = std::filesystem::space(folder, error);
+  if (!error && room.available < kNeeded) {
+    Refuse<NoRoomError>(path,
+                        "the disk is full: " + std::to_string(room.available) +
+                            " bytes are free in " + folder.string());
+  }
 }
 
 // file:PATH?immutable=1, with the signs escaped that mean something in a URI.
@@ -206,19 +230,6 @@ bool SqliteError::IsOfValues() const {
          primary == SQLITE_TOOBIG || primary == SQLITE_RANGE;
 }
 
-OpenFiles::OpenFiles(std::filesystem::path database)
-    : path_(std::move(database)),
-      database_(IdOf("")),
-      wal_(IdOf("-wal")),
-      gate_(IdOf(".gate")) {}
-
-OpenFiles::Id OpenFiles::IdOf(const char* suffix) const {
-  struct stat facts {};
-  return stat((path_.string() + suffix).c_str(), &facts) == 0
-             ? Id({facts.st_dev, facts.st_ino})
-             : std::nullopt;
-}
-
 Database::Database(const std::filesystem::path& path, const Schema& schema,
                    Access access)
     : path_(path), schema_(schema), access_(access) {
@@ -226,9 +237,12 @@ Database::Database(const std::filesystem::path& path, const Schema& schema,
   if (access != Access::kReader) {
     gate_ = std::make_unique<WriteGate>(path);
   }
-  const bool immutable = IsImmutable(path, access);
-  connection_ = Connect(path, access, immutable);
+  OpenFiles::PutBackLogOf(path);
+  connection_ = Connect(path, access, IsImmutable(path, access));
   if (access == Access::kReader) {
+    if (!HasRoomToRead(*connection_) && WalBytes() == 0) {
+      connection_ = Connect(path, access, true);
+    }
     version_ = CheckIdentity(schema);
     if (version_ < schema.version()) {
       Refuse<OutdatedError>(
@@ -241,12 +255,17 @@ Database::Database(const std::filesystem::path& path, const Schema& schema,
     // Under the gate, so that two writers that open a new file do not both
     // create it.
     const GateHolder holder(*gate_, path);
-    version_ = CheckIdentity(schema);
-    Configure(schema);
-    if (version_ < schema.version()) {
-      Migrate(schema, version_);
-    } else {
-      FinishBackups(path_, version_);
+    try {
+      version_ = CheckIdentity(schema);
+      Configure(schema);
+      if (version_ < schema.version()) {
+        Migrate(schema, version_);
+      } else {
+        FinishBackups(path_, version_);
+      }
+    } catch (const SqliteError&) {
+      RefuseLackOfRoom(path);
+      throw;
     }
   }
   // A connection that has read in WAL mode keeps its WAL until it is closed.
@@ -254,16 +273,21 @@ Database::Database(const std::filesystem::path& path, const Schema& schema,
   files_ = OpenFiles(path);
 }
 
-Database::~Database() = default;
+// SQLite deletes its files by name.
+Database::~Database() {
+  files_.PutBack();
+}
 
 bool Database::Refresh() {
+  files_.PutBack();
   if (files_.InPlace()) {
     return false;
   }
-  if (files_.HasDatabase() && !files_.HasWal()) {
+  if (files_.HasDatabase() && !files_.HasLog()) {
     Refuse(path_,
-           "its -wal was deleted or replaced, and others cannot read "
-           "what it held: end every program that has the file open");
+           "its -wal or -shm was deleted or replaced, and others cannot read "
+           "what it held: write nothing here by other programs, and end "
+           "those that have the file open");
   }
   // Another database would take our WAL for its own.
   if (files_.LeftWal()) {
@@ -311,6 +335,7 @@ int Database::CheckIdentity(const Schema& schema) {
                         "): read it as a user who may write to its folder, or "
                         "read a copy that fdi-store backup has made");
     }
+    RefuseLackOfRoom(path_);
     Refuse(path_, error.what());
   }
   // A program that was stopped before it had committed its first migration
@@ -693,6 +718,7 @@ void Transaction::Commit() {
   database_.Execute("COMMIT");
   open_ = false;
   database_.gate_->Leave();
+  database_.files_.PutBack();
   if (!database_.files_.InPlace()) {
     throw SqliteError(SQLITE_READONLY_DBMOVED,
                       database_.path().string() +

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "base/error.h"
+#include "storage/database/open_files.h"
 
 namespace SQLite {
 class Database;
@@ -101,6 +102,13 @@ struct Schema {
 /// The file is sound, but not yet what a reader can read: it has an older
 /// version, or nothing in it. A writer that opens it brings it up to date.
 class OutdatedError : public DataError {
+ public:
+  using DataError::DataError;
+};
+
+/// The disk has no room for what opening a database takes. What nobody has open
+/// can be read all the same.
+class NoRoomError : public DataError {
  public:
   using DataError::DataError;
 };
@@ -226,34 +234,6 @@ class Statement {
   bool writes_{false};
 };
 
-/// The files of a database as they were opened, to notice that one was deleted
-/// or replaced. SQLite itself does not: what it then writes is in no file that
-/// anybody else can open. A copy that overwrites a file in place is not
-/// noticed.
-class OpenFiles {
- public:
-  OpenFiles() = default;
-  explicit OpenFiles(std::filesystem::path database);
-
-  /// Whether all are still the files of these names.
-  bool InPlace() const { return HasDatabase() && HasWal() && HasGate(); }
-  bool HasDatabase() const { return database_ && IdOf("") == database_; }
-  bool HasWal() const { return !wal_ || IdOf("-wal") == wal_; }
-  /// Whether our WAL lies beside another database, or none.
-  bool LeftWal() const { return wal_ && HasWal() && !HasDatabase(); }
-
- private:
-  /// Device and inode; nothing if there is no such file.
-  using Id = std::optional<std::pair<std::uint64_t, std::uint64_t>>;
-  bool HasGate() const { return !gate_ || IdOf(".gate") == gate_; }
-  Id IdOf(const char* suffix) const;
-
-  std::filesystem::path path_;
-  Id database_;
-  Id wal_;
-  Id gate_;
-};
-
 /// One connection to one of the three databases. Not thread safe: it may be
 /// handed over, e.g. to a thread started later, but concurrent use by two
 /// threads corrupts its statements.
@@ -263,11 +243,13 @@ class Database {
  public:
   /// Opens `path`. Writers create it (not its folder) and migrate it forward in
   /// one transaction, after saving a copy of an older file beside it. A reader
-  /// that may not write to the folder, as SQLite's shared memory needs, reads a
-  /// file that nobody has open, which is one without a WAL, as immutable.
+  /// that cannot write to the folder, as SQLite's shared memory needs, because
+  /// it may not or because the disk is full, reads a file that nobody has open,
+  /// which is one without a WAL, as immutable.
   /// @throws DataError naming file and reason: folder missing, no permission,
   ///   not a database, another application_id, a version that is newer, or
-  ///   older than the baseline. @throws OutdatedError for a reader.
+  ///   older than the baseline. @throws OutdatedError for a reader,
+  ///   NoRoomError.
   /// @throws SqliteError if SQLite fails otherwise.
   Database(const std::filesystem::path& path, const Schema& schema,
            Access access);
@@ -342,8 +324,8 @@ class Database {
   Access access_;
   int version_{0};
   std::unique_ptr<WriteGate> gate_;  // Null for a reader.
+  OpenFiles files_;                  // Outlives the connection.
   std::unique_ptr<SQLite::Database> connection_;
-  OpenFiles files_;
   std::map<std::string, Statement, std::less<>> cached_;
 };
 

@@ -176,16 +176,18 @@ ON CONFLICT (episode_id, kind, stamp_ns) DO NOTHING
 UPDATE episode SET acked_by = ?, acked_ns = ?
 WHERE episode_id = ? AND acked_by IS NULL
 -- name: insert_unsent
-INSERT INTO event_outbox (event_id) VALUES (?)
+INSERT INTO event_outbox (event_id, seq, source_id, fault_bits, factor,
+  strength, candidates)
+VALUES (?, ?, ?, ?, ?, ?, ?)
 -- name: delete_unsent
 DELETE FROM event_outbox WHERE event_id = (
   SELECT event_id FROM episode_event
   WHERE episode_id = ? AND kind = ? AND stamp_ns = ?)
 -- In the order of commitment.
 -- name: unsent_events
-SELECT v.event_id, v.episode_id, v.kind, e.valve_id, e.source_id, v.stamp_ns,
-  e.detected_ns, v.fault_bits, v.factor, v.strength, v.reason, v.faults,
-  e.model_set, e.model_hash, v.priority
+SELECT v.event_id, v.episode_id, v.kind, e.valve_id, o.source_id, o.seq,
+  v.stamp_ns, e.detected_ns, o.fault_bits, o.factor, o.strength, v.reason,
+  o.candidates, e.model_set, e.model_hash, v.priority
 FROM event_outbox o JOIN episode_event v USING (event_id)
   JOIN episode e USING (episode_id)
 ORDER BY v.event_id
@@ -462,8 +464,11 @@ SELECT s.episode_id, s.kind, s.stamp_ns, s.recorded_ns, s.faults, s.fault_bits,
 FROM source.episode_event s JOIN source.episode e USING (episode_id)
 WHERE e.valve_id = ? AND e.ended_ns IS NULL ORDER BY s.event_id
 -- name: copy_open_outbox
-INSERT OR IGNORE INTO event_outbox
-SELECT t.event_id FROM source.event_outbox o
+INSERT OR IGNORE INTO event_outbox (event_id, seq, source_id, fault_bits,
+  factor, strength, candidates)
+SELECT t.event_id, o.seq, o.source_id, o.fault_bits, o.factor, o.strength,
+  o.candidates
+FROM source.event_outbox o
   JOIN source.episode_event s USING (event_id)
   JOIN source.episode e USING (episode_id)
   JOIN main.episode_event t USING (episode_id, kind, stamp_ns)

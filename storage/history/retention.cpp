@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "base/time_units.h"
+#include "storage/database/locks.h"
 #include "storage/history/health.h"
 #include "storage/history/history_database.h"
 #include "storage/history/sql.h"
@@ -158,31 +159,46 @@ std::uintmax_t CountHealth(Database& database, const std::string& valve,
   return row.Uint64(3);
 }
 
-}  // namespace
-
-PruneResult PruneRuns(const std::filesystem::path& path,
-                      const RetentionLimits& limits) {
-  // One run per transaction: its chunks, 144 for a day at 1 Hz, are deleted
-  // with it, and the recorder waits meanwhile.
-  return Pruner(path,
-                {RunsSchema(), sql::run_candidates,
-                 "DELETE FROM run WHERE run_id = ?", sql::protected_runs, 1},
-                limits)
-      .Run();
+// Runs `prune` on the database. On a full disk, where nothing can be written,
+// it works on a copy in the folder for temporary files, and what is left then
+// replaces the contents of the file: it is smaller, so that it has room. The
+// copy is complete until that is done.
+template <typename Prune>
+PruneResult PruneInPlaceOrCopy(const std::filesystem::path& path,
+                               const Schema& schema, Prune prune) {
+  try {
+    return prune(path);
+  } catch (const NoRoomError&) {
+    const auto copy =
+        std::filesystem::temp_directory_path() /
+        (path.filename().string() + "." + std::to_string(UtcNow()) + ".pruned");
+    const std::filesystem::path packed = copy.string() + ".packed";
+    WriteGate gate(path);
+    const GateHolder holder(gate, path);
+    Database(path, schema, Access::kReader).BackupTo(copy);
+    const PruneResult result = prune(copy);
+    Database(copy, schema, Access::kReader).BackupTo(packed);
+    if (result.deleted > 0) {
+      std::filesystem::copy_file(
+          packed, path, std::filesystem::copy_options::overwrite_existing);
+    }
+    for (const auto& left :
+         {packed, copy, std::filesystem::path(copy.string() + ".gate")}) {
+      std::filesystem::remove(left);
+    }
+    return result;
+  }
 }
 
-PruneResult PruneHistory(const std::filesystem::path& path,
-                         const RetentionLimits& limits) {
-  return Pruner(path,
-                {HistorySchema(), sql::episode_candidates,
-                 "DELETE FROM episode WHERE rowid = ?", sql::protected_episodes,
-                 20},
-                limits)
-      .Run();
+PruneResult PruneItems(const std::filesystem::path& path, const Items& items,
+                       const RetentionLimits& limits) {
+  return PruneInPlaceOrCopy(path, items.schema, [&](const auto& file) {
+    return Pruner(file, items, limits).Run();
+  });
 }
 
-PruneResult PruneHealth(const std::filesystem::path& path,
-                        const RetentionLimits& limits) {
+PruneResult PruneHealthOf(const std::filesystem::path& path,
+                          const RetentionLimits& limits) {
   Database database(
       path, HistorySchema(),
       limits.dry_run ? Access::kReader : Access::kOccasionalWriter);
@@ -207,6 +223,35 @@ PruneResult PruneHealth(const std::filesystem::path& path,
       limits.dry_run ? result.bytes_before - std::min(gone, result.bytes_before)
                      : database.UsedBytes();
   return result;
+}
+
+}  // namespace
+
+PruneResult PruneRuns(const std::filesystem::path& path,
+                      const RetentionLimits& limits) {
+  // One run per transaction: its chunks, 144 for a day at 1 Hz, are deleted
+  // with it, and the recorder waits meanwhile.
+  return PruneItems(
+      path,
+      {RunsSchema(), sql::run_candidates, "DELETE FROM run WHERE run_id = ?",
+       sql::protected_runs, 1},
+      limits);
+}
+
+PruneResult PruneHistory(const std::filesystem::path& path,
+                         const RetentionLimits& limits) {
+  return PruneItems(
+      path,
+      {HistorySchema(), sql::episode_candidates,
+       "DELETE FROM episode WHERE rowid = ?", sql::protected_episodes, 20},
+      limits);
+}
+
+PruneResult PruneHealth(const std::filesystem::path& path,
+                        const RetentionLimits& limits) {
+  return PruneInPlaceOrCopy(path, HistorySchema(), [&](const auto& file) {
+    return PruneHealthOf(file, limits);
+  });
 }
 
 }  // namespace fdi::storage

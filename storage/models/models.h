@@ -247,8 +247,6 @@ class ModelStore {
   ValveType LoadTemplate(std::string_view name);
   /// Ordered by name, without bytes.
   std::vector<ValveType> ListTemplates();
-  /// @throws NotFoundError
-  void DeleteTemplate(std::string_view name);
 
   /// The first entry whose pattern matches.
   std::optional<ValveEntry> FindValve(std::string_view valve_id);

@@ -480,11 +480,4 @@ std::vector<ValveType> ModelStore::ListTemplates() {
   return types;
 }
 
-void ModelStore::DeleteTemplate(std::string_view name) {
-  LoadTemplate(name);  // Throws if it does not exist.
-  Transaction transaction(database_);
-  database_.Run("DELETE FROM valve_type WHERE name = ?", name);
-  transaction.Commit();
-}
-
 }  // namespace fdi::storage

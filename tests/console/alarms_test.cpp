@@ -89,6 +89,35 @@ TEST_F(AlarmBookTest, TellsSinceWhenTheHistoryIsAway) {
   Begin("V");
   EXPECT_TRUE(book.Refresh(kDetected).empty()) << "the first one";
   EXPECT_FALSE(book.away());
+  EXPECT_EQ(book.Stored().rows.size(), 1U);
+  EXPECT_EQ(book.Stored().note, "");
+}
+
+// Who asks for the alarms does not wait for a database that is locked.
+TEST_F(AlarmBookTest, HasTheAlarmsOfTheLastAnswer) {
+  Begin("V");
+  bool away = false;
+  AlarmBook book(
+      [&]() -> std::unique_ptr<storage::History> {
+        if (away) {
+          throw storage::HistoryAwayError("PostgreSQL: lock timeout");
+        }
+        return std::make_unique<storage::HistoryReader>(path_);
+      },
+      texts_);
+  EXPECT_TRUE(book.Stored().rows.empty());
+  book.Refresh(kDetected);
+  away = true;
+  std::filesystem::remove(path_);
+  EXPECT_ANY_THROW(book.Refresh(kDetected));
+  EXPECT_ANY_THROW(book.Refresh(kDetected));
+
+  const AlarmBook::Rows stored = book.Stored();
+
+  ASSERT_EQ(stored.rows.size(), 1U);
+  EXPECT_EQ(stored.rows[0]["valve"], "V");
+  EXPECT_EQ(stored.note,
+            "as of the last answer of the history: PostgreSQL: lock timeout");
 }
 
 // As on the page of a plant: the history comes later, by shipping.

@@ -21,7 +21,7 @@ let address;
 before(async () => {
   [browser] = await Promise.all([launch(), plant.train()]);
   ({address} = await plant.startMonitor());
-  plant.simulate('--valve', 'FV', '--valves', String(kValves), '--duration',
+  plant.simulate('--valve', 'FV', '--count', String(kValves), '--duration',
       '3600', '--speed', '1');
 });
 

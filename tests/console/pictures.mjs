@@ -43,15 +43,15 @@ try {
   simulate('U2-PV-301', '--fault', 'f19:abrupt@400:strength=0.5');
   simulate('U1-LV-204', '--fault', 'f6:abrupt@250:strength=0.6');
   simulate('U2-FV-108', '--fault', 'f3:abrupt@100:strength=0.5');
-  simulate('U1-FV', '--valves', '9');
-  simulate('U2-FV', '--valves', '8');
+  simulate('U1-FV', '--count', '9');
+  simulate('U2-FV', '--count', '8');
   simulate('U3-TV-11');
   const silent = simulate('U3-TV-12');
 
   const listed = async () => JSON.parse(await plant.run('fdi-store', 'history',
       'list', '--json')).episodes.filter((row) => row.fault);
   await until(async () => (await listed()).length >= 3, 'three names', 120000);
-  await plant.run('fdi-store', 'history', 'ack', '--all', '--valve',
+  await plant.run('fdi-store', 'history', 'ack', '--valve',
       'U2-FV-108', '--by', 'anna', '--comment', 'at the next stop');
   silent.kill('SIGKILL');
   // The data of all others still come, and are as new as can be.

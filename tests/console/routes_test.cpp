@@ -129,6 +129,15 @@ TEST_F(ConsoleRoutesTest, WhatIsPartlyJudgedIsNotCalledNormal) {
   EXPECT_EQ(blind["state"], "PARTLY_JUDGED");
   EXPECT_EQ(blind["blind"], true);
 
+  verdict.confidence = 1.0;
+  verdict.intake = Intake::kSuperseded;
+  monitor::ValveOutcome outcome{verdict, models.get(), false};
+  outcome.contested = true;
+  console_->live().OnVerdict("V1", monitor::PlantSample(3), outcome);
+  const Json contested = Get("/api/v1/valves")["valves"][0];
+  EXPECT_EQ(contested["state"], "PARTLY_JUDGED");
+  EXPECT_EQ(contested["contested"], true);
+
   verdict.quality = Quality::kBadInput;
   verdict.intake = Intake::kRange;
   const Json refused = show(monitor::PlantSample(3, 1e6));

@@ -296,6 +296,7 @@ test('what is judged in part only is said, with the reason', async () => {
   monitor.reset([tile('half', 'PARTLY_JUDGED', [],
       {missing: ['P1'], unjudged: ['F']}),
   tile('wide', 'PARTLY_JUDGED', [], {blind: true}),
+  tile('twin', 'PARTLY_JUDGED', [], {contested: true}),
   tile('bar', 'NOT_JUDGED', [], {quality: 'BAD_INPUT',
     refused: {reason: 'range', signals: ['P1'], flow_unit: 'm3/h'}}),
   tile('mass', 'NOT_JUDGED', [], {quality: 'BAD_INPUT',
@@ -307,11 +308,12 @@ test('what is judged in part only is said, with the reason', async () => {
 
   assert.match(await said('half'), /Partly judged[^]*no P1; F not judged/);
   assert.match(await said('wide'), /limits too wide to see a fault/);
+  assert.match(await said('twin'), /two publishers send it, the newest counts/);
   assert.match(await said('bar'), /bad input: P1 implausible: in another unit/);
   assert.match(await said('mass'), /flow in another unit than m³\/h/);
   assert.deepEqual(await page.locator('.tile .tile-id').allTextContents(),
-      ['bar', 'half', 'mass', 'wide', 'well']);
-  await page.getByRole('button', {name: /Not or partly judged 4/}).waitFor();
+      ['bar', 'half', 'mass', 'twin', 'wide', 'well']);
+  await page.getByRole('button', {name: /Not or partly judged 5/}).waitFor();
 
   monitor.answers['valves/half/trend'] = {...trend({state: 'NORMAL', d0: 1,
     d: [0, 0]}), words: 'as the normal model expects'};

@@ -116,19 +116,6 @@ ModelSet SlowPlant() {
   return models;
 }
 
-// What a fault explains that looks normal is too little for a name.
-TEST_F(EpisodeTest, NothingIsNamedBesideAFaultThatLooksNormal) {
-  ModelSet models = SlowPlant();
-  models.undetectable = {6};
-  Use(models);
-  Explained(kF3 | kF6, 2 * models.decision.isolation_samples);
-  EXPECT_EQ(verdict_.state, State::kDetected);
-  EXPECT_EQ(verdict_.isolated, 0U);
-  EXPECT_EQ(verdict_.unknown, Unknown::kTooEarly);
-  Explained(kF3, 2 * models.decision.isolation_samples);
-  EXPECT_EQ(verdict_.isolated, kF3);
-}
-
 // The evidence tells nothing apart.
 ModelSet Blurred(ModelSet models) {
   for (Observer& observer : models.observers) {

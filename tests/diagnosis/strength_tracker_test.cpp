@@ -257,39 +257,6 @@ TEST(FaultBankTest, FlowAtAPositionIsJudgedByTheNeighbourThatKnowsIt) {
   EXPECT_TRUE(Fits(0.25, 2));
 }
 
-// Where F is at its limit f6 differs from normal operation nowhere.
-TEST(FaultBankTest, FaultIsNotNamedForWantOfEvidence) {
-  const ModelSet models = SaturatingPlant();
-  const double threshold = models.decision.isolation_threshold;
-  const auto f6 = static_cast<std::size_t>(FaultIndex(models, 6));
-  ObserverBank bank(models);
-  FaultBank faults(models);
-  Verdict verdict;
-  Noise noise(5);
-  std::uint64_t k = 0;
-  bank.Initialise(SaturatingSample(k, 10.0, 0.0, noise));
-  faults.Restart();
-  const auto step = [&](double cv, double fault) {
-    Sample sample = SaturatingSample(++k, cv, 0.0, noise);
-    if (cv > 60.0) {
-      AddF6(sample, fault);
-    }
-    bank.Step(sample);
-    faults.Score(bank, verdict);
-    faults.Update(bank);
-    faults.ApplyEvidence(verdict);
-  };
-  for (int i = 0; i < 50; ++i) {
-    step(10.0, 1.0);
-    EXPECT_LE(verdict.fault_factors[f6], 0.5 * threshold);
-  }
-  EXPECT_EQ(verdict.fault_factors[f6], 0.5 * threshold);  // a candidate
-  for (int i = 0; i < 20; ++i) {
-    step(70.0, 1.0);
-  }
-  EXPECT_EQ(verdict.fault_factors[f6], 1.0);
-}
-
 // f3 at .75, midway between its strengths, where the flow is off by a few per
 // cent of the effect: enough for f6 to gather more evidence in the long run,
 // and no reason to drop f3. At the trained strength 1, nothing is allowed for.

@@ -77,7 +77,7 @@ for valve in $valves; do
 done
 start --record --model-set quick
 for valve in $valves; do
-  "$bin/fdi-simulator" --domain "$domain" replay --csv "$valve.stamped.csv" \
+  "$bin/fdi-simulator" --domain "$domain" replay --file "$valve.stamped.csv" \
     --valve "$valve" --keep-stamps --speed max >/dev/null 2>replay.log
 done
 stop

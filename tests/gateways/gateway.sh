@@ -41,7 +41,7 @@ port=$((16000 + domain))  # No ephemeral one, nor one of a test's domain.
 "$bin/fdi-simulator" run --no-publish --duration $count --seed 7 \
   --parameters paper-operating-point --fault f19:abrupt@200:strength=0.5 \
   --set excitation.amplitude_pct=8 --set excitation.period_s=80 \
-  --export valve.csv --log-level error >/dev/null
+  -o valve.csv --log-level error >/dev/null
 start --record --model-set quick
 
 if [ "$way" = opcua ]; then

@@ -79,19 +79,19 @@ TEST(CsvTest, ColumnsAreFoundByNameInAnyOrderAndCase) {
 }
 
 TEST(CsvTest, NameAndSizeOfTheFirstCellTellTheFormOfTimes) {
-  const auto form = [](const char* name, double first) {
-    return TimeUnitOf(name, first).form;
+  const auto unit = [](const char* name, double first) {
+    return std::string(TimeUnitName(TimeUnitOf(name, first)));
   };
-  EXPECT_EQ(form("t_s", 1.7e9), TimeForm::kElapsed);
-  EXPECT_EQ(form("Time", 46027.4), TimeForm::kSerial);
-  EXPECT_EQ(form("Time", 30000.0), TimeForm::kElapsed);
-  EXPECT_EQ(form("Time", 1.7e9), TimeForm::kUnix);
+  EXPECT_EQ(unit("t_s", 1.7e9), "s");
+  EXPECT_EQ(unit("Time", 46027.4), "serial");
+  EXPECT_EQ(unit("Time", 30000.0), "s");
+  EXPECT_EQ(unit("Time", 1.7e9), "unix");
   for (const char* name : {"time_s", "Time [s]", "Zeit (s)"}) {
-    EXPECT_EQ(form(name, 30000.5), TimeForm::kElapsed) << name;
-    EXPECT_EQ(form(name, 1.7e9), TimeForm::kUnix) << name;
+    EXPECT_EQ(unit(name, 30000.5), "s") << name;
+    EXPECT_EQ(unit(name, 1.7e9), "unix") << name;
   }
-  EXPECT_EQ(TimeUnitOf("Zeit [ms]", 250.0).scale, 1e-3);
-  EXPECT_EQ(TimeUnitOf("ts", 1.7e15).scale, 1e-6);
+  EXPECT_EQ(unit("Zeit [ms]", 250.0), "ms");
+  EXPECT_EQ(unit("ts", 1.7e15), "unix us");
 }
 
 TEST(CsvTest, TruthNeedsAStrengthOtherThanZero) {
@@ -255,7 +255,7 @@ TEST(CsvTest, SplitGapsBeginsARunAtEachGap) {
 TEST(CsvTest, AMapRenamesScalesAndTurnsColumns) {
   CsvOptions options;
   options.map.time_column = "ms";
-  options.map.time_scale = 1e-3;
+  options.map.time_unit = *FindTimeUnit("ms");
   options.map.columns = {
       {"LIC01.OP", Signal::kCv, 1.0, 0.0, Sense::kOpening},
       {"PI02", Signal::kP1, 100.0, 101.3, Sense::kClosing},  // bar gauge

@@ -1,8 +1,10 @@
 // Exports of every kind, as their users have them: what sniff writes, the
 // importer reads, and both find the same readings.
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdlib>
+#include <filesystem>
 #include <fstream>
 #include <functional>
 #include <map>
@@ -670,7 +672,7 @@ TEST(KindsTest, TimesWithoutADateCountFromTheStart) {
     ASSERT_EQ(c.time(0), c.first);
     const std::string text = Wide("Time,17FC.OP,17ZT.PV,17FT.PV", c.time);
     const ColumnMap map = MapOf(text, Utc());
-    EXPECT_EQ(map.time_form, TimeForm::kClock);
+    EXPECT_EQ(map.time_unit.form, TimeForm::kClock);
     CsvTable table;
     ASSERT_NO_THROW(table =
                         ReadCsv(text, {.map = map, .start_ns = 7'000'000'000}));
@@ -1043,6 +1045,11 @@ TEST(KindsTest, TagsOfAPlantAreToldApartTogether) {
             {"Rückführung [%]", "x"},
             {"Menge [t/h]", "f"},
             {"Vordruck (bar ü)", "p1"}},
+           {{"Ventil Sollwert", "cv"},
+            {"Ventil Istwert", "x"},
+            {"FT7", "f"},
+            {"Druck 2 [bar]", "p2"},
+            {"PT7 [bar]", "p1"}},
            {{"consigne vanne", "cv"},
             {"position vanne", "x"},
             {"débit", "f"},
@@ -1246,6 +1253,269 @@ TEST(KindsTest, TheReferenceFilesGiveWhatTheirTableSays) {
       EXPECT_THAT(error.what(), HasSubstr(says));
     }
   }
+}
+
+// What sniff writes, the importer takes: of every file, or it says why not.
+TEST(KindsTest, EveryReferenceFileIsReadWithItsMapOrRefusedForAReason) {
+  const char* folder = std::getenv("FDI_REFERENCE_DATA");
+  if (folder == nullptr) {
+    GTEST_SKIP() << "FDI_REFERENCE_DATA is not set";
+  }
+  const std::map<std::string, const char*> refused = {
+      {"a17_etl_headerless.csv", "the first row holds values"},
+      {"b04_level_loop.csv", "neither a position (X) nor a flow (F)"},
+      {"p02_datalink_pairs.csv", "each value has a time of its own"},
+      {"p03_23FIC101.OP.csv", "missing column CV_pct"},
+      {"p03_23FT101.PV.csv", "missing column CV_pct"},
+      {"p03_23ZT101.PV.csv", "missing column CV_pct"},
+      {"p05_report_by_exception.jsonl", "is JSON lines, not a table"},
+      {"p06_minute_stamps.csv", "the seconds are missing"},
+      {"p08_niagara_FT101_Flow.csv", "missing column CV_pct"},
+      {"p08_niagara_FV101_Cmd.csv", "missing column CV_pct"},
+      {"p08_niagara_FV101_Pos.csv", "missing column CV_pct"},
+      {"p10_historian_odata.json", "is JSON of OData, not a table"},
+      {"p10_lineprotocol.txt", "is line protocol, not a table"},
+      // Loops, which are audited.
+      {"p11_ahu_0311_cooling_stuck_closed_TIC1C.csv", "neither a position"},
+      {"p11_ahu_20080819_healthy_TIC1C.csv", "neither a position"},
+      {"p11_ahu_20090503_healthy_TIC1C.csv", "neither a position"},
+      {"p12_temperature_slow_load_1.csv", "neither a position"}};
+  std::size_t files = 0;
+  for (const char* collection : {"/cases", "/cases-4"}) {
+    for (const auto& entry : std::filesystem::directory_iterator(
+             std::string(folder) + collection)) {
+      const std::string name = entry.path().filename();
+      if (name.ends_with(".md") || name.ends_with(".toml")) {
+        continue;
+      }
+      SCOPED_TRACE(name);
+      ++files;
+      std::string said;
+      try {
+        const TextLines lines = TextLines::OfFile(entry.path());
+        ColumnMap zone = Utc();
+        zone.zone = name.starts_with("a12") ? "Europe/Berlin" : "UTC";
+        const ColumnMap map = ReadTagMapText(
+            MapText(Sniff(lines, name, zone), name), "map of " + name);
+        const CsvTable table = ReadCsv(
+            lines,
+            {.source = name, .map = map, .required = 0, .split_gaps = true});
+        EXPECT_FALSE(table.runs.empty());
+      } catch (const DataError& error) {
+        said = error.what();
+      }
+      const auto reason = refused.find(name);
+      if (reason == refused.end()) {
+        EXPECT_EQ(said, "");
+      } else {
+        EXPECT_THAT(said, HasSubstr(reason->second));
+      }
+    }
+  }
+  EXPECT_GE(files, 50U);
+}
+
+// F is a type there, and no Fahrenheit.
+TEST(KindsTest, ARowOfTypesSaysNothingOfUnits) {
+  const Sniffed found = Sniff(
+      "\"#NAMES\"\n\"t_stamp\",\"FV1/Out\",\"FV1/Pos\",\"FT1/PV\"\n"
+      "\"#TYPES\"\n\"date\",\"D\",\"D\",\"F\"\n\"#ROWS\",\"120\"\n" +
+          Rows([](std::size_t k) { return Iso(k) + "," + Plain(k); }),
+      "plant.csv", Utc());
+  EXPECT_EQ(found.columns.at(2).signal, Signal::kF);
+  EXPECT_EQ(found.columns.at(2).unit, "m3/h");
+}
+
+TEST(KindsTest, WordsOfAModeColumnGoIntoTheMap) {
+  const auto text = [](const char* by_hand) {
+    return "time,FIC1.OP,ZT1.PV,FT1 [t/h],FIC1.MODE\n" +
+           Rows([&](std::size_t k) {
+             return Iso(k) + "," + Plain(k) + "," + (k < 60 ? "Auto" : by_hand);
+           });
+  };
+  const ColumnMap map = MapOf(text("Man"), Utc());
+  EXPECT_EQ(map.mode_column, "FIC1.MODE");
+  const auto mode = [](const std::string& table, const ColumnMap& columns,
+                       std::size_t k) {
+    return ReadCsv(table, {.map = columns})
+        .runs.at(0)
+        .samples.at(k)
+        .sample.mode;
+  };
+  EXPECT_EQ(mode(text("Man"), map, 59), ValveMode::kAuto);
+  EXPECT_EQ(mode(text("Man"), map, 60), ValveMode::kManual);
+  // Words of one plant: the map says what they mean.
+  const std::string own = text("Hand");
+  EXPECT_EQ(MapOf(own, Utc()).mode_column, "");
+  EXPECT_THROW(mode(own, map, 60), DataError);
+  const ColumnMap words =
+      ReadTagMapText(MapText(Sniff(own, "own.csv", Utc()), "own.csv") +
+                         "[mode]\ncolumn = \"FIC1.MODE\"\n"
+                         "manual = [\"HAND\"]\n",
+                     "own.toml");
+  EXPECT_EQ(mode(own, words, 60), ValveMode::kManual);
+}
+
+TEST(KindsTest, MillisecondsMayHaveAColumnOfTheirOwn) {
+  const std::string text =
+      "Time,Milliseconds,FV1 OP,FV1 ZT,FT1 F\n" + Rows([](std::size_t k) {
+        return Clock("%Y-%m-%d %H:%M:%S,", k / 2) +
+               (k % 2 == 0 ? "0," : "500,") + Plain(k);
+      });
+  const CsvTable table = ReadCsv(text, {.map = MapOf(text, Utc())});
+  ASSERT_EQ(table.runs.size(), 1U);
+  EXPECT_EQ(table.runs[0].period_s, 0.5);
+  EXPECT_EQ(table.runs[0].samples.size(), kRows);
+}
+
+TEST(KindsTest, QualitiesInBracesAreNoTags) {
+  const std::string text =
+      "Timestamp,Trend Flags,Status,FC1.OP,ZT1.PV,FT1 [t/h],State\n" +
+      Rows([](std::size_t k) {
+        return Iso(k) + ",{},{ok}," + Plain(k) + (k == 7 ? ",{down}" : ",{ok}");
+      });
+  ColumnMap map = MapOf(text, Utc());
+  map.resampling.reset();
+  const auto samples = ReadCsv(text, {.map = map}).runs.at(0).samples;
+  EXPECT_TRUE(samples.at(6).sample.Has(Signal::kF));
+  EXPECT_FALSE(samples.at(7).sample.Has(Signal::kF));
+}
+
+TEST(KindsTest, MinutesWithoutSecondsAndOtherFormsAreRefusedByName) {
+  const auto said = [](const std::string& text) {
+    try {
+      ReadCsv(text, {.map = MapOf(text, Utc())});
+    } catch (const DataError& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  EXPECT_THAT(
+      said(Wide("time,FC1.OP,ZT1.PV,FT1",
+                [](std::size_t k) { return Clock("%Y-%m-%d %H:%M", k); })),
+      HasSubstr("the seconds are missing"));
+  EXPECT_THAT(said("{\"@odata.context\": \"x\", \"value\": []}\n"),
+              HasSubstr("is JSON of OData, not a table; try: jq"));
+  EXPECT_THAT(said("[{\"time\": 1, \"tag\": 2}]\n"),
+              HasSubstr("is JSON, not a table; try: jq"));
+  EXPECT_THAT(said("valve,tag=FV1 cv=45.1,x=45.0 1773129600000000000\n"),
+              HasSubstr("is line protocol, not a table; try: awk"));
+}
+
+// Whatever changes is written, with empty cells beside it: values hold.
+TEST(KindsTest, ATableByExceptionIsHeld) {
+  std::string text = "time,FC1.OP [%],ZT1.PV [%],FT1 [t/h]\n";
+  for (std::size_t k = 0; k < kRows; ++k) {
+    const std::size_t at = k + k / 3;
+    text += Iso(at) + "," + (k % 2 == 0 ? Fixed(kValve.cv[k]) : "") + "," +
+            (k % 5 < 2 ? Fixed(kValve.x[k]) : "") + "," +
+            (k % 3 == 0 ? Fixed(kValve.f[k]) : "") + "\n";
+  }
+  const Sniffed found = Sniff(text, "plant.csv", Utc());
+  EXPECT_TRUE(found.compressed);
+  EXPECT_EQ(found.resample, "1s:hold:10min");
+}
+
+// Three tags at a sample a second, a third of a second apart.
+TEST(KindsTest, StampsOfSeveralTagsMakeNoPeriod) {
+  const std::string text =
+      "Tag,Time,Value\n" +
+      Tall(
+          [](std::size_t k, const std::string& tag, double value) {
+            const char* part = tag == "17FC.OP"   ? ".0"
+                               : tag == "17ZT.PV" ? ".365"
+                                                  : ".731";
+            return tag + "," + Clock("%Y-%m-%dT%H:%M:%S", k) + part + "Z," +
+                   Fixed(value);
+          },
+          false);
+  const Sniffed found = Sniff(text, "plant.csv", Utc());
+  EXPECT_EQ(found.period_s, 1.0);
+  EXPECT_EQ(found.resample, "1s:linear");
+  EXPECT_NO_THROW(ReadCsv(text, {.map = MapOf(text, Utc())}));
+}
+
+TEST(TagMapTest, TheFlowOfAPressureDifferenceGoesWithItsRoot) {
+  const ColumnMap map = ReadTagMapText(
+      "[signal.CV]\ncolumn = \"OP\"\n[signal.F]\ncolumn = \"DP\"\n"
+      "unit = \"m3/h\"\nraw = [4, 20]\nspan = [0, 40]\nroot = true\n",
+      "map");
+  const CsvTable table = ReadCsv("t_s,OP,DP\n0,50,8\n1,50,20\n", {.map = map});
+  EXPECT_EQ(table.runs.at(0).samples[0].sample[Signal::kF], 20.0);
+  EXPECT_EQ(table.runs.at(0).samples[1].sample[Signal::kF], 40.0);
+  EXPECT_THROW(FlowMap("unit = \"m3/h\"\nroot = true\n"), ConfigError);
+}
+
+// The columns of a loop, by the same evidence as those of a valve.
+TEST(LoopGuessTest, FindsOpPvSpXAndMode) {
+  struct Case {
+    const char* names;
+    std::vector<std::string> found;  // OP, PV, SP, X, mode; "-": refused.
+  };
+  const std::vector<Case> cases = {
+      {"FIC7.OP,FIC7.PV,FIC7.SP,FIC7.MODE",
+       {"FIC7.OP", "FIC7.PV", "FIC7.SP", "", "FIC7.MODE"}},
+      {"CV_pct,P1_kPa,P2_kPa,T1_degC,X_pct,F_t_h",
+       {"CV_pct", "F_t_h", "", "X_pct", ""}},
+      {"FV101.OP,FV101.PV,FV101.SP",
+       {"FV101.OP", "FV101.PV", "FV101.SP", "", ""}},
+      {"23FIC101.OP (%),23ZT101.PV (%),23FT101.PV (m3/h),23PT101.PV (bar a)",
+       {"23FIC101.OP (%)", "23FT101.PV (m3/h)", "", "23ZT101.PV (%)", ""}},
+      {"LIC7.OP [%],LT7 [%]", {"LIC7.OP [%]", "LT7 [%]", "", "", ""}},
+      {"P17.FT.F_CV,P17.FV_OP.F_CV,P17.FV_ZT.F_CV",
+       {"P17.FV_OP.F_CV", "P17.FT.F_CV", "", "P17.FV_ZT.F_CV", ""}},
+      {"FIC1.OP,FIC1.PV,FIC2.OP,FIC2.PV", {"-"}},
+      {"OP,remark", {"-"}}};
+  for (const Case& c : cases) {
+    SCOPED_TRACE(c.names);
+    const std::string text =
+        "time," + std::string(c.names) + "\n" + Rows([&](std::size_t k) {
+          std::string row = Iso(k);
+          const std::string names = c.names;
+          for (std::size_t i = 0, begin = 0; begin <= names.size(); ++i) {
+            const std::size_t end =
+                std::min(names.find(',', begin), names.size());
+            row +=
+                "," +
+                (names.substr(begin, end - begin).ends_with("MODE")
+                     ? "AUTO"
+                     : Fixed(40.0 + kValve.cv[k] / static_cast<double>(i + 1)));
+            begin = end + 1;
+          }
+          return row;
+        });
+    ColumnMap map;
+    std::vector<std::string> found;
+    try {
+      GuessLoop(ScanColumns(TextLines(text), "loop.csv", {}).columns, {},
+                "loop.csv", map);
+      for (const Signal signal :
+           {Signal::kCv, Signal::kF, Signal::kSp, Signal::kX}) {
+        const auto column =
+            std::ranges::find(map.columns, signal, &ColumnMapping::signal);
+        found.push_back(column == map.columns.end() ? "" : column->column);
+      }
+      found.push_back(map.mode_column);
+    } catch (const DataError&) {
+      found = {"-"};
+    }
+    EXPECT_EQ(found, c.found);
+  }
+}
+
+TEST(LoopGuessTest, AnOutputBetweenZeroAndOneIsAShare) {
+  const auto scale = [](double of_cells) {
+    ColumnMap map;
+    const std::string text =
+        "time,TIC1.OP,TIC1.PV\n" + Rows([&](std::size_t k) {
+          return Iso(k) + "," + Fixed(of_cells * kValve.cv[k], 4) + ",60";
+        });
+    GuessLoop(ScanColumns(TextLines(text), "loop.csv", {}).columns, {},
+              "loop.csv", map);
+    return map.columns.at(0).scale;
+  };
+  EXPECT_EQ(scale(0.01), 100.0);
+  EXPECT_EQ(scale(1.0), 1.0);
 }
 
 TEST(KindsTest, AFileWithoutNamesIsRefusedInOneLine) {

@@ -55,6 +55,20 @@ constexpr const char* kCsv =
     "FIC1,boiler,,,,,f,2,lublin-actuator-3\n"
     "LIC2,,,,,,L,,data only\n";
 
+// As in plants that number their loops so.
+TEST_F(PlantTableTest, ARowWhoseNameBeginsWithAHashIsNotLeftOutInSilence) {
+  const PlantTable table = ReadPlantTable(Write("p.csv",
+                                                "# loops of the boiler\n"
+                                                "name,op,pv,service\n"
+                                                "#12,A.OP,A.PV,F\n"
+                                                "# 13, not used any more\n"
+                                                "\"#14\",B.OP,B.PV,F\n"));
+  ASSERT_EQ(table.rows.size(), 2U);
+  EXPECT_THAT(table.rows[0].error, HasSubstr("it begins with #"));
+  EXPECT_EQ(table.rows[1].name, "#14");
+  EXPECT_EQ(table.rows[1].error, "");
+}
+
 TEST_F(PlantTableTest, TomlAndCsvSayTheSame) {
   for (const auto& path : {Write("p.toml", kToml), Write("p.csv", kCsv)}) {
     const PlantTable table = ReadPlantTable(path);

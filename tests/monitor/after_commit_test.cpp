@@ -6,6 +6,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "base/error.h"
+
 namespace fdi::monitor {
 namespace {
 
@@ -19,6 +21,9 @@ struct Noting : EventSink {
   bool Publish(const FaultEvent& event, bool persisted) override {
     notes.push_back(name + (event.resent ? " again" : "") +
                     (persisted ? "" : " unstored"));
+    if (event.valve_id.empty()) {
+      throw DataError("no valve");
+    }
     return sent;
   }
 
@@ -47,6 +52,7 @@ TEST_F(AfterCommitTest, StepsAreTakenInTheirOrderByNewAndResentEvents) {
   list_.Add(bus_);
   list_.Add("hook", Tell("hook"));
   FaultEvent event;
+  event.valve_id = "V1";
 
   EXPECT_TRUE(list_.Publish(event, false));
   EXPECT_THAT(notes_, ElementsAre("page", "bus unstored", "hook"));
@@ -62,13 +68,26 @@ TEST_F(AfterCommitTest, AStepThatFailsIsCountedAndStopsNothing) {
     throw std::runtime_error("no page");
   });
   list_.Add(bus_);
+  FaultEvent event;
+  event.valve_id = "V1";
 
-  EXPECT_TRUE(list_.Publish({}, true));
+  EXPECT_TRUE(list_.Publish(event, true));
 
   EXPECT_THAT(notes_, ElementsAre("bus"));
   EXPECT_EQ(counters_[Counter::kPartFailures], 1U);
   EXPECT_THAT(log_,
               HasSubstr("part_failed id=M155 part=page reason=\"no page\""));
+}
+
+TEST_F(AfterCommitTest, AnEventThatTheBusCannotTakeIsNotSentAndStopsNothing) {
+  list_.Add(bus_);
+  list_.Add("hook", Tell("hook"));
+
+  EXPECT_FALSE(list_.Publish({}, true));
+
+  EXPECT_THAT(notes_, ElementsAre("bus", "hook"));
+  EXPECT_EQ(counters_[Counter::kPartFailures], 1U);
+  EXPECT_THAT(log_, HasSubstr("part=bus reason=\"no valve\""));
 }
 
 }  // namespace

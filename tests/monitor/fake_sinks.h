@@ -12,6 +12,7 @@
 #include <thread>
 #include <vector>
 
+#include "base/error.h"
 #include "monitor/checkpoint.h"
 #include "monitor/episode_tracker.h"
 #include "monitor/sinks.h"
@@ -78,6 +79,9 @@ class FakeBus : public DecisionSink, public EventSink {
   bool Publish(const std::string& valve_id, const ModelSet* models,
                const Verdict& verdict) override {
     notice.Await([this] { return !held; });
+    if (valve_id == unsendable) {
+      throw DataError("valve_id cannot be sent");
+    }
     notice.Apply([&] {
       decisions.push_back({valve_id, verdict.seq,
                            models != nullptr ? models->content_hash : 0,
@@ -98,6 +102,7 @@ class FakeBus : public DecisionSink, public EventSink {
 
   Notice notice;
   bool held{false};
+  std::string unsendable;
   std::vector<Decision> decisions;
   std::vector<std::string> removed;
   std::vector<std::pair<TransitionKind, bool>> events;

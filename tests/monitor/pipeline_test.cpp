@@ -135,6 +135,25 @@ TEST_F(PipelineTest, TheRunOfAnEvictedValveEndsAndItsLastVectorGoes) {
   EXPECT_THAT(bus_.removed, testing::ElementsAre(ValveName(0), ValveName(1)));
 }
 
+TEST_F(PipelineTest, AnUnknownValveThatEndedIsForgottenAndASilentOneIsNot) {
+  assigned_ = {"known"};
+  Start();
+  const auto now = std::chrono::steady_clock::now();
+  for (const auto& valve : {"ended", "known", "silent"}) {
+    pipeline_->OnSample(valve, PlantSample(0), 1, now);
+  }
+  pipeline_->OnStreamEnded("ended", 1);
+  pipeline_->OnStreamEnded("known", 1);
+  pipeline_->Poll(now + std::chrono::minutes(59));
+  EXPECT_EQ(pipeline_->valve_names().size(), 3U);
+  pipeline_->Poll(now + std::chrono::minutes(61));
+
+  EXPECT_THAT(pipeline_->valve_names(),
+              testing::ElementsAre("known", "silent"));
+  EXPECT_EQ(pipeline_->census().valves, 2U);
+  Stop();
+}
+
 // Stamps that jump, and epochs that flip, with every sample.
 TEST_F(PipelineTest, WhatMakesADiagnosisBeginAnewIsLimited) {
   Start();
@@ -184,6 +203,66 @@ TEST_F(PipelineTest, NoThreadStartsBeforeStart) {
   EXPECT_EQ(ThreadCount(), before + 5);
   Stop();
   EXPECT_EQ(ThreadCount(), before);
+}
+
+TEST_F(PipelineTest, AVectorThatCannotBeSentCostsNothingElse) {
+  bus_.unsendable = "V1";
+  Start();
+  Feed("V1", 0, 3);
+  Feed("V2", 0, 3);
+  pipeline_->Stop();
+
+  EXPECT_EQ(bus_.decisions.size(), 3U);
+  EXPECT_EQ(counters_[Counter::kDecisionsUnsent], 3U);
+  EXPECT_THAT(lines_, testing::Contains(testing::HasSubstr(
+                          "valve=V1 reason=\"valve_id cannot be sent\"")));
+}
+
+// A copied tag: the healthy readings of another valve under the id of one with
+// a fault. The one that is not judged goes on sending.
+TEST_F(PipelineTest, AValveThatTwoPublishersSendIsContested) {
+  Start();
+  const auto start = std::chrono::steady_clock::now();
+  const auto at = [start](std::uint64_t k) {
+    return start + std::chrono::seconds(k);
+  };
+  for (const std::string valve : {"V1", "bare"}) {
+    for (std::uint64_t k = 0; k < 20; ++k) {
+      pipeline_->OnSample(valve, PlantSample(k, kF7Offset), 1, at(k));
+      if (k >= 10) {
+        Sample old = PlantSample(k, 0.0, 2);
+        old.stamp_ns -= 7 * 86'400'000'000'000;  // Last week's record.
+        pipeline_->OnSample(valve, old, 2, at(k));
+      }
+    }
+  }
+  pipeline_->Poll(at(20));
+  EXPECT_EQ(pipeline_->census().contested, 2U);
+  EXPECT_EQ(pipeline_->census().contested_valve, "V1");
+  EXPECT_THAT(lines_, testing::Contains(testing::HasSubstr(
+                          "two_publishers id=M118 valves=2 first=V1")));
+  // The publisher that counts is silent, the other one does not replace it.
+  for (std::uint64_t k = 20; k < 30; ++k) {
+    pipeline_->OnSample("V1", PlantSample(k, kF7Offset), 1, at(k));
+  }
+  pipeline_->Poll(at(30));
+  EXPECT_GE(pipeline_->census().stale, 1U);
+  EXPECT_EQ(pipeline_->census().contested, 2U);
+  pipeline_->Poll(at(120));
+  EXPECT_EQ(pipeline_->census().contested, 0U);
+  Stop();
+}
+
+// The last samples of a publisher that was started anew.
+TEST_F(PipelineTest, APublisherThatIsRestartedContestsNothing) {
+  Start();
+  Feed("V1", 0, 20);
+  pipeline_->OnSample("V1", PlantSample(21, 0.0, 2), 2);
+  Feed("V1", 22, 25);
+  pipeline_->OnSample("V1", PlantSample(26, 0.0, 2), 2);
+  pipeline_->Poll(std::chrono::steady_clock::now() + std::chrono::seconds(1));
+  EXPECT_EQ(pipeline_->census().contested, 0U);
+  Stop();
 }
 
 // Runs that cannot even be refused: not a std::exception.

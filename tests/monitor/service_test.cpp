@@ -154,6 +154,46 @@ TEST_F(ServiceTest, AnErrorAtTheStartEndsItsParts) {
   EXPECT_EQ(Count("monitor_stopped"), 1U);
 }
 
+// As if another program had written the row.
+TEST_F(ServiceTest, AnEventThatCannotBeSentAgainDoesNotEndTheService) {
+  const ModelSet models = LinearModels();
+  std::filesystem::create_directory(global_.data_dir);
+  {
+    HistoryStore history(global_.data_dir / "history.db", NowNs, Context().log);
+    history.BeginSession("test", "");
+    for (const auto& valve : {"V1", "V2"}) {
+      FaultEvent event;
+      event.valve_id = valve;
+      event.episode_id = EpisodeId(valve, 1, 5);
+      event.transition.detection_stamp_ns = event.transition.stamp_ns = 5;
+      event.candidates = {{7, 0.5, 0.5, false}};
+      event.models = {std::shared_ptr<void>(), &models};
+      history.CommitBatch([&] { history.Record(event); });
+    }
+    history.EndSession();
+  }
+  Execute(global_.data_dir / "history.db", storage::HistorySchema(),
+          "UPDATE event_outbox SET candidates = '999:0.5:0.5:0' "
+          "WHERE event_id = (SELECT min(event_id) FROM event_outbox)");
+  const report::Context context = Context();
+  report::StopSignals signals(report::StopSignals::HangUp::kReload);
+  ServiceOptions options;
+  options.status_period_s = 0.0;
+  Service service(options, context);
+  std::thread driver([&] {
+    EXPECT_TRUE(notice_.Await([&] { return Count("monitor_status") > 0; }));
+    kill(getpid(), SIGTERM);
+  });
+
+  EXPECT_EQ(service.Run(signals), report::kExitOk);
+
+  driver.join();
+  EXPECT_EQ(Count("part_failed id=M155 part=bus"), 1U);
+  EXPECT_THAT(lines_,
+              Contains(testing::AllOf(testing::HasSubstr("events_resent=1"),
+                                      testing::HasSubstr("events_unsent=1"))));
+}
+
 // Who asks for a reload wants to know, however often.
 TEST_F(ServiceTest, EveryReloadThatFailsIsALineOfTheLog) {
   const report::Context context = Context();

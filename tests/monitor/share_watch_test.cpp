@@ -103,6 +103,11 @@ TEST(ContestedStatusTest, LongAndStrangeNamesFitTheWire) {
   facts.contested = {2, "V1", "host:2"};
   EXPECT_EQ(StatusOf(facts).health, idl::Health::kDegraded);
   EXPECT_EQ(StatusOf(facts).text, "host:2 takes 2 of these valves, too: V1");
+  facts.census.contested = 3;
+  facts.census.contested_valve = "V7";
+  EXPECT_EQ(StatusOf(facts).text,
+            "host:2 takes 2 of these valves, too: V1; two publishers send V7 "
+            "and 2 more valves");
   facts.contested = {100'000, std::string(64, 'V'), std::string(64, '\n')};
   EXPECT_EQ(StatusOf(facts).text.size(), idl::kMaxTextLength);
   EXPECT_EQ(StatusOf(facts).text.find('\n'), std::string::npos);

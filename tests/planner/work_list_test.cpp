@@ -456,7 +456,7 @@ TEST_F(WorkListTest, TextHasTheFirstRowsAndCsvAll) {
   EXPECT_THAT(
       text.str(),
       AllOf(HasSubstr("as of"), HasSubstr("\n1. V"), HasSubstr("because "),
-            HasSubstr("and 1 more (--top 0)"), Not(HasSubstr("\n2. "))));
+            HasSubstr("and 1 more (--rows 0)"), Not(HasSubstr("\n2. "))));
   std::ostringstream csv;
   report.PrintCsv(csv);
   EXPECT_THAT(csv.str(), AllOf(HasSubstr("rank,valve_id,kind,fault,name"),

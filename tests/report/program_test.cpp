@@ -14,6 +14,7 @@
 
 #include "base/error.h"
 #include "base/time_text.h"
+#include "report/help.h"
 #include "report/stop_signals.h"
 #include "tests/storage/temporary_directory.h"
 
@@ -24,6 +25,7 @@ using testing::AllOf;
 using testing::EndsWith;
 using testing::HasSubstr;
 using testing::IsEmpty;
+using testing::Not;
 using testing::StartsWith;
 
 struct BusError : std::runtime_error {
@@ -299,6 +301,55 @@ TEST(ProgramTest, HelpReadsLikeAManualPage) {
       AllOf(HasSubstr("Usage: prog [OPTIONS] VERB\n"),
             HasSubstr("\nVerbs:\n  greet                       Greets\n"),
             HasSubstr("  -h, --help                  Print")));
+}
+
+TEST(ProgramTest, WhatFewPlantsNeedIsInHelpAllAlone) {
+  const auto help_of = [](const char* flag) {
+    Program program("prog", "A program");
+    CLI::App& verb = program.AddVerb(
+        "greet", "Greets", [](const Context&) { return int{kExitOk}; });
+    verb.add_flag("--plain");
+    verb.add_flag("--special");
+    ShowInHelpAll(verb, {"--special", "--of-a-component-that-is-left-out"});
+    const char* arguments[] = {"prog", "greet", flag};
+    testing::internal::CaptureStdout();
+    EXPECT_EQ(program.Run(3, arguments), kExitOk);
+    return testing::internal::GetCapturedStdout();
+  };
+
+  EXPECT_THAT(help_of("--help"),
+              AllOf(HasSubstr("--plain"), Not(HasSubstr("--special")),
+                    EndsWith("\nmore: --help-all\n")));
+  EXPECT_THAT(help_of("--help-all"),
+              AllOf(HasSubstr("--plain"), HasSubstr("--special"),
+                    Not(HasSubstr("more:"))));
+  EXPECT_THAT(RunProgram({"greet", "--help"}).out, Not(HasSubstr("more:")));
+}
+
+// In a file of --config as on the command line.
+TEST(ProgramTest, ARemovedWordNamesWhatReplacesIt) {
+  const TemporaryDirectory directory;
+  const std::string file = (directory.path() / "c.toml").string();
+  std::ofstream(file) << "[run]\nshadow = 'paper'\n";
+  const auto error_of = [](std::vector<const char*> words) {
+    Program program("fdi-monitor", "A program");
+    program.AddVerb("run", "Runs", [](const Context&) { return int{kExitOk}; });
+    words.insert(words.begin(), "fdi-monitor");
+    testing::internal::CaptureStderr();
+    EXPECT_EQ(program.Run(static_cast<int>(words.size()), words.data()),
+              kExitUsage);
+    return testing::internal::GetCapturedStderr();
+  };
+
+  EXPECT_THAT(error_of({"top", "--once"}),
+              HasSubstr("top is gone: fdi-monitor watch --table"));
+  EXPECT_THAT(error_of({"run", "--shadow=paper"}),
+              HasSubstr("--shadow is gone: record with --record"));
+  EXPECT_THAT(error_of({"run", "--console-tls", "x"}),
+              HasSubstr("--console-tls is gone: nginx"));
+  EXPECT_THAT(error_of({"--config", file.c_str(), "run"}),
+              HasSubstr("line 2: --shadow is gone: record with --record"));
+  EXPECT_THAT(error_of({"run", "--never-there"}), Not(HasSubstr("is gone")));
 }
 
 TEST(ProgramTest, OptionsOfTheBusAreForProgramsThatUseIt) {

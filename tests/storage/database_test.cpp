@@ -349,17 +349,67 @@ TEST_F(DatabaseTest, AFileThatReplacesItIsReadWithoutTheOldWal) {
   }
 }
 
-// Other connections would have to be closed for the file to be read again.
-TEST_F(DatabaseTest, WithoutItsWalADatabaseTakesNothing) {
+// "They are temporary files": the commits of each connection stay, also those
+// of a program that is started in between.
+TEST_F(DatabaseTest, ADeletedLogGetsItsNameBack) {
   {
     Database database(file_, SchemaOf(1), Access::kWriter);
+    Database reader(file_, SchemaOf(1), Access::kReader);
     Insert(database, 1);
-    std::filesystem::remove(directory_.path() / "test.db-wal");
-    EXPECT_THROW(Insert(database, 2), SqliteError);
-    EXPECT_THROW(database.Refresh(), DataError);
+    for (const char* name : {"test.db-wal", "test.db-shm"}) {
+      ASSERT_TRUE(std::filesystem::remove(directory_.path() / name));
+    }
+    {
+      Database other(file_, SchemaOf(1), Access::kOccasionalWriter);
+      Insert(other, 2);
+    }
+    EXPECT_EQ(reader.QueryInt64("SELECT count(*) FROM t"), 2);
+    ASSERT_TRUE(std::filesystem::remove(directory_.path() / "test.db-wal"));
+    Insert(database, 3);
+    ASSERT_TRUE(std::filesystem::remove(directory_.path() / "test.db-shm"));
+    EXPECT_FALSE(database.Refresh());
+    EXPECT_FALSE(reader.Refresh());
+    EXPECT_EQ(reader.QueryInt64("SELECT count(*) FROM t"), 3);
+    ASSERT_TRUE(std::filesystem::remove(directory_.path() / "test.db-wal"));
   }
+  const std::filesystem::directory_iterator files(directory_.path());
+  EXPECT_EQ(std::distance(begin(files), end(files)), 2);  // And the gate.
   Database database(file_, SchemaOf(1), Access::kWriter);
-  EXPECT_EQ(database.QueryInt64("SELECT min(id) FROM t"), 1);
+  EXPECT_EQ(database.QueryInt64("SELECT sum(id) FROM t"), 6);
+  EXPECT_TRUE(database.Check().empty());
+}
+
+// Somebody restores "all files" of a backup while the database is open.
+TEST_F(DatabaseTest, ALogThatReplacesItIsSetAside) {
+  Database database(file_, SchemaOf(1), Access::kWriter);
+  Insert(database, 1);
+  std::ofstream(directory_.path() / "old") << "another log";
+  std::filesystem::rename(directory_.path() / "old",
+                          directory_.path() / "test.db-wal");
+  EXPECT_FALSE(database.Refresh());
+  EXPECT_TRUE(
+      std::filesystem::exists(directory_.path() / "test.db-wal.replaced"));
+  Database other(file_, SchemaOf(1), Access::kOccasionalWriter);
+  Insert(other, 2);
+  EXPECT_EQ(database.QueryInt64("SELECT sum(id) FROM t"), 3);
+}
+
+// A process that was killed leaves second names that nobody locks.
+TEST_F(DatabaseTest, TheLogOfAKilledProgramIsNotPutBack) {
+  const pid_t child = fork();
+  if (child == 0) {
+    Database database(file_, SchemaOf(1), Access::kWriter);
+    Insert(database, 1);
+    _exit(0);
+  }
+  waitpid(child, nullptr, 0);
+  ASSERT_TRUE(std::filesystem::exists(directory_.path() / "test.db-wal"));
+  { Database(file_, SchemaOf(1), Access::kWriter).Checkpoint(); }
+  EXPECT_FALSE(std::filesystem::exists(directory_.path() / "test.db-wal"));
+  Database database(file_, SchemaOf(1), Access::kWriter);
+  EXPECT_EQ(database.QueryInt64("SELECT sum(id) FROM t"), 1);
+  Insert(database, 2);
+  EXPECT_EQ(database.QueryInt64("SELECT sum(id) FROM t"), 3);
 }
 
 // A backup is not in WAL mode.

@@ -311,11 +311,16 @@ TEST_F(HistoryWriterTest, ResumedEpisodeGoesOnUnderItsOldId) {
 }
 
 TEST_F(HistoryWriterTest, EventsNotMarkedAsSentAreFoundAtTheNextStart) {
+  const std::vector<FaultCandidate> candidates{
+      {19, 0.1 + 0.2, -1.0 / 3.0, true}, {1, 0.8, 0.5, true}, {8, 5e-324, 0.0}};
   {
     HistoryWriter writer(path_);
     const FaultEvent detected = Event(Kind::kDetected, 0, 0, 0.3);
     writer.Record(detected, kDetected);
-    writer.Record(Event(Kind::kIsolated, 20, 0b101, 0.8), kDetected);
+    FaultEvent isolated = Event(Kind::kIsolated, 20, 0b101, 0.8);
+    isolated.seq = 77;
+    isolated.candidates = candidates;
+    writer.Record(isolated, kDetected);
     writer.MarkSent(detected);
     writer.Commit(kDetected);
   }
@@ -333,11 +338,14 @@ TEST_F(HistoryWriterTest, EventsNotMarkedAsSentAreFoundAtTheNextStart) {
   EXPECT_EQ(unsent[0].transition.faults, 0b101U);
   EXPECT_EQ(unsent[0].transition.factor, 0.8);
   EXPECT_EQ(unsent[0].transition.reason, EndReason::kNone);
-  ASSERT_EQ(unsent[0].candidates.size(), 2U);
-  EXPECT_EQ(unsent[0].candidates[0].fault, 1);
-  EXPECT_EQ(unsent[0].candidates[1].fault, 19);
-  EXPECT_EQ(unsent[0].candidates[1].factor, 0.8);
-  EXPECT_TRUE(unsent[0].candidates[1].isolated);
+  EXPECT_EQ(unsent[0].seq, 77U);
+  ASSERT_EQ(unsent[0].candidates.size(), candidates.size());
+  for (std::size_t i = 0; i < candidates.size(); ++i) {
+    EXPECT_EQ(unsent[0].candidates[i].fault, candidates[i].fault);
+    EXPECT_EQ(unsent[0].candidates[i].factor, candidates[i].factor);
+    EXPECT_EQ(unsent[0].candidates[i].strength, candidates[i].strength);
+    EXPECT_EQ(unsent[0].candidates[i].isolated, candidates[i].isolated);
+  }
   EXPECT_EQ(unsent[0].model_set, "demo");
   EXPECT_EQ(unsent[0].model_version, 3);
   EXPECT_TRUE(unsent[0].persisted);

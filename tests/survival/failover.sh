@@ -208,13 +208,13 @@ await 60 ready 1 || fail "the monitor does not start on host 1"
 
 # When each vector of one valve came.
 ip netns exec "$plant" "$bin/fdi-monitor" --interface 10.80.0.9 \
-  watch --json --valves S 2>"$out/1/watch.log" > >(while read -r line; do
+  watch --json --valve S 2>"$out/1/watch.log" > >(while read -r line; do
     case $line in *DecisionVector*) now_ms ;; esac
   done >"$out/vectors") &
 watcher=$!
 publish() {  # NAME VALVES FAULT-AT
   ip netns exec "$plant" "$bin/fdi-simulator" --interface 10.80.0.9 run \
-    --valve "$1" --valves "$2" --keep-alive --duration 900 \
+    --valve "$1" --count "$2" --keep-alive --duration 900 \
     --parameters paper-operating-point \
     --fault "f19:abrupt@$3:strength=0.5" >/dev/null 2>"$out/1/$1.log" &
   publishers+=($!)

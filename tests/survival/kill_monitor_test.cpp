@@ -7,6 +7,7 @@
 #include <map>
 #include <optional>
 #include <set>
+#include <sstream>
 #include <tuple>
 
 #include <gtest/gtest.h>
@@ -34,6 +35,21 @@ constexpr std::int64_t kDetectionNs = 3'000'000'000;  // n_d samples.
 
 // One transition of an episode.
 using Step = std::tuple<std::uint64_t, std::string, std::int64_t>;
+
+std::string ContentOf(const FaultEvent& event) {
+  const Transition& t = event.transition;
+  std::ostringstream text;
+  text.precision(17);
+  text << event.valve_id << ' ' << event.source_id << ' ' << event.seq << ' '
+       << t.detection_stamp_ns << ' ' << t.faults << ' ' << t.factor << ' '
+       << t.strength << ' ' << EndReasonName(t.reason) << ' ' << event.model_set
+       << '@' << event.model_version << ' ' << event.model_hash;
+  for (const FaultCandidate& each : event.candidates) {
+    text << ' ' << each.fault << ':' << each.factor << ':' << each.strength
+         << ':' << each.isolated;
+  }
+  return text.str();
+}
 
 class KilledMonitor : public testing::Test {
  protected:
@@ -69,15 +85,19 @@ class KilledMonitor : public testing::Test {
          },
          {}},
         milliseconds(5));
-    events_->Take({[this](const FaultEvent& m, const idl::Reception&) {
-                     (m.persisted ? persisted_ : unpersisted_)
-                         .emplace(
-                             m.episode_id,
-                             std::string(TransitionName(m.transition.kind)),
-                             m.transition.stamp_ns);
-                   },
-                   {}},
-                  milliseconds(0));
+    events_->Take(
+        {[this](const FaultEvent& m, const idl::Reception&) { Keep(m); }, {}},
+        milliseconds(0));
+  }
+  // What is sent again is what was sent.
+  void Keep(const FaultEvent& event) {
+    const Step step{event.episode_id,
+                    std::string(TransitionName(event.transition.kind)),
+                    event.transition.stamp_ns};
+    (event.persisted ? persisted_ : unpersisted_).insert(step);
+    const auto [first, is_new] = contents_.emplace(step, ContentOf(event));
+    repeats_ += is_new ? 0 : 1;
+    EXPECT_EQ(first->second, ContentOf(event)) << event.valve_id;
   }
   void TakeFor(milliseconds time) {
     for (const auto end = Clock::now() + time; Clock::now() < end;) {
@@ -116,6 +136,8 @@ class KilledMonitor : public testing::Test {
       answers_;
   std::set<Step> persisted_;
   std::set<Step> unpersisted_;
+  std::map<Step, std::string> contents_;
+  int repeats_{0};
   std::vector<std::int64_t> killed_ns_;
   std::uint64_t recorded_{0};
   std::uint64_t lost_{0};
@@ -302,8 +324,8 @@ TEST_F(KilledMonitor, LosesNoPersistedEventAndDiagnosesAgain) {
   Tell("oldest sample lost", losses_);
   std::cout << "monitor: " << rounds << " rounds, " << persisted_.size()
             << " events persisted, " << unpersisted_.size() << " not, "
-            << recorded_ << " samples recorded, " << lost_
-            << " answered but not recorded\n";
+            << repeats_ << " of them sent again, " << recorded_
+            << " samples recorded, " << lost_ << " answered but not recorded\n";
 }
 
 }  // namespace

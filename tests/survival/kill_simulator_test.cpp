@@ -43,7 +43,7 @@ class KilledSimulator : public testing::Test {
                                      "udp",
                                      "run",
                                      "--record",
-                                     "--valves",
+                                     "--count",
                                      "20",
                                      "--start",
                                      "2026-01-01T00:00:00Z",

@@ -74,7 +74,7 @@ supervise() {
 supervise &
 supervisor=$!
 ip netns exec "$far" "$bin/fdi-simulator" --interface 10.77.0.2 \
-  run --valves $valves --keep-alive \
+  run --count $valves --keep-alive \
   --duration $((cut + 300)) --parameters paper-operating-point \
   >"$out/publisher.out" 2>"$out/publisher.log" &
 publisher=$!

@@ -82,7 +82,7 @@ echo "listen_addresses = ''
 unix_socket_directories = '$out'" >>"$out/cluster/postgresql.conf"
 start_postgres
 url="postgresql://postgres@/postgres?host=$out"
-"$bin/fdi-store" ship --init --to "$url" >/dev/null
+"$bin/fdi-store" ship --init --db "$url" >/dev/null
 
 ip -n "$hub" link set lo up
 ip -n "$hub" link add br0 type bridge mcast_snooping 0
@@ -106,12 +106,12 @@ cp "$out"/data1/* "$out/data2"
 
 start_monitor() {  # MONITOR
   ip netns exec "$(space "$1")" "$bin/fdi-monitor" --interface "10.79.0.$1" \
-    --data "$out/data$1" run --model-set quick --valves "${share[$1]}" \
+    --data "$out/data$1" run --model-set quick --valve "${share[$1]}" \
     2>>"$out/monitor$1.log" &
   monitor[$1]=$!
 }
 start_shipper() {  # MONITOR
-  "$bin/fdi-store" ship --data "$out/data$1" --to "$url" --monitor "m$1" \
+  "$bin/fdi-store" ship --data "$out/data$1" --db "$url" --monitor "m$1" \
     --every 1s >/dev/null 2>>"$out/shipper$1.log" &
   shipper[$1]=$!
 }
@@ -130,7 +130,7 @@ for ((s = 1; s <= streams; ++s)); do
     faults+=(--fault "f19:abrupt@$at:strength=0.5:until=$((at + 20))")
   done
   ip netns exec "$hub" "$bin/fdi-simulator" --interface 10.79.0.3 \
-    run --valve "S$s" --valves $valves --keep-alive --seed "$s" \
+    run --valve "S$s" --count $valves --keep-alive --seed "$s" \
     --duration $((seconds + 90)) --parameters paper-operating-point \
     "${faults[@]}" >/dev/null 2>"$out/publisher$s.log" &
   publisher[s]=$!
@@ -184,7 +184,7 @@ done
 for i in 1 2; do
   kill_now "${shipper[$i]}"
   shipper[$i]=
-  "$bin/fdi-store" ship --data "$out/data$i" --to "$url" --monitor "m$i" \
+  "$bin/fdi-store" ship --data "$out/data$i" --db "$url" --monitor "m$i" \
     >/dev/null || fail "the last rows of m$i were not shipped"
 done
 kill -TERM "$watcher"

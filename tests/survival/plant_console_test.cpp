@@ -45,7 +45,7 @@ class PlantConsoleTest : public PlantFixture {
   void StartMonitor(const std::string& name) {
     monitors_[name] = std::make_unique<ChildProcess>(std::vector<std::string>{
         FDI_MONITOR_PROGRAM, "--data", Folder(name).string(), "--domain",
-        std::to_string(domain_.id()), "run", "--valves", globs_.at(name)});
+        std::to_string(domain_.id()), "run", "--valve", globs_.at(name)});
     ASSERT_TRUE(monitors_[name]->AwaitLine("monitor_ready"))
         << monitors_[name]->errors();
   }
@@ -54,8 +54,8 @@ class PlantConsoleTest : public PlantFixture {
     std::ofstream(Folder("page") / "index.html") << "<title>page</title>";
     console_ = std::make_unique<ChildProcess>(std::vector<std::string>{
         FDI_MONITOR_PROGRAM, "--domain", std::to_string(domain_.id()),
-        "console", "--from", Url(), "--listen", "127.0.0.1:0",
-        "--console-files", Folder("page").string(), "--log-level", "info"});
+        "console", "--db", Url(), "--listen", "127.0.0.1:0", "--console-files",
+        Folder("page").string(), "--log-level", "info"});
     ASSERT_TRUE(console_->AwaitLine("console_listening")) << console_->errors();
     const std::string& log = console_->errors();
     const std::size_t at = log.find("address=127.0.0.1:");
@@ -255,7 +255,7 @@ class PlantPageTest : public PlantFixture {
                                              "--domain",
                                              std::to_string(domain_.id()),
                                              "console",
-                                             "--from",
+                                             "--db",
                                              Url(),
                                              "--listen",
                                              "127.0.0.1:0",

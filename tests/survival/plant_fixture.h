@@ -70,10 +70,10 @@ class PlantFixture : public HistoryFixture {
   Outcome Ship(const std::string& folder, const std::string& more = "",
                const std::string& user = "postgres") const {
     return Store("ship --data " + (directory_.path() / folder).string() +
-                 " --monitor " + folder + " --to '" + Url(user) + "' " + more);
+                 " --monitor " + folder + " --db '" + Url(user) + "' " + more);
   }
   void Init() const {
-    const Outcome outcome = Store("ship --init --to '" + Url() + "'");
+    const Outcome outcome = Store("ship --init --db '" + Url() + "'");
     ASSERT_EQ(outcome.code, 0) << outcome.err;
   }
 

@@ -116,7 +116,7 @@ class ShiftTest : public MonitorFixture {
     gateway_.emplace(*participant_,
                      idl::PublisherOptions{idl::Profile::kLossless, 100});
     if (server_ != nullptr) {
-      Store("ship --init --to '" + server_->Url("plant") + "'");
+      Store("ship --init --db '" + server_->Url("plant") + "'");
     }
   }
 
@@ -261,7 +261,7 @@ class ShiftTest : public MonitorFixture {
   }
   Alarms FromPostgres() const {
     const std::string url = server_->Url("plant");
-    Store("ship --to '" + url + "' --monitor here");
+    Store("ship --db '" + url + "' --monitor here");
     storage::PlantDatabase plant(url);
     const storage::PlantRows rows =
         plant.Run(std::string("SELECT ") + kViewColumns +
@@ -522,7 +522,7 @@ TEST_F(ShiftTest, EverybodySaysTheSameOfEveryAlarm) {
                    {"FV-06", "UNACK", "f7", "high", 0.75},
                    {"FV-09", "UNACK", "f1", "high", 0.75}});
 
-  Store("history ack --all --valve 'FV-0[16]' --by anna --comment 'on my way'");
+  Store("history ack --valve 'FV-0[16]' --by anna --comment 'on my way'");
   Moment("acknowledged", {{"FV-01", "ACKED", "f1", "high", 0.75},
                           {"FV-06", "ACKED", "f7", "high", 0.75},
                           {"FV-09", "UNACK", "f1", "high", 0.75}});
@@ -582,8 +582,8 @@ TEST_F(ShiftTest, EverybodySaysTheSameOfEveryAlarm) {
   mended[1].strength = 0.9;
   Moment("mended", mended);
 
-  Store("history ack --all --by anna --comment 'seen'");
-  Store("history unshelve --valve FV-06 --by jan");
+  Store("history ack --by anna --comment 'seen'");
+  Store("history shelve FV-06 --off --by jan");
   Moment("acknowledged at the end of the shift",
          {{"FV-06", "ACKED", "f7", "critical", 0.9}});
 }

@@ -40,7 +40,7 @@ class ShipTest : public PlantFixture {
   std::vector<std::string> ShipCommand(const std::string& folder,
                                        const std::string& every) const {
     return {"ship",        "--data",  (directory_.path() / folder).string(),
-            "--to",        Url(),     "--monitor",
+            "--db",        Url(),     "--monitor",
             folder,        "--every", every,
             "--log-level", "info"};
   }
@@ -416,21 +416,21 @@ TEST_F(ShipTest, RefusalsHaveAReasonAndCode3) {
   refused(Ship("a", "", "nobody"), "permission denied for schema fdi");
   refused(Ship("a", "", "screen"), "permission denied for table monitor");
   server_->Create("empty");
-  refused(Store("ship --init --to '" + server_->Url("empty", "room") + "'"),
+  refused(Store("ship --init --db '" + server_->Url("empty", "room") + "'"),
           "permission denied for database empty");
   EXPECT_EQ(Ship("a", "", "room").code, 0);
   refused(Ship("a", "--prune --history-age 1s --trust-clock", "room"),
           "permission denied for table episode");
-  EXPECT_EQ(Store("history list --from '" + Url("screen") + "'").code, 0);
+  EXPECT_EQ(Store("history list --db '" + Url("screen") + "'").code, 0);
   owner.Run("UPDATE fdi.plant SET version = version + 1");
   refused(Ship("a"),
           "schema fdi has version 10, this program needs 9: update "
           "this program");
   refused(Store("ship --data " + Folder("a").string() +
-                " --to 'postgresql://x:secret@/plant?host=/nowhere'"),
+                " --db 'postgresql://x:secret@/plant?host=/nowhere'"),
           "No such file or directory");
   EXPECT_THAT(Store("ship --data " + Folder("a").string() +
-                    " --to 'postgresql://x:secret@[/plant'")
+                    " --db 'postgresql://x:secret@[/plant'")
                   .err,
               testing::Not(HasSubstr("secret")));
 }
@@ -521,7 +521,7 @@ TEST_F(ShipTest, RetentionOfBothSides) {
     return std::pair(pruned.deleted, pruned.kept);
   };
   const Outcome verb =
-      Store("ship --prune --history-age 36000d --to '" + Url() + "' --json");
+      Store("prune --history-age 36000d --db '" + Url() + "' --json");
   EXPECT_THAT(verb.out, AllOf(HasSubstr("\"deleted\": 0"),
                               HasSubstr("\"protected\": 3")));
   using Pair = std::pair<std::int64_t, std::int64_t>;
@@ -546,7 +546,7 @@ TEST_F(ShipTest, RetentionOfBothSides) {
       "INSERT INTO fdi.monitor_session (monitor_id, session_id, start_ns, "
       "alive_ns, software) SELECT monitor_id, 1, 1, 1, '' FROM fdi.monitor");
   const Outcome years_ahead =
-      Store("ship --prune --history-age 1s --to '" + Url() + "'");
+      Store("prune --history-age 1s --db '" + Url() + "'");
   EXPECT_EQ(years_ahead.code, 3);
   EXPECT_THAT(years_ahead.err, HasSubstr("--trust-clock"));
 }
@@ -599,7 +599,7 @@ TEST_F(ShipTest, TheVerbsReadThePlant) {
     const Outcome here = Store(arguments + " --json --data " +
                                (directory_.path() / "a").string());
     const Outcome there =
-        Store(arguments + " --json --from '" + Url("postgres") + "'");
+        Store(arguments + " --json --db '" + Url("postgres") + "'");
     ASSERT_EQ(there.code, here.code) << arguments << ": " << there.err;
     if (here.code != 0) {
       return;
@@ -631,11 +631,11 @@ TEST_F(ShipTest, TheVerbsReadThePlant) {
         << arguments << ": " << nlohmann::json::diff(expected, found);
   };
   for (const char* filter :
-       {"", "--limit 7", "--valve V0042", "--valve 'V00[0-4]*'",
+       {"", "--rows 7", "--valve V0042", "--valve 'V00[0-4]*'",
         "--valve 'LV-?'", "--valve 'LV-*'", "--fault f7", "--fault unknown",
         "--fault low_flow", "--fault f1 --valve 'V*'", "--state open",
         "--state unacked", "--state rtn_unack", "--state shelved",
-        "--state isolated --limit 3", "--since 2026-01-01 --utc"}) {
+        "--state isolated --rows 3", "--from 2026-01-01 --utc"}) {
     same(std::string("history list ") + filter);
   }
   same("history show last");
@@ -652,23 +652,23 @@ TEST_F(ShipTest, TheVerbsReadThePlant) {
             HistoryReader(path).Strengths(Id("LV-1")));
   EXPECT_EQ(looks(PlantReader(Url()), Id("LV-1")).flow,
             looks(HistoryReader(path), Id("LV-1")).flow);
-  same("health show --valve LV-3");
-  same("health show --valve LV-3 --hourly --until 2026-11-20T10:00");
-  same("health show --valve nothing");
-  same("health trend --valve LV-3 --limit travel=3");
-  const std::string since = " --since 2000d --limit travel=3";
-  same("worklist --top 0" + since);
+  same("health --valve LV-3");
+  same("health --valve LV-3 --hourly --to 2026-11-20T10:00");
+  same("health --valve nothing");
+  same("health --valve LV-3 --limit travel=3");
+  const std::string since = " --from 2000d --limit travel=3";
+  same("worklist --rows 0" + since);
   same("worklist --valve 'LV-*' --discipline instrument" + since);
   const Outcome list =
-      Store("history list --limit 1 --csv --from '" + Url() + "' --monitor a");
+      Store("history list --rows 1 --csv --db '" + Url() + "' --monitor a");
   EXPECT_THAT(
       list.out,
       HasSubstr("unconfirmed_utc,fault_name,acked_utc,ack_comment,alarm_state,"
                 "shelved_until_utc,second,host,monitor\n"));
   EXPECT_THAT(list.out, HasSubstr(",a\n"));
-  EXPECT_THAT(Store("history list --from '" + Url() + "' --monitor b").out,
+  EXPECT_THAT(Store("history list --db '" + Url() + "' --monitor b").out,
               HasSubstr("no episode matches"));
-  EXPECT_THAT(Store("worklist --monitor b --from '" + Url() + "'" + since).out,
+  EXPECT_THAT(Store("worklist --monitor b --db '" + Url() + "'" + since).out,
               HasSubstr("Nothing to do."));
 }
 
@@ -764,7 +764,7 @@ TEST_F(ShipTest, AnEpisodeThatMovesEndsWhereItWas) {
   });
   EXPECT_EQ(reader.Show(id).id, Id());
   EXPECT_THROW(reader.Show(""), NotFoundError);
-  EXPECT_THAT(Store("history list --from '" + Url() + "'").out,
+  EXPECT_THAT(Store("history list --db '" + Url() + "'").out,
               AllOf(HasSubstr("NORMAL"), HasSubstr("UNACK")));
 
   move(there, here, -90);  // Its stamps are ahead of the clock.
@@ -797,7 +797,7 @@ TEST_F(ShipTest, WhatTwoMonitorsSawCountsOnce) {
   EXPECT_EQ(hours[0].monitor, "b");
   EXPECT_EQ(hours[1].monitor, "a");
   const auto list = nlohmann::json::parse(
-      Store("worklist --json --since 2000d --from '" + Url() + "'").out);
+      Store("worklist --json --from 2000d --db '" + Url() + "'").out);
   ASSERT_EQ(list["rows"].size(), 1U);
   EXPECT_EQ(list["rows"][0]["episodes"], 1);
   EXPECT_EQ(list["rows"][0]["monitor"], "a");
@@ -997,7 +997,7 @@ TEST_F(ShipTest, ABadRowHidesNoGoodOne) {
   EXPECT_EQ(PlantRowsOf("SELECT count(day_utc) FROM fdi.coverage_hours"),
             std::vector<std::string>{"|0"});
   const Outcome said =
-      Store("history list --from '" + Url() + "' --since 2000-01-01 --json");
+      Store("history list --db '" + Url() + "' --from 2000-01-01 --json");
   EXPECT_THAT(said.err, HasSubstr("plant_rows_left_out"));
 }
 
@@ -1005,7 +1005,7 @@ TEST_F(ShipTest, ABadRowHidesNoGoodOne) {
 TEST_F(ShipTest, ASchemaOfBeforeTheBaselineIsRefused) {
   Init();
   PlantDatabase(Url()).RunScript("UPDATE fdi.plant SET version = 8");
-  for (const char* command : {"ship --init --to '", "history list --from '"}) {
+  for (const char* command : {"ship --init --db '", "history list --db '"}) {
     const Outcome refused = Store(command + Url() + "'");
     EXPECT_EQ(refused.code, 3);
     EXPECT_THAT(refused.err, HasSubstr("version 8, this program needs"));
@@ -1176,7 +1176,7 @@ TEST_F(ShipTest, APoolerMayGiveEachTransactionAnotherSession) {
   for (int i = 0; i < 3; ++i) {
     RecordEpisode(writer, 0b01, "LV-" + std::to_string(i));
     const Outcome outcome = Store("ship --data " + Folder("a").string() +
-                                  " --monitor a --to '" + pooled + "'");
+                                  " --monitor a --db '" + pooled + "'");
     EXPECT_EQ(outcome.code, 0) << outcome.err;
     // Two readers hold a connection each, so that the sessions change.
     PlantReader first(pooled);

@@ -44,7 +44,7 @@ faults=()
 for ((start = episode; start < seconds * speed; start += episode)); do
   faults+=(--fault "f19:abrupt@$start:strength=0.5:until=$((start + episode / 4))")
 done
-"$bin/fdi-simulator" --domain "$domain" run --valves "$valves" \
+"$bin/fdi-simulator" --domain "$domain" run --count "$valves" \
   --speed "$speed" --duration $((seconds * speed)) \
   --parameters paper-operating-point "${faults[@]}" \
   >"$out/publisher.out" 2>"$out/publisher.log" &

@@ -83,7 +83,7 @@ is_as_imported() { cmp -s <(readings "$FDI_DATA") <(readings imported); }
 
 wrong=()
 if [ -n "$all" ]; then  # Of the valve whose supply is lost later.
-  "$bin/fdi-simulator" run --no-publish --seed 4101 --export healthy.csv \
+  "$bin/fdi-simulator" run --no-publish --seed 4101 -o healthy.csv \
     --scenario "$tests/../../campaigns/operation/normal.toml" >simulator.log 2>&1
   "$bin/fdi-trainer" onboard --valve b10_supply_lost --file healthy.csv \
     --signals CV,X,F --no-coverage >onboard.log 2>&1 ||
@@ -98,7 +98,7 @@ while IFS='|' read -r name zone onboards samples no_x no_f; do
   printf '%-28s' "$name" >"$name.row"
   refused=
   [ -n "$samples" ] || refused=$onboards
-  run fdi-store runs sniff "$file" --zone "$zone" --map-output "$name.toml"
+  run fdi-store runs sniff "$file" --zone "$zone" -o "$name.toml"
   judge sniff "$refused" [ -s "$name.toml" ]
   map=(--map "$name.toml")
   [ -s "$name.toml" ] || map=(--zone "$zone")
@@ -114,7 +114,7 @@ while IFS='|' read -r name zone onboards samples no_x no_f; do
   map=(--map "$name.toml")
   [ -s "$name.toml" ] || map=(--zone "$zone")
   run fdi-simulator --domain "$domain" replay --valve "$name" --split-gaps \
-    --csv "$FDI_REFERENCE_DATA/cases/$name.csv" "${map[@]}" --speed max
+    --file "$FDI_REFERENCE_DATA/cases/$name.csv" "${map[@]}" --speed max
   mv verb.out "$name.replay"
   echo $code >"$name.code"
 done <cases.txt
@@ -139,7 +139,7 @@ slow() {  # PROGRAM WORDS
   run "$@"
   [ "$code" -eq 0 ] || fail "LIC-106, $2: $(tail -1 verb.out)"
 }
-slow fdi-store runs sniff "$loop" --map-output lic.toml
+slow fdi-store runs sniff "$loop" -o lic.toml
 slow fdi-trainer onboard --valve LIC-106 --map lic.toml --file "$loop@0:345600" \
   --no-coverage
 slow fdi-trainer evaluate --valve LIC-106 --map lic.toml --assume-normal \

@@ -50,7 +50,7 @@ for form in "$@"; do
   export_as healthy.csv "$form" >export.csv
   map=()
   if [ "$form" != record ]; then
-    "$bin/fdi-store" runs sniff export.csv --zone $zone --map-output tags.toml \
+    "$bin/fdi-store" runs sniff export.csv --zone $zone -o tags.toml \
       >sniff.log 2>&1 || fail "sniff refuses $form"
     # What no size tells: a tag without unit may be gauge or absolute.
     sed -i 's/^unit = "bar"$/unit = "bar g"/' tags.toml
@@ -94,11 +94,11 @@ done
 # A healthy loop whose command moves by some per cent every second: what is drawn
 # between its readings is wrong by as much, and is not judged.
 "$bin/fdi-simulator" run --no-publish --duration 1500 --seed 31 \
-  --excitation level-loop --export loop.csv --log-level error >/dev/null
+  --excitation level-loop -o loop.csv --log-level error >/dev/null
 "$bin/fdi-trainer" onboard --valve loop --file loop.csv --no-coverage \
   >onboard.log 2>&1 || fail "onboarding refuses the loop"
 awk -v form=spreadsheet -f "$tests/exports.awk" loop.csv >export.csv
-"$bin/fdi-store" runs sniff export.csv --zone $zone --map-output loop.toml \
+"$bin/fdi-store" runs sniff export.csv --zone $zone -o loop.toml \
   >sniff.log 2>&1 || fail "sniff refuses the loop"
 sed -i 's/^unit = "bar"$/unit = "bar g"/' loop.toml
 "$bin/fdi-study" evaluate --model-set loop --file export.csv --map loop.toml \
@@ -116,7 +116,7 @@ start --model-set "$form"
 name=${faults[0]%%:*}
 export_as "$name.csv" "$form" >export.csv
 timeout 60 "$bin/fdi-simulator" --domain "$domain" replay --valve LC51_03 \
-  --csv export.csv --map tags.toml --split-gaps --speed max >simulator.log 2>&1 ||
+  --file export.csv --map tags.toml --split-gaps --speed max >simulator.log 2>&1 ||
   fail "the replay fails"
 stop
 found=$(history "select fault from fault_history where valve_id = 'LC51_03'")

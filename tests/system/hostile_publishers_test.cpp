@@ -127,6 +127,9 @@ TEST_F(HostilePublishersTest, OfTwoPublishersOfOneValveTheNewerIsDiagnosed) {
   ASSERT_TRUE(AwaitDiagnosed(160));
 
   EXPECT_EQ(counters_["superseded"], 60U);
+  EXPECT_TRUE(Await([this] { return health_ == idl::Health::kDegraded; }));
+  EXPECT_EQ(counters_["valves_two_publishers"], 1U);
+  EXPECT_TRUE(monitor->AwaitLine("two_publishers id=M118 valves=1 first=V1"));
   ASSERT_EQ(vectors_.size(), 100U);
   for (std::size_t k = 0; k < 100; ++k) {
     EXPECT_EQ(vectors_[k].verdict.source_id, k < 40 ? 1U : 2U) << k;

@@ -5,7 +5,7 @@
 set -euo pipefail
 source "$(cd "$(dirname "$0")" && pwd)/programs.sh" "$1"
 
-"$bin/fdi-simulator" run --no-publish --duration 1500 --export valve.csv \
+"$bin/fdi-simulator" run --no-publish --duration 1500 -o valve.csv \
   >simulator.log 2>&1
 awk 'BEGIN {print "t_s,CV_pct,P1_kPa,P2_kPa,T1_degC,X_pct,F_t_h"
   for (i = 0; i < 600000; ++i) print i ",40.5,3500,2600,100,41.25,22.125"}' >long.csv
@@ -23,7 +23,7 @@ interrupt() {  # PROGRAM WORDS
   [ $took -lt 1200000 ] || fail "$* took $took us to end"
   printf '%s ' "$1 $2: $((took / 1000)) ms"
 }
-interrupt fdi-store runs sniff long.csv --map-output tags.toml
+interrupt fdi-store runs sniff long.csv -o tags.toml
 interrupt fdi-store runs import long.csv --valve FV-1
 interrupt fdi-trainer onboard --valve FV-1 --file valve.csv --no-coverage
 [ ! -e tags.toml ] || fail "a map was written"

@@ -63,7 +63,7 @@ expect 'lineage' "$(json trained.json '$.lineage.episodes' \
 others=()
 for seed in 500 501 502 503 504 505; do
   "$bin/fdi-simulator" run --scenario plant.toml --seed $seed --speed max \
-    --no-publish --export "$seed.csv" >simulator.log 2>&1 ||
+    --no-publish -o "$seed.csv" >simulator.log 2>&1 ||
     fail "the simulator fails"
   others+=(--file "$seed.csv")
 done

@@ -58,7 +58,7 @@ class LoadTest : public MonitorFixture {
     if (with_stuck_subscriber) {
       watch.emplace(std::vector<std::string>{
           FDI_MONITOR_PROGRAM, "--domain", std::to_string(domain_.id()),
-          "--transport", "udp", "watch", "--count"});
+          "--transport", "udp", "watch", "--totals"});
       EXPECT_TRUE(watch->AwaitLine("watch_ready")) << watch->errors();
       EXPECT_TRUE(Await([this] { return counters_.contains("received"); }));
       watch->Signal(SIGSTOP);
@@ -119,7 +119,7 @@ TEST_F(LoadTest, ATermUnderFullLoadDrainsAndEnds) {
   const ChildProcess publisher(
       {FDI_SIMULATOR_PROGRAM, "--domain", std::to_string(domain_.id()),
        "--transport", "udp", "--data", (directory_.path() / "sim").string(),
-       "run", "--valve", "V", "--valves", "200", "--duration", "100000",
+       "run", "--valve", "V", "--count", "200", "--duration", "100000",
        "--speed", "max"});
   ASSERT_TRUE(Await([this] { return counters_["diagnosed"] > 20'000; }))
       << publisher.errors();

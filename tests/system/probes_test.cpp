@@ -89,7 +89,7 @@ void ExpectExposition(const std::string& page) {
 
 TEST_F(ProbesTest, MetricsParseAndAgreeWithTheStatusOnTheBus) {
   StoreModels(data_, LinearModels());
-  const auto monitor = StartWithHttp({"--record", "--valves", "V1"});
+  const auto monitor = StartWithHttp({"--record", "--valve", "V1"});
   Publish(0, 40);
   Publish(BadSample(40));
   Publish(PlantSample(7));

@@ -29,7 +29,7 @@ std::string LineOf(int k) {
 TEST_F(PvLoopTest, APressureLoopThatDoesNotAnswerHasItsEpisode) {
   const auto monitor = StartMonitor({"--record=lossless"});
   simulator::Process replay(
-      {"replay", "--csv", "-", "--valve", "PV-7", "--keep-alive", "--domain",
+      {"replay", "--file", "-", "--valve", "PV-7", "--keep-alive", "--domain",
        std::to_string(domain_.id()), "--data", data_.string()});
   const auto named = [this] {
     return !faults_.empty() &&

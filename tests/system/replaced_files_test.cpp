@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "storage/history/history_editor.h"
 #include "storage/history/history_reader.h"
 #include "storage/runs/run_recorder.h"
 #include "storage/runs/runs.h"
@@ -59,6 +60,40 @@ TEST_F(ReplacedFilesTest, ADeletedHistoryIsMadeAnewWithWhatIsOpen) {
     reasons.push_back(gap.reason);
   }
   EXPECT_THAT(reasons, Contains("persistence_degraded"));
+}
+
+// "They are temporary files." Meanwhile an operator shelves the alarm.
+TEST_F(ReplacedFilesTest, DeletedLogsCostNothing) {
+  StoreModels(data_, LinearModels());
+  const auto monitor = StartMonitor({"--record"});
+  Publish(0, 50);
+  Publish(50, 80, kF7Offset);
+  ASSERT_TRUE(AwaitEvent(TransitionKind::kIsolated)) << monitor->errors();
+  ASSERT_TRUE(Await([this] { return counters_["recorded"] == 80; }));
+  for (const char* file :
+       {"history.db-wal", "history.db-shm", "runs.db-wal", "runs.db-shm"}) {
+    ASSERT_TRUE(std::filesystem::remove(data_ / file)) << file;
+  }
+  storage::HistoryEditor(data_ / "history.db")
+      .Shelve("V1", std::nullopt, storage::UtcNow() + 3'600'000'000'000,
+              {"anna", "", "test", storage::UtcNow()});
+  Publish(80, 150);
+  ASSERT_TRUE(AwaitEvent(TransitionKind::kClosed)) << monitor->errors();
+  EXPECT_TRUE(faults_.back().persisted);
+  ASSERT_TRUE(Await([this] { return counters_["recorded"] == 150; }));
+  monitor->Signal(SIGTERM);
+
+  EXPECT_EQ(monitor->AwaitExit(), 0) << monitor->errors();
+  EXPECT_EQ(monitor->errors().find("degraded"), std::string::npos);
+  storage::HistoryReader history(data_ / "history.db");
+  EXPECT_TRUE(history.database().Check().empty());
+  ASSERT_EQ(history.List().size(), 1U);
+  EXPECT_TRUE(history.List()[0].ended_ns);
+  ASSERT_EQ(history.Shelves(std::nullopt).size(), 1U);
+  storage::RunStore runs(data_ / "runs.db");
+  EXPECT_TRUE(runs.database().Check().empty());
+  ASSERT_EQ(runs.List().size(), 1U);
+  EXPECT_EQ(runs.List()[0].samples, 150);
 }
 
 // Moved into place as a backup is, with the WAL of the old file left beside it.

@@ -8,7 +8,7 @@ source "$(dirname "$0")/programs.sh" "$1"
 
 record() {  # FILE OPTIONS
   "$bin/fdi-simulator" run --no-publish --speed max --excitation level-loop \
-    --export "$@" 2>simulator.log >&2 || fail "the simulator fails"
+    -o "$@" 2>simulator.log >&2 || fail "the simulator fails"
 }
 
 record healthy.csv --seed 31 --duration 3600
@@ -22,7 +22,7 @@ wanted=$(sqlite3 :memory: "select group_concat(value, '|') from
    '\$.runs[0].final_set') order by value)")
 
 start
-timeout 400 "$bin/fdi-simulator" --domain "$domain" replay --csv faulty.csv \
+timeout 400 "$bin/fdi-simulator" --domain "$domain" replay --file faulty.csv \
   --valve LV-1 --speed 12 >simulator.log 2>&1 || fail "the simulator fails"
 stop
 

@@ -56,8 +56,8 @@ class SharesTest : public MonitorFixture {
 };
 
 TEST_F(SharesTest, TwoMonitorsThatTakeOneValveAreBothTold) {
-  const auto one = StartAnother("one", {"--valves", "V*"});
-  const auto two = StartAnother("two", {"--valves", "*1"});
+  const auto one = StartAnother("one", {"--valve", "V*"});
+  const auto two = StartAnother("two", {"--valve", "*1"});
   ASSERT_TRUE(samples_->WaitForReaders(2, kMonitorPatience));
   Publish(PlantSample(0), "V1");
   Publish(PlantSample(0), "V2");
@@ -105,7 +105,7 @@ TEST_F(SharesTest, APartitionIsAShareOfItsOwn) {
 // What one monitor was at with a valve, the other one goes on with.
 TEST_F(SharesTest, AMovedValveTakesItsEpisodeAndAccumulatorsAlong) {
   const auto from = directory_.path() / "from";
-  auto monitor = StartAnother("from", {"--valves", "V*"});
+  auto monitor = StartAnother("from", {"--valve", "V*"});
   ASSERT_TRUE(samples_->WaitForReaders(1, kMonitorPatience));
   ASSERT_TRUE(events_->WaitForWriters(1, kMonitorPatience));
   for (const char* valve : {"V1", "V2"}) {
@@ -115,14 +115,9 @@ TEST_F(SharesTest, AMovedValveTakesItsEpisodeAndAccumulatorsAlong) {
   }
   ASSERT_TRUE(Await([this] { return faults_.size() == 4; }));
   const auto to = directory_.path() / "to";
-  const std::vector<std::string> move{FDI_STORE_PROGRAM,
-                                      "--data",
-                                      from.string(),
-                                      "valves",
-                                      "move",
-                                      "V1",
-                                      "--to",
-                                      to.string()};
+  const std::vector<std::string> move{
+      FDI_STORE_PROGRAM, "--data", from.string(), "valves", "move", "V1",
+      to.string()};
   EXPECT_EQ(ChildProcess(move).AwaitExit(), 3) << "while the monitor runs";
   monitor->Signal(SIGTERM);
   ASSERT_EQ(monitor->AwaitExit(), 0);
@@ -134,7 +129,7 @@ TEST_F(SharesTest, AMovedValveTakesItsEpisodeAndAccumulatorsAlong) {
 
   faults_.clear();
   data_ = to;
-  monitor = StartMonitor({"--valves", "V1"});
+  monitor = StartMonitor({"--valve", "V1"});
   for (std::uint64_t k = 80; k < 150; ++k) {
     Publish(PlantSample(k, k < 120 ? kF7Offset : 0.0));
   }

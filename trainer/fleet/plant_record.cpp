@@ -208,16 +208,7 @@ std::string Verdict(const loop::Audit& audit) {
 
 }  // namespace
 
-// The plant's own words of the mode are replaced in the text, so that whatever
-// reads it need only know AUTO and MANUAL.
 std::vector<RowText> TextsOf(const PlantJob& job, PlantFiles& files) {
-  std::map<std::string, std::string> words;
-  for (const std::string& word : job.row.auto_words) {
-    words.emplace(word, "AUTO");
-  }
-  for (const std::string& word : job.row.manual_words) {
-    words.emplace(word, "MANUAL");
-  }
   std::vector<RowText> texts;
   for (const RowSource& source : job.sources) {
     const auto index = files.Open(source.path);
@@ -227,9 +218,7 @@ std::vector<RowText> TextsOf(const PlantJob& job, PlantFiles& files) {
         columns.push_back(column);
       }
     }
-    texts.push_back(
-        {index->Project(columns, source.match[LoopTag::kMode], words),
-         index->form()});
+    texts.push_back({index->Project(columns), index->form()});
   }
   return texts;
 }
@@ -261,9 +250,8 @@ std::uint64_t InputHash(const PlantJob& job, const std::vector<RowText>& texts,
     const importer::ColumnMap& form = texts[i].form;
     input += form.zone + '\n' + std::string(1, form.decimal) +
              std::to_string(static_cast<int>(form.date_order)) + ' ' +
-             std::to_string(static_cast<int>(form.time_form)) + ' ' +
-             NumberText(form.time_scale) + '\n' + Listed(form.no_reading) +
-             '\n';
+             std::string(importer::TimeUnitName(form.time_unit)) + '\n' +
+             Listed(form.no_reading) + '\n';
     if (form.resampling) {
       input += NumberText(form.resampling->period_s) + ' ' +
                NumberText(form.resampling->limit_s) +

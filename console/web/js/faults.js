@@ -148,8 +148,9 @@ function refusalText({reason, signals, flow_unit: unit}) {
 }
 
 // "no P1; F not judged"
-function lackText({quality, missing, unjudged, refused, blind}) {
+function lackText({quality, missing, unjudged, refused, blind, contested}) {
   return [
+    contested ? 'two publishers send it, the newest counts' : '',
     blind ? 'limits too wide to see a fault' : '',
     missing?.length ? `no ${missing.join(', ')}` : '',
     unjudged?.length ? `${unjudged.join(', ')} not judged` : '',
@@ -163,7 +164,8 @@ export function qualityText(tile) {
     monitor_silent_since_ms: silent} = tile;
   if (quality === 'LIVE') return lackText(tile);
   if (silent) return `monitor ${monitor} silent since ${timeText(silent)}`;
-  const why = quality === 'BAD_INPUT' ? lackText(tile) : (reasons ?? '')
+  const why = quality === 'BAD_INPUT' || tile.contested ? lackText(tile) :
+    (reasons ?? '')
       .split('|').map((r) => kReasonWords[r] ?? r).join(', ');
   return (kQualityWords[quality] ?? plain(quality)) +
       (stamp && quality === 'STALE' ? ` since ${timeText(stamp)}` :

@@ -41,7 +41,7 @@ struct Block {
 std::vector<Tag> tags;  // By address.
 std::vector<Block> blocks;
 constexpr const char* kClock = "clock";  // The tag that is the PLC's time.
-double newest_s = 0.0;  // Stamp of the last answer.
+double newest_s = 0.0;                   // Stamp of the last answer.
 long readings = 0, bad = 0, refused = 0, connections = 0;
 volatile std::sig_atomic_t stopping = 0;
 
@@ -55,22 +55,20 @@ void Say(const char* what) {
 bool TakeTag(const char* text) {
   char name[64] = "", type[64] = "u16", special[64] = "-";
   Tag tag;
-  const int taken =
-      std::sscanf(text, "%63[^=]=%d:%63[^:]:%63[^:]:%lf", name, &tag.address,
-                  type, special, &tag.scale);
+  const int taken = std::sscanf(text, "%63[^=]=%d:%63[^:]:%63[^:]:%lf", name,
+                                &tag.address, type, special, &tag.scale);
   tag.name = name;
   tag.type = type;
-  tag.special = special[0] == '-' && special[1] == '\0' ? NAN
-                                                        : std::atof(special);
+  tag.special =
+      special[0] == '-' && special[1] == '\0' ? NAN : std::atof(special);
   tags.push_back(tag);
   return taken >= 2 && tag.address >= 0 &&
          (tag.wide() || tag.type == "u16" || tag.type == "i16");
 }
 
 void MakeBlocks() {
-  std::sort(tags.begin(), tags.end(), [](const Tag& a, const Tag& b) {
-    return a.address < b.address;
-  });
+  std::sort(tags.begin(), tags.end(),
+            [](const Tag& a, const Tag& b) { return a.address < b.address; });
   for (Tag& tag : tags) {
     if (blocks.empty() ||
         tag.end() - blocks.back().first > MODBUS_MAX_READ_REGISTERS)
@@ -100,8 +98,8 @@ void Print(Tag& tag, double value, double stamp_s) {
     std::printf("{\"tag\":\"%s\",\"t\":%.3f,\"v\":%.9g}\n", tag.name.c_str(),
                 stamp_s, value);
   else
-    std::printf("{\"tag\":\"%s\",\"t\":%.3f,\"q\":\"bad\"}\n",
-                tag.name.c_str(), stamp_s);
+    std::printf("{\"tag\":\"%s\",\"t\":%.3f,\"q\":\"bad\"}\n", tag.name.c_str(),
+                stamp_s);
   ++(usable ? readings : bad);
 }
 
@@ -175,7 +173,8 @@ int main(int argc, char** argv) {
       for (Tag& tag : tags)
         tag.said = false;
       do
-        usleep(static_cast<unsigned>(1e6 * (poll_s - std::fmod(Now(), poll_s))));
+        usleep(
+            static_cast<unsigned>(1e6 * (poll_s - std::fmod(Now(), poll_s))));
       while (!stopping && Read(plc));
       for (const Block& block : blocks)
         PrintBad(block);

@@ -88,7 +88,7 @@ class PublishTest : public testing::Test {
   std::string MakeCsv(const std::string& duration_s) const {
     const std::string file = (folder_.path() / "run.csv").string();
     const Ended ended = RunProgram(
-        {"run", "--no-publish", "--export", file, "--duration", duration_s});
+        {"run", "--no-publish", "-o", file, "--duration", duration_s});
     EXPECT_EQ(ended.code, 0) << ended.err;
     return file;
   }

@@ -30,7 +30,7 @@ TEST_F(AppPublishTest, AReplayedCsvArrivesInOrderBitForBit) {
   const importer::CsvTable table = importer::ReadCsvFile(file);
   Reader reader(domain_);
 
-  Process process(With({"replay", "--csv", file, "--valve", "LC1", "--speed",
+  Process process(With({"replay", "--file", file, "--valve", "LC1", "--speed",
                         "max", "--start", "2026-03-01T00:00:00Z"}));
   ASSERT_TRUE(reader.TakeUntilEnded());
   const Ended ended = process.Wait();
@@ -60,7 +60,7 @@ TEST_F(AppPublishTest, StampsThatEndNowAreNeverAheadOfTheClock) {
   const std::string file = MakeCsv("300");
   for (const std::vector<std::string>& what :
        std::vector<std::vector<std::string>>{{"run", "--duration", "300"},
-                                             {"replay", "--csv", file}}) {
+                                             {"replay", "--file", file}}) {
     Reader reader(domain_);
     std::vector<std::string> words = what;
     words.insert(words.end(), {"--valve", "E", "--speed", "300", "--end-now"});
@@ -73,7 +73,7 @@ TEST_F(AppPublishTest, StampsThatEndNowAreNeverAheadOfTheClock) {
     EXPECT_GE(last_ns, began_ns - 1'000'000'000);
   }
   const Ended refused =
-      RunProgram({"replay", "--csv", "-", "--valve", "E", "--end-now"});
+      RunProgram({"replay", "--file", "-", "--valve", "E", "--end-now"});
   EXPECT_EQ(refused.code, 2);
   EXPECT_THAT(refused.err, HasSubstr("whose end is not known"));
 }
@@ -81,7 +81,7 @@ TEST_F(AppPublishTest, StampsThatEndNowAreNeverAheadOfTheClock) {
 TEST_F(AppPublishTest, AtMaxSpeedASlowReaderLosesNothing) {
   Reader reader(domain_);
   Process process(With(
-      {"replay", "--csv", MakeLongCsv(), "--valve", "S", "--speed", "max"}));
+      {"replay", "--file", MakeLongCsv(), "--valve", "S", "--speed", "max"}));
 
   ASSERT_TRUE(reader.AwaitFull());
   ASSERT_TRUE(reader.TakeUntilEnded(1, 1000));
@@ -101,7 +101,7 @@ TEST_F(AppPublishTest, ManyValvesArriveWholeEachFromItsOwnSource) {
   Reader reader(domain_);
 
   Process process(
-      With({"run", "--valves", "20", "--duration", "200", "--speed", "max"}));
+      With({"run", "--count", "20", "--duration", "200", "--speed", "max"}));
   ASSERT_TRUE(reader.TakeUntilEnded(20));
   const Ended ended = process.Wait();
 
@@ -157,7 +157,7 @@ TEST_F(AppPublishTest, GapsOfAFileAreKept) {
                                      "2,3,3\n60,4,4\n61,5,5\n");
   Reader reader(domain_);
 
-  Process process(With({"replay", "--csv", file, "--valve", "G", "--speed",
+  Process process(With({"replay", "--file", file, "--valve", "G", "--speed",
                         "max", "--split-gaps"}));
   ASSERT_TRUE(reader.TakeUntilEnded());
 
@@ -188,7 +188,7 @@ TEST_F(AppPublishTest, ReferenceFilesAreReplayedAsTheyAreRead) {
         importer::ReadCsvFile(file, {.map = importer::ReadTagMap(tags)});
     Reader reader(domain_);
 
-    Process process(With({"replay", "--csv", file, "--map", tags, "--valve",
+    Process process(With({"replay", "--file", file, "--map", tags, "--valve",
                           name, "--speed", "max"}));
     ASSERT_TRUE(reader.TakeUntilEnded());
 
@@ -251,7 +251,7 @@ TEST_F(AppPublishTest, WhatBecomesOfItsLogHoldsNothingUp) {
     }
     Reader reader(domain_);
     Process process(
-        With({"replay", "--csv", file, "--valve", "L", "--speed", "max"}),
+        With({"replay", "--file", file, "--valve", "L", "--speed", "max"}),
         log[1]);
     close(log[1]);
 
@@ -267,7 +267,7 @@ TEST_F(AppPublishTest, WhatBecomesOfItsLogHoldsNothingUp) {
 TEST_F(AppPublishTest, SigtermEndsAWriterWhoseReaderTakesNothing) {
   Reader reader(domain_);
   Process process(With(
-      {"replay", "--csv", MakeLongCsv(), "--valve", "S", "--speed", "max"}));
+      {"replay", "--file", MakeLongCsv(), "--valve", "S", "--speed", "max"}));
   ASSERT_TRUE(
       reader.TakeUntil([&] { return !reader.Samples("S").empty(); }, 1));
   ASSERT_TRUE(reader.AwaitFull());

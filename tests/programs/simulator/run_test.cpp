@@ -87,7 +87,7 @@ TEST_F(AppRunTest, AStoredScenarioRepeatsItsRun) {
 
 TEST_F(AppRunTest, EachOfManyValvesIsARunOfItsOwn) {
   const Ended ended = RunProgram({"run", "--no-publish", "--record", "--data",
-                                  Data(), "--valves", "3", "--valve", "LC",
+                                  Data(), "--count", "3", "--valve", "LC",
                                   "--duration", "10", "--seed", "5"});
 
   ASSERT_EQ(ended.code, 0) << ended.err;
@@ -107,7 +107,7 @@ TEST_F(AppRunTest, EachOfManyValvesIsARunOfItsOwn) {
 TEST_F(AppRunTest, TheExportedCsvHasTheBitsOfTheRun) {
   const std::string file = (folder_.path() / "run.csv").string();
   const storage::StoredRun run =
-      Record({"--duration", "50", "--export", file, "--fault",
+      Record({"--duration", "50", "-o", file, "--fault",
               "f19:abrupt@20:strength=-0.5"});
 
   const importer::CsvTable table = importer::ReadCsvFile(file);
@@ -154,20 +154,17 @@ TEST_F(AppRunTest, WhatItRefusesItNamesWithWhatIsAccepted) {
       {{"run", "--no-publish", "--start", "noon"}, 2, {"noon"}},
       {{"run", "--speed", "fast"}, 2, {"fast", "max"}},
       {{"run", "--no-publish", "--valve", std::string(65, 'v')}, 2, {"64"}},
-      {{"run", "--no-publish", "--valves", "2", "--export", "x.csv"},
+      {{"run", "--no-publish", "--count", "2", "-o", "x.csv"}, 2, {"-o"}},
+      {{"run", "--no-publish", "--seed", "9223372036854775807", "--count", "2"},
        2,
-       {"--export"}},
-      {{"run", "--no-publish", "--seed", "9223372036854775807", "--valves",
-        "2"},
-       2,
-       {"--valves 2", "9223372036854775807"}},
-      {{"replay", "--valve", "V"}, 2, {"--csv", "--run"}},
-      {{"replay", "--csv", text}, 2, {"--valve"}},
-      {{"replay", "--valve", "V", "--csv", text}, 3, {"text.csv:3", "fifty"}},
-      {{"replay", "--valve", "V", "--csv", missing}, 3, {"CV_pct"}},
-      {{"replay", "--valve", "V", "--csv", jump}, 3, {"jump.csv:5"}},
-      {{"replay", "--valve", "V", "--csv", empty}, 3, {"empty"}},
-      {{"replay", "--valve", "V", "--csv", "no.csv"}, 5, {"no.csv"}},
+       {"--count 2", "9223372036854775807"}},
+      {{"replay", "--valve", "V"}, 2, {"--file", "--run"}},
+      {{"replay", "--file", text}, 2, {"--valve"}},
+      {{"replay", "--valve", "V", "--file", text}, 3, {"text.csv:3", "fifty"}},
+      {{"replay", "--valve", "V", "--file", missing}, 3, {"CV_pct"}},
+      {{"replay", "--valve", "V", "--file", jump}, 3, {"jump.csv:5"}},
+      {{"replay", "--valve", "V", "--file", empty}, 3, {"empty"}},
+      {{"replay", "--valve", "V", "--file", "no.csv"}, 5, {"no.csv"}},
       {{"replay", "--run", "0123456789ab", "--data", Data()},
        5,
        {"0123456789ab"}},
@@ -193,19 +190,6 @@ TEST_F(AppRunTest, AnUnknownRunOfAStoreIsNotFound) {
       RunProgram({"replay", "--run", "0123456789ab", "--data", Data()});
 
   EXPECT_EQ(ended.code, 5) << ended.err;
-}
-
-TEST_F(AppRunTest, TheFaultsAreListed) {
-  const Ended text = RunProgram({"faults"});
-  const Ended json = RunProgram({"faults", "--json"});
-
-  EXPECT_THAT(text.out, AllOf(HasSubstr("f19"), HasSubstr("flow reading x 0"),
-                              HasSubstr("F5")));
-  const auto faults = nlohmann::json::parse(json.out)["faults"];
-  ASSERT_EQ(faults.size(), std::size_t{kLastFault});
-  EXPECT_EQ(faults[6]["name"], "f7");
-  EXPECT_EQ(faults[6]["paper_name"], "F4");
-  EXPECT_EQ(faults[3]["strength_min"], -1.0);
 }
 
 }  // namespace

@@ -18,7 +18,7 @@ using AppStdinTest = PublishTest;
 TEST_F(AppStdinTest, EachJsonLineIsPublishedAtOnce) {
   Reader reader(domain_);
   Process process(
-      With({"replay", "--csv", "-", "--valve", "J", "--wait-reader", "20"}));
+      With({"replay", "--file", "-", "--valve", "J", "--wait-reader", "20"}));
 
   process.Send(
       "{\"t_s\": 0, \"CV_pct\": 70.1, \"X_pct\": 0.1, \"F_t_h\": 12}\n");
@@ -46,7 +46,7 @@ TEST_F(AppStdinTest, EachJsonLineIsPublishedAtOnce) {
 
 TEST_F(AppStdinTest, APvOfJsonLinesIsPublishedWithItsSetPoint) {
   Reader reader(domain_);
-  Process process(With({"replay", "--csv", "-", "--valve", "J"}));
+  Process process(With({"replay", "--file", "-", "--valve", "J"}));
   process.Send(
       "{\"CV_pct\": 70, \"F_t_h\": 12, \"sp\": 40}\n"
       "{\"CV_pct\": 71, \"pv\": 3.1, \"sp\": 3.25}\n"
@@ -69,7 +69,7 @@ TEST_F(AppStdinTest, APvOfJsonLinesIsPublishedWithItsSetPoint) {
 
 TEST_F(AppStdinTest, JsonLinesWithoutTimeAreStampedOnTheGridOfThePeriod) {
   Reader reader(domain_);
-  Process process(With({"replay", "--csv", "-", "--valve", "J", "--period",
+  Process process(With({"replay", "--file", "-", "--valve", "J", "--period",
                         "0.25", "--start", "2026-03-01T00:00:00Z"}));
 
   process.Send(
@@ -87,7 +87,7 @@ TEST_F(AppStdinTest, JsonLinesWithoutTimeAreStampedOnTheGridOfThePeriod) {
 
 TEST_F(AppStdinTest, AFilePipedThroughStdinLosesNothing) {
   Reader reader(domain_);
-  Process process(With({"replay", "--csv", "-", "--valve", "P"}));
+  Process process(With({"replay", "--file", "-", "--valve", "P"}));
   std::string lines = "t_s,CV_pct,X_pct,colour\n";
   for (int i = 0; i < 3000; ++i) {
     lines += std::to_string(i) + ",50,50,red\n";
@@ -106,8 +106,8 @@ TEST_F(AppStdinTest, AFilePipedThroughStdinLosesNothing) {
 
 TEST_F(AppStdinTest, AGapMayBeTheFirstStepIfThePeriodIsGiven) {
   Reader reader(domain_);
-  Process process(With({"replay", "--csv", "-", "--valve", "G", "--period", "1",
-                        "--split-gaps"}));
+  Process process(With({"replay", "--file", "-", "--valve", "G", "--period",
+                        "1", "--split-gaps"}));
 
   process.Send("t_s,CV_pct,X_pct\n0,50,50\n9,51,51\n10,52,52\n11,53,53\n");
   process.CloseInput();
@@ -118,8 +118,8 @@ TEST_F(AppStdinTest, AGapMayBeTheFirstStepIfThePeriodIsGiven) {
 }
 
 TEST_F(AppStdinTest, AByteOrderMarkMayPrecedeJson) {
-  Process process(With({"replay", "--csv", "-", "--valve", "J", "--wait-reader",
-                        "0", "--json"}));
+  Process process(With({"replay", "--file", "-", "--valve", "J",
+                        "--wait-reader", "0", "--json"}));
 
   process.Send("\xEF\xBB\xBF{\"CV_pct\": 1, \"X_pct\": 1}\n");
   process.CloseInput();
@@ -130,8 +130,8 @@ TEST_F(AppStdinTest, AByteOrderMarkMayPrecedeJson) {
 }
 
 TEST_F(AppStdinTest, WithoutSamplesThereIsNoStart) {
-  Process process(With({"replay", "--csv", "-", "--valve", "E", "--wait-reader",
-                        "0", "--json"}));
+  Process process(With({"replay", "--file", "-", "--valve", "E",
+                        "--wait-reader", "0", "--json"}));
 
   process.CloseInput();
 
@@ -141,7 +141,7 @@ TEST_F(AppStdinTest, WithoutSamplesThereIsNoStart) {
 TEST_F(AppStdinTest, ABadLineOnStdinEndsTheStreamBehindTheGoodOnes) {
   Reader reader(domain_);
   Process process(
-      With({"replay", "--csv", "-", "--valve", "B", "--speed", "max"}));
+      With({"replay", "--file", "-", "--valve", "B", "--speed", "max"}));
 
   process.Send("t_s,CV_pct,X_pct\n0,50,50\n1,51,51\n2,x,52\n3,53,53\n");
   ASSERT_TRUE(reader.TakeUntilEnded());
@@ -170,7 +170,7 @@ TEST_F(AppStdinTest, JsonLinesAreRefusedWithLineAndKey) {
        "stdin:3: time jumps"}};
   Reader reader(domain_);
   for (const auto& [lines, word] : cases) {
-    Process process(With({"replay", "--csv", "-", "--valve", "B"}));
+    Process process(With({"replay", "--file", "-", "--valve", "B"}));
     process.Send(lines + "\n");
     process.CloseInput();
 

@@ -8,6 +8,7 @@
 #include "storage/database/locks.h"
 #include "storage/runs/run_recorder.h"
 #include "tests/programs/store/store_program_fixture.h"
+#include "tests/storage/small_disk.h"
 
 namespace fdi::storage {
 namespace {
@@ -145,8 +146,8 @@ TEST_F(FdiStoreHistoryTest, FiltersReachTheQuery) {
   EXPECT_EQ(count("--fault f7"), 1U);
   EXPECT_EQ(count("--fault paper5"), 0U);
   EXPECT_EQ(count("--valve 'PV*'"), 0U);
-  EXPECT_EQ(count("--since 2026-11-20T14:56:12Z"), 0U);
-  EXPECT_EQ(count("--until 2026-11-20T14:56:12Z"), 1U);
+  EXPECT_EQ(count("--from 2026-11-20T14:56:12Z"), 0U);
+  EXPECT_EQ(count("--to 2026-11-20T14:56:12Z"), 1U);
   EXPECT_EQ(count("--state isolated"), 1U);
   EXPECT_EQ(Store("history list --state odd").code, 2);
   EXPECT_EQ(Store("history list --fault f99").code, 2);
@@ -223,10 +224,10 @@ TEST_F(FdiStoreHistoryTest, AFilterAcknowledgesAllItFindsIfAskedTo) {
     RecordEpisode(writer, 0b001, "PV-2");
   }
   EXPECT_EQ(Store("history ack").code, 2);
-  EXPECT_EQ(Store("history ack last --all").code, 2);
+  EXPECT_EQ(Store("history ack last --valve 'PV-*'").code, 2);
 
-  const json first = StoreJson("history ack --all --valve 'PV-*'");
-  const json again = StoreJson("history ack --all --valve 'PV-*'");
+  const json first = StoreJson("history ack --valve 'PV-*'");
+  const json again = StoreJson("history ack --valve 'PV-*'");
 
   EXPECT_EQ(first["episodes"].size(), 2U);
   EXPECT_EQ(again["episodes"].size(), 0U);
@@ -245,8 +246,8 @@ TEST_F(FdiStoreHistoryTest, AWindowIsPlannedBeforeAnyMonitorHasRun) {
   EXPECT_EQ(ParseTime(planned["until_utc"].get<std::string>(), true),
             from_ns + 7200 * kSecond);
   EXPECT_FALSE(planned["planned_utc"].is_null());
-  EXPECT_EQ(StoreJson("history shelf")["shelf"].size(), 1U);
-  EXPECT_EQ(StoreJson("history unshelve --valve FV-9")["shelf"].size(), 1U);
+  EXPECT_EQ(StoreJson("history list --shelved")["shelf"].size(), 1U);
+  EXPECT_EQ(StoreJson("history shelve FV-9 --off")["shelf"].size(), 1U);
   EXPECT_THAT(Store("--utc history shelve FV-9 --from 2026-01-01").err,
               HasSubstr("planned from a time after now"));
 }
@@ -260,7 +261,7 @@ TEST_F(FdiStoreHistoryTest, AShelfNeedsNoFolderYet) {
     return std::system(command.c_str());
   };
   EXPECT_EQ(run("history shelve FV-9 --for 2h"), 0);
-  EXPECT_EQ(run("history shelf"), 0);
+  EXPECT_EQ(run("history list --shelved"), 0);
   EXPECT_THAT(Slurp(out), HasSubstr("FV-9"));
 }
 
@@ -272,12 +273,16 @@ TEST_F(FdiStoreHistoryTest, AShelvedAlarmSaysSoUntilItIsTakenOff) {
   EXPECT_THAT(Store("history list").out, HasSubstr("SHELVED"));
   EXPECT_EQ(StoreJson("history show last")["shelf"]["who"], "anna");
 
-  EXPECT_EQ(StoreJson("history unshelve --valve LV-1")["shelf"].size(), 1U);
+  EXPECT_EQ(StoreJson("history shelve LV-1 --off")["shelf"].size(), 1U);
 
-  EXPECT_EQ(StoreJson("history shelf")["shelf"].size(), 0U);
-  EXPECT_EQ(StoreJson("history shelf --all")["shelf"].size(), 1U);
-  EXPECT_EQ(Store("history unshelve 1").code, 3);
-  EXPECT_EQ(Store("history unshelve --valve LV-1").code, 5);
+  EXPECT_EQ(StoreJson("history list --shelved")["shelf"].size(), 0U);
+  EXPECT_EQ(
+      StoreJson("history list --shelved --from 1970-01-01")["shelf"].size(),
+      1U);
+  EXPECT_EQ(Store("history shelve LV-1 --off --for 1h").code, 2);
+  EXPECT_THAT(Store("history unshelve 1").err,
+              HasSubstr("unshelve is gone: fdi-store history shelve"));
+  EXPECT_EQ(Store("history shelve LV-1 --off").code, 5);
   EXPECT_EQ(Store("history shelve LV-1 --for 91d").code, 2);
   EXPECT_THAT(Store("history shelve LV-1 --for 8").err,
               HasSubstr("--for 8: expected a time with its unit"));
@@ -310,13 +315,13 @@ TEST_F(FdiStoreHistoryTest, AnIdThatLooksLikeAPatternIsAnId) {
   ASSERT_EQ(shelved.size(), 1U);
   EXPECT_EQ(shelved[0]["valve_id"], "V[1]");
 
-  const auto moved = StoreJson("valves move 'V[1]' --to there")["valves"];
+  const auto moved = StoreJson("valves move 'V[1]' there")["valves"];
 
   ASSERT_EQ(moved.size(), 1U);
   EXPECT_EQ(moved[0]["valve_id"], "V[1]");
   EXPECT_THAT(left(), testing::UnorderedElementsAre("LV-1", "V1", "V2"));
   // No valve of that id is left: a pattern.
-  EXPECT_EQ(StoreJson("valves move 'V[1]' --to there")["valves"].size(), 1U);
+  EXPECT_EQ(StoreJson("valves move 'V[1]' there")["valves"].size(), 1U);
   EXPECT_THAT(left(), testing::UnorderedElementsAre("LV-1", "V2"));
 }
 
@@ -341,6 +346,54 @@ TEST_F(FdiStoreHistoryTest, DoctorSaysWhatIsRecordedElsewhere) {
   }
   EXPECT_THAT(Store("doctor").out, HasSubstr("a recorder runs"));
   EXPECT_TRUE(recorder.Refresh());
+  EXPECT_EQ(Store("doctor").code, 0);
+}
+
+TEST_F(FdiStoreHistoryTest, AFullDiskCanBeReadAndPruned) {
+  const SmallDisk disk(directory_.path() / "disk", "4M");
+  if (!disk.mounted()) {
+    GTEST_SKIP() << "mounting a file system is not permitted";
+  }
+  std::filesystem::copy_file(path_, disk.path() / "history.db");
+  {
+    RunRecorder recorder(disk.path() / "runs.db");
+    for (int r = 0; r < 3; ++r) {
+      NewRun run;
+      run.valve_id = "LV-1";
+      run.start_ns = kDetected + r * 100'000 * kSecond;
+      const auto key = recorder.Begin(run);
+      for (int k = 0; k < 20'000; ++k) {
+        Sample sample = Instant(k).sample;
+        sample.stamp_ns = run.start_ns + k * kSecond;
+        recorder.Append(key, LabelledSample{sample, {}});
+      }
+      recorder.End(key);
+    }
+    recorder.Close();
+  }
+  const auto before = std::filesystem::file_size(disk.path() / "runs.db");
+  ASSERT_GT(before, 400'000U);
+  disk.Fill();
+  data_ = "disk";
+
+  for (const char* call :
+       {"history list", "history show last", "runs list", "doctor",
+        "history export last -o e.csv", "backup elsewhere"}) {
+    const Outcome outcome = Store(call);
+    EXPECT_EQ(outcome.code, 0) << call << ": " << outcome.err;
+  }
+  for (const char* call : {"history ack last --by anna",
+                           "history shelve LV-1 --for 8h --by anna"}) {
+    const Outcome refused = Store(call);
+    EXPECT_EQ(refused.code, 3) << call;
+    EXPECT_THAT(refused.err, HasSubstr("the disk is full: 0 bytes are free"));
+  }
+  const Outcome pruned = Store("prune --runs-size 200kB");
+  EXPECT_EQ(pruned.code, 0) << pruned.err;
+  EXPECT_LT(std::filesystem::file_size(disk.path() / "runs.db"), before / 2);
+  EXPECT_EQ(Store("runs list").code, 0);
+  const Outcome acked = Store("history ack last --by anna");
+  EXPECT_EQ(acked.code, 0) << acked.err;
   EXPECT_EQ(Store("doctor").code, 0);
 }
 
@@ -382,7 +435,7 @@ TEST_F(FdiStoreHistoryTest, WhatTheWorkListTookOverNamesIt) {
   for (const char* verb : {"history stats", "history causes"}) {
     const Outcome outcome = Store(verb);
     EXPECT_EQ(outcome.code, 2) << verb;
-    EXPECT_THAT(outcome.err, HasSubstr("is gone: `fdi-store worklist`"));
+    EXPECT_THAT(outcome.err, HasSubstr("is gone: fdi-store worklist"));
   }
 }
 
@@ -410,7 +463,8 @@ TEST_F(FdiStoreHistoryTest, PlotIsAPictureOrAClearError) {
   EXPECT_EQ(Store("history plot last --output a.png").code, 0);
 
   EXPECT_EQ(Slurp(directory_.path() / "a.png").substr(1, 3), "PNG");
-  EXPECT_EQ(Store("history plot last -o a.svg --from -10").code, 0);
+  EXPECT_EQ(
+      Store("history plot last -o a.svg --from 2026-11-20T14:56:00Z").code, 0);
   EXPECT_THAT(Slurp(directory_.path() / "a.svg"), HasSubstr("isolated f7"));
 }
 
@@ -429,7 +483,7 @@ TEST_F(FdiStoreHistoryTest, DoctorFindsASoundDirectorySound) {
   EXPECT_EQ(report["sound"], true);
   ASSERT_EQ(report["databases"].size(), 3U);
   EXPECT_EQ(report["databases"][0]["present"], false);
-  EXPECT_EQ(report["databases"][2]["version"], 17);
+  EXPECT_EQ(report["databases"][2]["version"], 18);
   EXPECT_EQ(report["databases"][2]["figures"]["open_episodes"], 1);
   EXPECT_EQ(report["databases"][2]["figures"]["unsent_events"], 2);
 }
@@ -492,7 +546,7 @@ TEST_F(FdiStoreHistoryTest, DoctorFindsADamagedIdInTheOutbox) {
     database.Run(
         "INSERT INTO episode_event (event_id, episode_id, kind, stamp_ns, "
         "recorded_ns) VALUES (99, 'zzzzzzzzzzzzzzzz', 'DETECTED', 1, 1)");
-    database.Run("INSERT INTO event_outbox VALUES (99)");
+    database.Run("INSERT INTO event_outbox (event_id) VALUES (99)");
     transaction.Commit();
   }
 

@@ -38,23 +38,23 @@ class FdiStorePlannerTest : public FdiStoreTest {
 
 TEST_F(FdiStorePlannerTest, TrendGivesTimeAndInterval) {
   KeepHealth();
-  const json trend = StoreJson("health trend --valve V1 --limit X=3")["trends"];
+  const json trend = StoreJson("health --valve V1 --limit X=3")["trends"];
   ASSERT_EQ(trend.size(), 1u);
   EXPECT_EQ(trend[0]["answer"], "time");
   EXPECT_NEAR(trend[0]["days"].get<double>(), (3.0 - 1.97) / 0.05, 1.0);
   EXPECT_LE(trend[0]["lower_days"], trend[0]["days"]);
   EXPECT_GE(trend[0]["upper_days"], trend[0]["days"]);
-  EXPECT_EQ(Store("health trend --valve V1 --limit Q=3").code, 2);
-  EXPECT_EQ(Store("health trend --valve none --limit X=3").code, 5);
+  EXPECT_EQ(Store("health --valve V1 --limit Q=3").code, 2);
+  EXPECT_EQ(Store("health --valve none --limit X=3").code, 5);
 }
 
 TEST_F(FdiStorePlannerTest, HealthIsShownByDayByHourAndAsCsv) {
   KeepHealth();
-  EXPECT_GE(StoreJson("health show --valve V1")["hours"].size(), 40u);
-  const json hours = StoreJson("health show --valve V1 --hourly")["hours"];
+  EXPECT_GE(StoreJson("health --valve V1")["hours"].size(), 40u);
+  const json hours = StoreJson("health --valve V1 --hourly")["hours"];
   ASSERT_EQ(hours.size(), 24u * 40u);
   EXPECT_NEAR(hours[0]["channels"][0]["mean"].get<double>(), 0.0, 0.05);
-  EXPECT_THAT(Store("health show --valve V1 --csv").out,
+  EXPECT_THAT(Store("health --valve V1 --csv").out,
               HasSubstr("hour_utc,epoch,model_hash"));
 }
 
@@ -76,8 +76,7 @@ TEST_F(FdiStorePlannerTest, StatusIsThatOfTheGravestFigureBeyondItsLimit) {
     checkpoint.health.push_back(hour);
     writer.CommitCheckpoint(checkpoint);
   }
-  const json days =
-      StoreJson("health show --valve V2 --since 1970-01-01")["hours"];
+  const json days = StoreJson("health --valve V2 --from 1970-01-01")["hours"];
   ASSERT_EQ(days.size(), 2u);
   EXPECT_EQ(days[0]["dead_band"], 1.2);
   EXPECT_EQ(days[0]["at_limit"], 10.0);
@@ -86,7 +85,7 @@ TEST_F(FdiStorePlannerTest, StatusIsThatOfTheGravestFigureBeyondItsLimit) {
   EXPECT_EQ(days[0]["exceeded"], json({"at_limit", "dead_band"}));
   EXPECT_EQ(days[0]["status"], "out of specification");
   EXPECT_EQ(days[1]["status"], "good");
-  EXPECT_THAT(Store("health show --valve V2 --since 1970-01-01").out,
+  EXPECT_THAT(Store("health --valve V2 --from 1970-01-01").out,
               HasSubstr("out of specification: at_limit, dead_band"));
 }
 
@@ -97,7 +96,7 @@ TEST_F(FdiStorePlannerTest, WorkListOfAnEmptyHistoryIsEmpty) {
   EXPECT_EQ(Store("worklist --discipline plumber").code, 2);
   const Outcome report = Store("report --output .");
   EXPECT_EQ(report.code, 2);
-  EXPECT_THAT(report.err, HasSubstr("report is gone: `fdi-store worklist"));
+  EXPECT_THAT(report.err, HasSubstr("report is gone: fdi-store worklist"));
 }
 
 // A day of which 20 h were judged, and a fault.
@@ -110,7 +109,7 @@ TEST_F(FdiStorePlannerTest, WorkListIsWrittenAsAPageAndCompared) {
     checkpoint.coverage = {day};
     writer.CommitCheckpoint(checkpoint);
   }
-  const std::string verb = "worklist --since 2026-11-01 --utc --html week.html";
+  const std::string verb = "worklist --from 2026-11-01 --utc --html week.html";
   EXPECT_EQ(Store(verb).code, 0);
   const json first = json::parse(Slurp(directory_.path() / "week.json"));
   EXPECT_TRUE(first["changes"].is_null());
@@ -134,8 +133,8 @@ TEST_F(FdiStorePlannerTest, WorkListRefusesWhatItCannotUse) {
   EXPECT_EQ(Store("worklist").code, 3);  // There is nothing at all.
   { const HistoryWriter writer(path_); }
   EXPECT_EQ(Store("worklist").code, 0);
-  EXPECT_EQ(Store("worklist --since 2100-01-01").code, 2);
-  EXPECT_EQ(Store("worklist --since soon").code, 2);
+  EXPECT_EQ(Store("worklist --from 2100-01-01").code, 2);
+  EXPECT_EQ(Store("worklist --from soon").code, 2);
   EXPECT_EQ(Store("worklist --html no/such/week.html").code, 3);
   Write("week.json", "[1]");
   const Outcome foreign = Store("worklist --html week.html");
@@ -156,7 +155,7 @@ TEST_F(FdiStorePlannerTest, WorkListAuditsStoredRunsIfAskedTo) {
   }
   Write("a.csv", rows);
   ASSERT_EQ(Store("runs import a.csv --valve FV-1").code, 0);
-  const std::string verb = "worklist --since 2000-01-01";
+  const std::string verb = "worklist --from 2000-01-01";
   const json list = StoreJson(verb + " --audit-windows 3");
   EXPECT_EQ(list["coverage"]["audit"], 1);
   ASSERT_EQ(list["rows"].size(), 1u) << list.dump(1);

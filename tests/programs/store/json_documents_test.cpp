@@ -304,7 +304,7 @@ TEST_F(JsonDocumentsTest, ProgramsAndPageHaveTheSameKeys) {
   Page page(Slurp(FDI_JSON_PAGE));
   const std::string id =
       Printed(page, "runs import", "a.csv --valve LV-1")["run_id"];
-  Printed(page, "runs sniff", "a.csv --map-output tags.toml");
+  Printed(page, "runs sniff", "a.csv -o tags.toml");
   // Two loops with one period, and a file that is too short.
   for (const char* loop : {"FIC1.csv", "FIC2.csv"}) {
     std::string text = "t_s,OP,PV,SP,auto\n";
@@ -326,9 +326,8 @@ TEST_F(JsonDocumentsTest, ProgramsAndPageHaveTheSameKeys) {
   Printed(page, "models import", "pump.fdm");
   Printed(page, "types list");
   Printed(page, "types show", "globe");
-  Printed(page, "types delete", "globe");
   Printed(page, "valves add", "'PV-*' --type globe");
-  Printed(page, "valves event", "LV-1 --kind repacked");
+  Printed(page, "valves repaired", "LV-1 repacked");
   Printed(page, "valves assign", "LV-1 pump@2");
   Write("plant.csv", "name,op,pv,group\nFIC1,OP,PV,a\nFIC2,OP,PV,a\n,OP,,\n");
   Printed(page, "valves add --plant", "plant.csv");
@@ -338,30 +337,30 @@ TEST_F(JsonDocumentsTest, ProgramsAndPageHaveTheSameKeys) {
   Printed(page, "models import DIR");
   Printed(page, "valves list");
   Printed(page, "valves show", "LV-1");
-  Printed(page, "valves move", "LV-1 --to moved");
+  Printed(page, "valves move", "LV-1 moved");
   Printed(page, "valves remove", "'PV-*'");
   Printed(page, "history shelve", "LV-1 --for 1h --comment ordered");
-  Printed(page, "history shelf");
+  Printed(page, "history list --shelved");
   if (FDI_PLANNER) {
-    Printed(page, "worklist", "--since 2020-01-01 --html week.html");
+    Printed(page, "worklist", "--from 2020-01-01 --html week.html");
   }
   Printed(page, "history list");
   Printed(page, "history ack", "last");
   Printed(page, "history label", "last f7 --comment seen");
   Printed(page, "history show", "last");
-  Printed(page, "history unshelve", "--valve LV-1");
+  Printed(page, "history shelve", "LV-1 --off");
   Printed(page, "faults");
   if (FDI_PLANNER) {
-    Printed(page, "health show", "--valve LV-1");
-    Printed(page, "health trend", "--valve LV-1 --limit X=3");
+    Printed(page, "health", "--valve LV-1");
+    Printed(page, "health --limit", "X=3 --valve LV-1");
     // A valve that nothing judges, and one that is shelved no longer.
     Printed(page, "valves add", "NV-9");
     Printed(page, "worklist",
-            "--since 2020-01-01 --limit X=0.01 --audit-windows 3 "
+            "--from 2020-01-01 --limit X=0.01 --audit-windows 3 "
             "--html week.html");
   } else {
-    called_.insert({"fdi-store health show", "fdi-store health trend",
-                    "fdi-store worklist"});
+    called_.insert(
+        {"fdi-store health", "fdi-store health --limit", "fdi-store worklist"});
   }
   Printed(page, "doctor");
   Printed(page, "backup", "copy");
@@ -369,23 +368,22 @@ TEST_F(JsonDocumentsTest, ProgramsAndPageHaveTheSameKeys) {
   if (FDI_PLANNER && FDI_PLANT && PrivatePostgres::IsInstalled()) {
     PrivatePostgres server;
     server.Create("plant");
-    const std::string to = "--to '" + server.Url("plant") + "'";
+    const std::string to = "--db '" + server.Url("plant") + "'";
     Printed(page, "ship --init", to);
     Printed(page, "ship", to);
-    const std::string from = "'" + server.Url("plant") + "'";
-    Printed(page, "history list --from", from);
-    Printed(page, "history show --from", from + " last");
-    Printed(page, "health show --from", from + " --valve LV-1");
-    Printed(page, "worklist --from",
-            from + " --since 2020-01-01 --limit X=0.01");
-    Printed(page, "ship --prune", to + " --history-age 36000d");
+    const std::string plant = "'" + server.Url("plant") + "'";
+    Printed(page, "history list --db", plant);
+    Printed(page, "history show --db", plant + " last");
+    Printed(page, "health --db", plant + " --valve LV-1");
+    Printed(page, "worklist --db", plant + " --from 2020-01-01 --limit X=0.01");
+    Printed(page, "prune --db", plant + " --history-age 36000d");
     Printed(page, "ship --forget");
   } else {
-    called_.insert(
-        {"fdi-store ship", "fdi-store ship --init", "fdi-store ship --prune",
-         "fdi-store ship --forget", "fdi-store history list --from",
-         "fdi-store history show --from", "fdi-store health show --from",
-         "fdi-store worklist --from"});
+    called_.insert({"fdi-store ship", "fdi-store ship --init",
+                    "fdi-store prune --db", "fdi-store ship --forget",
+                    "fdi-store history list --db",
+                    "fdi-store history show --db", "fdi-store health --db",
+                    "fdi-store worklist --db"});
   }
   if (std::system("gnuplot --version >/dev/null 2>&1") == 0) {
     Printed(page, "history plot", "last");
@@ -406,8 +404,8 @@ TEST_F(JsonDocumentsTest, ProgramsAndPageHaveTheSameKeys) {
   }
 }
 
-// Of the other programs those verbs that need neither minutes (onboard,
-// coverage) nor a bus (watch, top).
+// The verbs of the other programs that need neither minutes (onboard) nor a bus
+// (watch).
 TEST_F(JsonDocumentsTest, SimulatorAndTrainerAreOnThePage) {
   const auto bin = std::filesystem::path(FDI_STORE_PROGRAM).parent_path();
   if (!exists(bin / "fdi-trainer") || !exists(bin / "fdi-simulator")) {
@@ -421,7 +419,6 @@ TEST_F(JsonDocumentsTest, SimulatorAndTrainerAreOnThePage) {
         "period_s = 80}\nduration_s = 300\nseed = 1\n"
         "[[run]]\nsimulate = {duration_s = 900}\n"
         "[[run]]\nsimulate = {}\nfaults = [\"f19\"]\nstrengths = [0.5]\n");
-  Printed(page, "faults", "", "fdi-simulator");
   const std::string id =
       Printed(page, "run",
               "--valve V --duration 300 --parameters paper-operating-point "

@@ -14,10 +14,10 @@ TEST_F(FdiStoreTest, WhatIsLeftOutNamesTheOptionThatBringsItBack) {
     bool built;
     const char* option;
   } kTable[] = {
-      {"worklist --top 3", "worklist", FDI_PLANNER, "FDI_PLANNER"},
-      {"health show --valve V1", "health", FDI_PLANNER, "FDI_PLANNER"},
-      {"ship --to postgresql:///plant", "ship", FDI_PLANT, "FDI_PLANT"},
-      {"history list --from postgresql:///plant", "--from", FDI_PLANT,
+      {"worklist --rows 3", "worklist", FDI_PLANNER, "FDI_PLANNER"},
+      {"health --valve V1", "health", FDI_PLANNER, "FDI_PLANNER"},
+      {"ship --db postgresql:///plant", "ship", FDI_PLANT, "FDI_PLANT"},
+      {"history list --db postgresql:///plant", "--db", FDI_PLANT,
        "FDI_PLANT"}};
   for (const auto& row : kTable) {
     if (!row.built) {

@@ -32,13 +32,14 @@ class FdiStoreTest : public HistoryFixture {
     return text.str();
   }
 
-  // In the fresh folder, which is the data directory too.
+  // In the fresh folder, which is the data directory, too, unless a test has
+  // another one.
   Outcome Store(const std::string& arguments,
                 const std::string& environment = "TZ=UTC") {
     const std::string command = "cd " + directory_.path().string() + " && " +
                                 environment +
-                                " \"" FDI_STORE_PROGRAM "\" --data . " +
-                                arguments + " >out.txt 2>err.txt";
+                                " \"" FDI_STORE_PROGRAM "\" --data " + data_ +
+                                " " + arguments + " >out.txt 2>err.txt";
     const int status = std::system(command.c_str());
     return {WIFEXITED(status) ? WEXITSTATUS(status) : -1,
             Slurp(directory_.path() / "out.txt"),
@@ -71,6 +72,7 @@ class FdiStoreTest : public HistoryFixture {
     return rows;
   }
 
+  std::string data_{"."};
   const std::string header_ = "t_s,CV_pct,P1_kPa,P2_kPa,T1_degC,X_pct,F_t_h\n";
 };
 

@@ -122,10 +122,9 @@ TEST_F(AppEvaluateTest, RemovedVerbsAndOptionsNameWhatReplacesThem) {
   const std::vector<std::pair<std::string, std::string>> removed{
       {"evaluate --model-set quick --history plant --work-orders o.csv",
        "--history is gone: score each file with --file"},
-      {"evaluate --model-set quick --campaign c.toml",
-       "fdi-study evaluate --campaign"},
+      {"evaluate --model-set quick --campaign c.toml", "fdi-study evaluate"},
       {"evaluate --model-set quick --file f.csv --report r",
-       "fdi-study evaluate --report"},
+       "fdi-study evaluate"},
       {"compare quick@1 quick@1 --campaign c.toml", "fdi-study evaluate"},
       {"evaluate --model-set quick --leave-one-out", "fdi-study leave-one-out"},
       {"evaluate --model-set quick --seeds=20", "fdi-study seeds"},

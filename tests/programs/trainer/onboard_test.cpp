@@ -1,5 +1,4 @@
-// What `onboard` and `coverage` refuse; what they do is tested at length with
-// the system.
+// What `onboard` refuses; what it does is tested at length with the system.
 #include "tests/programs/trainer/fixture.h"
 
 namespace fdi::trainer {
@@ -49,13 +48,14 @@ TEST_F(OnboardProgramTest, RecordThatCannotBeIsRefusedAndNothingIsStored) {
 }
 
 TEST_F(OnboardProgramTest, UnknownTypesAndSignalsAreNamed) {
-  const Outcome signal = Run("coverage --signals CV,X,Q");
+  const Outcome signal = Run("onboard --dry-run --signals CV,X,Q");
   EXPECT_EQ(signal.code, 2);
   EXPECT_NE(signal.err.find("'Q'"), std::string::npos) << signal.err;
-  const Outcome type = Run("coverage --signals CV,X --type nothing-like-it");
+  const Outcome type =
+      Run("onboard --dry-run --signals CV,X --type nothing-like-it");
   EXPECT_EQ(type.code, 2);
   EXPECT_NE(type.err.find("nothing-like-it"), std::string::npos) << type.err;
-  const Outcome blind = Run("coverage --signals CV,P1");
+  const Outcome blind = Run("onboard --dry-run --signals CV,P1");
   EXPECT_EQ(blind.code, 3);
   EXPECT_NE(blind.err.find("CV, and X or F"), std::string::npos) << blind.err;
 }

@@ -149,7 +149,7 @@ TEST_F(PlantTest, PartsOfTheTableShareADataDirectory) {
   EXPECT_EQ(all.at("A")["unchanged"], true);
   EXPECT_EQ(all.at("B")["unchanged"], true);
   EXPECT_EQ(all.at("D")["unchanged"], false);
-  EXPECT_EQ(Run("onboard --plant plant.csv --file day.csv --rows X").code, 2);
+  EXPECT_EQ(Run("onboard --plant plant.csv --file day.csv --valve X").code, 2);
 }
 
 }  // namespace

@@ -108,8 +108,8 @@ TEST_F(AppTrainTest, CampaignIsSimulatedTrainedAndStoredWithTheKeysOfJson) {
 TEST_F(AppTrainTest, SameCampaignGivesTheSameHashElsewhere) {
   Write("c.toml", Quick() + TwoConditions());
 
-  const json here = RunJson("train --threads 1 --campaign c.toml", "a");
-  const json there = RunJson("train --threads 2 --campaign c.toml", "b");
+  const json here = RunJson("train --jobs 1 --campaign c.toml", "a");
+  const json there = RunJson("train --jobs 2 --campaign c.toml", "b");
 
   EXPECT_EQ(here["content_hash"], there["content_hash"]);
   EXPECT_EQ(here, there);

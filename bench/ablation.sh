@@ -1,0 +1,205 @@
+#!/usr/bin/env bash
+# What each rule of diagnosis/decision/rules.h buys: every set of runs below is
+# scored with each rule left out, and docs/results/ablation.md gets the table.
+# What is in DIR is not made again, so that it goes on where it was stopped; a
+# DIR of another version has to be removed. By the observers alone, without
+# looks; needs FDI_REFERENCE_DATA. One process at a time, some three hours of
+# CPU for all, half of which are the ramps.
+#
+#     bench/ablation.sh build/release/bin DIR [COLUMN...]
+set -euo pipefail
+bin=$(realpath "$1")
+mkdir -p "$2"
+dir=$(realpath "$2")
+wanted=" ${*:3} "
+cd "$(dirname "$0")/.."
+data=$FDI_REFERENCE_DATA
+export FDI_DATA=$dir/data
+mkdir -p "$dir/runs"
+
+quietly() { "$@" >"$dir/out" 2>"$dir/log" || { cat "$dir/log" >&2; exit 1; }; }
+
+simulate() {  # NAME SEED SECONDS OPTION...
+  [ -f "$dir/runs/$1.csv" ] || quietly "$bin/fdi-simulator" run --no-publish \
+    --speed max --seed "$2" --duration "$3" --export "$dir/runs/$1.csv" "${@:4}"
+}
+
+once() {  # NAME COMMAND...
+  [ -f "$dir/$1.made" ] || { quietly "${@:2}"; touch "$dir/$1.made"; }
+}
+
+is_wanted() { [ "$wanted" = "  " ] || [[ $wanted == *" $1 "* ]]; }
+
+ablate() {  # COLUMN SET FILE...
+  local files=()
+  for file in "${@:3}"; do files+=(--file "$file"); done
+  quietly "$bin/fdi-study" ablate --parts "$dir/parts" --column "$1" \
+    --model-set "$2" "${files[@]}"
+  cat "$dir/out"
+}
+
+ablate_campaign() {  # COLUMN CAMPAIGN SEED_OFFSET
+  quietly "$bin/fdi-study" ablate --parts "$dir/parts" --column "$1" \
+    --model-set benchmark --campaign "$2" --seed-offset "$3"
+  cat "$dir/out"
+}
+
+open_loop=(--parameters lublin-actuator-3 --excitation sine
+  --set continuous_inputs=true --set cold_start=true)
+level_loop=(--parameters lublin-actuator-3 --excitation level-loop)
+
+benchmark_set() {
+  once benchmark "$bin/fdi-trainer" train --campaign campaigns/benchmark.toml
+}
+own_set() {
+  simulate own-healthy 5201 7200 "${level_loop[@]}"
+  once own "$bin/fdi-trainer" onboard --valve own --no-coverage \
+    --file "$dir/runs/own-healthy.csv"
+}
+given_set() {
+  once LV1 "$bin/fdi-trainer" onboard --valve LV1 --no-coverage \
+    --file "$data/closed-loop/healthy_onboard.csv"
+}
+
+# The benchmark without the seven ramps of a day, and these alone.
+awk '/^\[\[validation\]\]/ { last = NR } { line[NR] = $0 }
+  END { for (i = 1; i < last; i++) print line[i] }' \
+  campaigns/benchmark.toml >"$dir/short.toml"
+awk '/^\[\[validation\]\]/ && !first { first = NR }
+  /^\[\[validation\]\]/ { last = NR } { line[NR] = $0 }
+  END { for (i = 1; i <= NR; i++) if (i < first || i >= last) print line[i] }' \
+  campaigns/benchmark.toml >"$dir/ramps.toml"
+
+for n in 1 2; do
+  if is_wanted benchmark-$n; then
+    benchmark_set
+    ablate_campaign benchmark-$n "$dir/short.toml" ${n}1000
+  fi
+done
+
+if is_wanted loop-given; then
+  given_set
+  ablate loop-given LV1 "$data"/closed-loop/loop_*.csv
+fi
+
+# Fifteen faults of two strengths on an onboarded valve in its level loop.
+for n in 1 2; do
+  is_wanted loop-own-$n || continue
+  own_set
+  seed=${n}7400
+  files=()
+  for fault in f1 f2 f3 f4 f6 f7 f10 f11 f12 f12- f13 f16 f17 f18 f19; do
+    for strength in .35 .7; do
+      seed=$((seed + 1))
+      case $fault in *-) s=-$strength ;; *) s=$strength ;; esac
+      name=own-$n-${fault%-}=$s
+      simulate "$name" $seed 2400 "${level_loop[@]}" \
+        --fault "${fault%-}:abrupt@1200:strength=$s"
+      files+=("$dir/runs/$name.csv")
+    done
+  done
+  ablate loop-own-$n own "${files[@]}"
+done
+
+# What sets of five faults call other ones (bench/untrained.sh): by the paper's
+# set, and by the onboarded valve's.
+untrained=(f2 f4 f5 f9 f10 f11 f12 f12- f13 f13- f15 f16 f17 f17- f18 f19- t1 t1-
+  p1 p1- p2 p2-)
+for n in 1 2; do
+  if is_wanted untrained-paper-$n; then
+    once paper "$bin/fdi-trainer" train --campaign campaigns/paper.toml
+    files=()
+    for fault in "${untrained[@]}"; do
+      for strength in .3 .6; do
+        case $fault in *-) s=-$strength ;; *) s=$strength ;; esac
+        name=paper-$n-${fault%-}=$s
+        simulate "$name" ${n}5200 600 --parameters paper-operating-point \
+          --excitation operating-point --set excitation.amplitude_pct=12 \
+          --set excitation.period_s=60 \
+          --fault "${fault%-}:abrupt@200:strength=$s"
+        files+=("$dir/runs/$name.csv")
+      done
+    done
+    ablate untrained-paper-$n paper "${files[@]}"
+  fi
+  if is_wanted untrained-own-$n; then
+    own_set
+    once five "$bin/fdi-study" reduce own --as five --without \
+      "f8,$(printf '%s\n' "${untrained[@]}" | grep -v -- - | paste -sd,)"
+    files=()
+    for fault in "${untrained[@]}"; do
+      for strength in .3 .6; do
+        case $fault in *-) s=-$strength ;; *) s=$strength ;; esac
+        name=untrained-$n-${fault%-}=$s
+        simulate "$name" ${n}5300 1200 "${level_loop[@]}" \
+          --fault "${fault%-}:abrupt@600:strength=$s"
+        files+=("$dir/runs/$name.csv")
+      done
+    done
+    ablate untrained-own-$n five "${files[@]}"
+  fi
+done
+
+# A second fault 600 s after the first (bench/second_fault.sh).
+pairs=(f13=.2,f1=.5 f13=.2,f2=.5 f13=.2,f7=.5 f13=.2,f4=.6 f19=-.3,f1=.5
+  f19=-.3,f7=.5 f19=-.3,f4=.6 f1=.5,f19=-.3 f2=.5,f13=.2 f7=.5,f13=.2
+  f4=.6,f19=-.3 f3=.6,f13=.2)
+for n in 1 2; do
+  is_wanted pairs-$n || continue
+  benchmark_set
+  files=()
+  for i in "${!pairs[@]}"; do
+    first=${pairs[i]%,*}
+    second=${pairs[i]#*,}
+    name=pair-$n-${first%=*}-${second%=*}
+    simulate "$name" $((n * 10000 + 7700 + i)) 2700 "${open_loop[@]}" \
+      --fault "${first%=*}:abrupt@900:strength=${first#*=}" \
+      --fault "${second%=*}:abrupt@1500:strength=${second#*=}"
+    files+=("$dir/runs/$name.csv")
+  done
+  ablate pairs-$n benchmark "${files[@]}"
+done
+
+# Without fault: hours of both loops, four given days under the sine (two of
+# them drift).
+if is_wanted healthy; then
+  own_set
+  files=()
+  for n in 1 2 3; do
+    simulate healthy-$n $((5900 + n)) 28800 "${level_loop[@]}"
+    files+=("$dir/runs/healthy-$n.csv")
+  done
+  ablate healthy own "${files[@]}"
+fi
+if is_wanted days; then
+  benchmark_set
+  ablate days benchmark "$data"/fault-free-days/*.csv
+fi
+
+for n in 1 2; do
+  if is_wanted ramps-$n; then
+    benchmark_set
+    ablate_campaign ramps-$n "$dir/ramps.toml" ${n}1000
+  fi
+done
+
+# Faults of X that grow over a day, which are a drift at first.
+for n in 1 2; do
+  is_wanted slow-$n || continue
+  benchmark_set
+  seed=${n}9100
+  files=()
+  for fault in f9 f10 f11 f12; do
+    seed=$((seed + 1))
+    name=slow-$n-$fault
+    simulate "$name" $seed 87300 "${open_loop[@]}" \
+      --fault "$fault:incipient@900+86400:strength=1"
+    files+=("$dir/runs/$name.csv")
+  done
+  ablate slow-$n benchmark "${files[@]}"
+done
+
+mkdir -p docs/results
+quietly "$bin/fdi-study" ablate --parts "$dir/parts" \
+  --table docs/results/ablation.md
+cat "$dir/out"

@@ -1,0 +1,124 @@
+#include "diagnosis/observers/lone_readings.h"
+
+#include <algorithm>
+#include <bit>
+#include <limits>
+
+#include "diagnosis/observers/detection.h"
+
+namespace fdi {
+namespace {
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+constexpr std::uint32_t SidesOf(std::size_t channel) {
+  return std::uint32_t{3} << (2 * channel);
+}
+
+}  // namespace
+
+// An input that has no channel of its own, as a pressure of the paper's set,
+// shows in the channels that read it alone, so it is held out with them. The
+// command is no transmitter, unless a position stands in its place.
+LoneReadings::LoneReadings(const ModelSet& models) : models_(&models) {
+  SignalMask others = models.position_as_command ? 0 : MaskOf(Signal::kCv);
+  for (const ChannelSpec& channel : models.channels) {
+    others = static_cast<SignalMask>(others | MaskOf(channel.output));
+  }
+  for (std::size_t c = 0; c < models.channels.size(); ++c) {
+    const TsModel& model = models.observers.front().channels[c].model;
+    doubtful_[c] = static_cast<SignalMask>((RequiredSignals(model) & ~others) |
+                                           MaskOf(model.output));
+  }
+  residuals_.fill(kNan);
+}
+
+void LoneReadings::Restart() {
+  has_past_ = false;
+  beyond_ = 0;
+  held_ = 0;
+}
+
+const Sample& LoneReadings::Step(ObserverBank& bank, const Sample& sample) {
+  const Sides held = held_;
+  held_ = 0;
+  residuals_.fill(kNan);
+  if (held != 0) {
+    // What is UNCERTAIN would keep the reading that decides from being judged.
+    bank.Amend(0, judged_.values, original_.uncertain());
+  }
+  bank.Step(sample);
+  Sides beyond = Beyond(bank);
+  if (held != 0) {
+    const bool real = (beyond & held) != 0;
+    const Sample& past = real ? original_ : judged_;
+    bank.Amend(1, past.values, past.uncertain());
+    bank.StepAgain(sample);
+    beyond = real ? Beyond(bank) : beyond;
+  }
+  const Sides lone = has_past_ ? TakeRare(beyond & ~beyond_) : 0;
+  beyond_ = beyond;
+  has_past_ = true;
+  if (lone != 0) {
+    HoldOut(bank, sample, lone);
+  } else {
+    judged_ = sample;
+  }
+  return judged_;
+}
+
+// A channel that was not read stays where it was: between readings of slow data
+// stand interpolated ones.
+LoneReadings::Sides LoneReadings::Beyond(const ObserverBank& bank) const {
+  Sides beyond = 0;
+  for (std::size_t c = 0; c < models_->channels.size(); ++c) {
+    const int channel = static_cast<int>(c);
+    if (!bank.active(channel) || !bank.measured(channel)) {
+      beyond |= beyond_ & SidesOf(c);
+      continue;
+    }
+    const double residual = CertainResidual(bank, channel);
+    const ChannelSpec& spec = models_->channels[c];
+    beyond |= (residual < spec.lower_threshold ? Sides{1} : Sides{0}) << 2 * c;
+    beyond |= (residual > spec.upper_threshold ? Sides{2} : Sides{0}) << 2 * c;
+  }
+  return beyond;
+}
+
+LoneReadings::Sides LoneReadings::TakeRare(Sides lone) {
+  for (std::size_t c = 0; c < models_->channels.size(); ++c) {
+    load_[c] = std::max(load_[c] - kRecovery, 0.0);
+    if ((lone & SidesOf(c)) == 0) {
+      continue;
+    }
+    if (load_[c] + 1.0 > kBurst) {
+      lone &= ~SidesOf(c);
+    } else {
+      load_[c] += 1.0;
+    }
+  }
+  return lone;
+}
+
+void LoneReadings::HoldOut(ObserverBank& bank, const Sample& sample,
+                           Sides lone) {
+  SignalMask doubtful = 0;
+  for (std::size_t c = 0; c < models_->channels.size(); ++c) {
+    if ((lone & SidesOf(c)) != 0) {
+      residuals_[c] = CertainResidual(bank, static_cast<int>(c));
+      doubtful = static_cast<SignalMask>(doubtful | doubtful_[c]);
+    }
+  }
+  const std::array<double, kSignalCount> last = judged_.values;
+  original_ = sample;
+  judged_ = sample;
+  for (unsigned left = doubtful & sample.present; left != 0; left &= left - 1) {
+    const auto i = static_cast<std::size_t>(std::countr_zero(left));
+    judged_.values[i] = last[i];
+    judged_.quality[i] = SignalQuality::kUncertain;
+  }
+  held_ = lone;
+  bank.StepAgain(judged_);
+}
+
+}  // namespace fdi

@@ -1,0 +1,70 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+
+#include "diagnosis/model/model_set.h"
+#include "diagnosis/model/sample.h"
+#include "diagnosis/observers/observer_bank.h"
+
+namespace fdi {
+
+/// Holds out single wrong readings, as loose wires and lost telegrams make
+/// them. A reading is held out where the residual of the normal observer passes
+/// a threshold that it did not pass at the reading before. It then counts as
+/// UNCERTAIN, with the last value in its place, and the next reading decides:
+///
+///  1. The next one passes that threshold, too: the step was real. The past of
+///     the observers gets the reading back, and nothing more is held out.
+///     Windows and evidence begin one sample later than without this class.
+///  2. It does not: the reading stays out of the past of the observers, their
+///     windows, and the floor.
+///
+/// Detection counts the residual() of what is held out against the threshold,
+/// for n_d samples in a row, so an abrupt fault is detected as soon as ever.
+///
+/// Wrong readings are taken to be rare: a channel that has had more of them of
+/// late than kBurst passes all on, as its noise is what has changed.
+class LoneReadings {
+ public:
+  /// Twenty wrong readings an hour, at a sample a second, hardly ever (Poisson:
+  /// less than once a day) leave more than five within two and a half minutes.
+  static constexpr double kBurst = 5.0;
+  static constexpr double kRecovery = 1.0 / 30.0;  // readings per sample
+
+  /// `models` must outlive it.
+  explicit LoneReadings(const ModelSet& models);
+
+  /// After the bank was initialised: there is no reading before.
+  void Restart();
+
+  /// Steps `bank` by `sample`, without the readings that are held out.
+  /// @returns the sample as it is to be judged; valid until the next call.
+  const Sample& Step(ObserverBank& bank, const Sample& sample);
+
+  /// Whether a reading of the last sample is held out.
+  bool holds() const { return held_ != 0; }
+  /// By channel, the residual of the reading that is held out; else NaN.
+  std::span<const double> residuals() const { return residuals_; }
+
+ private:
+  /// Two bits by channel: below, above.
+  using Sides = std::uint32_t;
+
+  Sides Beyond(const ObserverBank& bank) const;
+  Sides TakeRare(Sides lone);
+  void HoldOut(ObserverBank& bank, const Sample& sample, Sides lone);
+
+  const ModelSet* models_;
+  std::array<SignalMask, kMaxChannels> doubtful_{};  // if the channel is lone
+  Sample judged_;
+  Sample original_;  // the last sample of which something was held out
+  Sides beyond_{0};  // at the last reading of each channel
+  Sides held_{0};
+  bool has_past_{false};
+  std::array<double, kMaxChannels> residuals_;
+  std::array<double, kMaxChannels> load_{};  // readings held out of late
+};
+
+}  // namespace fdi

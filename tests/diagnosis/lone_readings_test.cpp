@@ -1,0 +1,127 @@
+#include "diagnosis/observers/lone_readings.h"
+
+#include <cmath>
+#include <memory>
+
+#include <gtest/gtest.h>
+
+#include "tests/diagnosis/engine_run.h"
+#include "tests/diagnosis/linear_plant.h"
+
+namespace fdi {
+namespace {
+
+using tests::kNoise;
+using tests::LinearPlant;
+using tests::PlantSample;
+using tests::Seen;
+using tests::StampOf;
+using tests::StepRange;
+
+// F follows its own measured past and P1, of which there is no channel:
+// F = F(k-1)/2 + (100 - CV)/2 + (P1 - 500)/10.
+ModelSet FlowWithPast() {
+  ModelSet models = LinearPlant();
+  for (Observer& observer : models.observers) {
+    TsModel& model = observer.channels[1].model;
+    model.parallel = false;
+    model.regressors.push_back({Signal::kF, 1});
+    model.regressors.push_back({Signal::kP1, 0});
+    model.regressor_min.insert(model.regressor_min.end(), {-100.0, 0.0});
+    model.regressor_max.insert(model.regressor_max.end(), {200.0, 1e4});
+    TsRule& rule = model.rules.front();
+    rule.antecedents.resize(3, rule.antecedents.front());
+    rule.slopes = {0.5 * rule.slopes[0], 0.5, 0.1};
+    rule.intercept = 0.5 * rule.intercept - 50.0;
+  }
+  return models;
+}
+
+Sample Resting(std::uint64_t k) {
+  Sample sample = PlantSample(k, 0.0);
+  sample.Set(Signal::kP1, 500.0);
+  return sample;
+}
+
+class LoneReadingsTest : public testing::Test {
+ protected:
+  void Step(Signal signal, double change) {
+    Sample sample = Resting(k_++);
+    sample.values[Index(signal)] += change;
+    if (k_ == 1) {
+      bank_.Initialise(sample);
+    }
+    judged_ = lone_.Step(bank_, sample);
+  }
+
+  ModelSet models_ = FlowWithPast();
+  ObserverBank bank_{models_};
+  LoneReadings lone_{models_};
+  std::uint64_t k_{0};
+  Sample judged_;
+};
+
+TEST_F(LoneReadingsTest, OneWrongReadingStaysOutOfThePast) {
+  for (const Signal signal : {Signal::kF, Signal::kP1}) {
+    for (int k = 0; k < 20; ++k) {
+      Step(signal, 0.0);
+      EXPECT_FALSE(lone_.holds());
+    }
+    Step(signal, 40.0);
+    EXPECT_TRUE(lone_.holds());
+    EXPECT_NE(judged_.uncertain() & MaskOf(signal), 0);
+    EXPECT_EQ(judged_[signal], Resting(0)[signal]);
+    EXPECT_FALSE(bank_.measured(1));
+    EXPECT_TRUE(bank_.measured(0)) << "of X nothing is wrong";
+    // The past of F has no reading, so F abstains once more.
+    Step(signal, 0.0);
+    EXPECT_FALSE(lone_.holds());
+    Step(signal, 0.0);
+    EXPECT_NEAR(bank_.residual(0, 1), 0.0, 1e-9) << SignalName(signal);
+  }
+}
+
+TEST_F(LoneReadingsTest, TheSecondReadingMakesAStepReal) {
+  for (int k = 0; k < 20; ++k) {
+    Step(Signal::kF, 0.0);
+  }
+  Step(Signal::kF, 40.0);
+  EXPECT_NEAR(lone_.residuals()[1], 40.0, 1e-9);
+  EXPECT_TRUE(std::isnan(lone_.residuals()[0]));
+  Step(Signal::kF, 40.0);
+  EXPECT_FALSE(lone_.holds());
+  // As predicted from the reading before, which is in the past again.
+  EXPECT_NEAR(bank_.residual(0, 1), 20.0, 1e-9);
+}
+
+TEST_F(LoneReadingsTest, WhatIsWrongTooOftenIsHeldOutNoLonger) {
+  Step(Signal::kF, 0.0);
+  int held = 0;
+  for (int k = 0; k < 30; ++k) {
+    Step(Signal::kF, k % 4 == 0 ? 40.0 : 0.0);
+    held += lone_.holds() ? 1 : 0;
+  }
+  EXPECT_EQ(held, 5);
+}
+
+TEST(LoneReadingsEngineTest, AWindowTakesNoLoneReading) {
+  ModelSet models = LinearPlant();
+  models.channels[1].windows = {{10, -kNoise, kNoise, std::log(4 * kNoise)}};
+  ValveEngine engine(std::make_shared<const ModelSet>(models));
+  const Seen seen = StepRange(engine, 0, 600, [k = 0](Sample& sample) mutable {
+    sample.values[Index(Signal::kF)] += ++k % 60 == 0 ? 40.0 : 0.0;
+  });
+  EXPECT_TRUE(seen.transitions.empty());
+}
+
+TEST(LoneReadingsEngineTest, AnAbruptFaultIsDetectedAtItsFirstSample) {
+  ValveEngine engine(std::make_shared<const ModelSet>(LinearPlant()));
+  ASSERT_TRUE(StepRange(engine, 0, 100).transitions.empty());
+  EXPECT_TRUE(StepRange(engine, 100, 101, tests::FullF6).transitions.empty());
+  const Seen seen = StepRange(engine, 101, 102, tests::FullF6);
+  ASSERT_EQ(seen.transitions.size(), 1U);
+  EXPECT_EQ(seen.transitions.front().stamp_ns, StampOf(100));
+}
+
+}  // namespace
+}  // namespace fdi

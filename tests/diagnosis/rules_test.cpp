@@ -1,0 +1,115 @@
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "diagnosis/decision/look_answer.h"
+#include "diagnosis/decision/valve_looks.h"
+#include "tests/diagnosis/engine_run.h"
+#include "tests/diagnosis/linear_plant.h"
+
+namespace fdi {
+namespace {
+
+using tests::StepRange;
+
+class NoSimulation final : public LookSimulation {
+ public:
+  NoSimulation() : LookSimulation({}) {}
+  double HealthyFlow(const InputRow& /*input*/,
+                     double /*x_pct*/) const override {
+    return 1.0;
+  }
+  SecondLook Look(const LookWindow& /*window*/,
+                  const std::stop_token& /*stop*/) const override {
+    return {};
+  }
+  StrengthLook Strengths(const LookWindow& /*window*/,
+                         const std::vector<Explanation>& /*known*/,
+                         const std::stop_token& /*stop*/) const override {
+    return {};
+  }
+  double Misfit(const LookWindow& /*window*/) const override { return 1.0; }
+};
+
+// Near the limits of what they see, observers name a fault now and then.
+TEST(RulesTest, WhatTheObserversNamedForLongIsRemembered) {
+  const ModelSet models = tests::LinearPlant();
+  const NoSimulation simulation;
+  ValveLooks looks(simulation, &models);
+  Verdict verdict;
+  verdict.detected = true;
+  verdict.isolated = 0b001;
+  verdict.transitions[0].kind = TransitionKind::kDetected;
+  verdict.transitions[0].detection_stamp_ns = tests::PlantSample(0).stamp_ns;
+  verdict.transition_count = 1;
+  for (std::uint64_t k = 0; k < 700; ++k) {
+    verdict.isolated = k < 690 ? 0b001 : 0b010;
+    looks.Step(tests::PlantSample(k), verdict);
+    verdict.transition_count = 0;
+  }
+  EXPECT_EQ(looks.Observed(models, 0b010), 0b011U);
+}
+
+// As in ValveEngineTest.AFaultThatOnlyToleratesWhatIsSeenIsNeverSure, but of an
+// observer that ought to explain the flow: it is off by four fifths.
+TEST(RulesTest, WhatLeavesMostOfWhatItOughtToExplainIsNoName) {
+  ModelSet models = tests::LinearPlant();
+  for (Observer& observer : models.observers) {
+    ChannelObserver& flow = observer.channels[1];
+    if (observer.fault == 6) {
+      flow = tests::LinearModel(Signal::kF, -1.0, 104.0);
+      flow.residual_sd = 8.0;
+      flow.membership = {-100.0, -50.0, 50.0, 100.0};
+      observer.moved = MaskOf(Signal::kF);
+    }
+    flow.fit = observer.fault == 0 ? FitBounds{} : FitBounds{-3.0, 3.0, 9.0};
+  }
+  ValveEngine engine(std::make_shared<const ModelSet>(models));
+  StepRange(engine, 0, 50);
+  const tests::Seen seen = StepRange(engine, 50, 250, tests::FullF6);
+  EXPECT_EQ(seen.last.isolated, 0U);
+  EXPECT_EQ(seen.last.unknown, Unknown::kOutsideKnown);
+}
+
+// An effect that is 4 % larger than that of the observer is 1.6 deviations off
+// in every sample.
+TEST(RulesTest, AnEffectThatIsOffByAShareFits) {
+  ModelSet models = tests::LinearPlant();
+  models.decision.isolation_samples = 20;
+  for (Observer& observer : models.observers) {
+    for (ChannelObserver& channel : observer.channels) {
+      channel.fit = {-0.8, 0.8, 2.0};
+      channel.membership = {-10.0, -8.0, 8.0, 10.0};
+    }
+  }
+  ValveEngine engine(std::make_shared<const ModelSet>(models));
+  tests::Noise noise(5);
+  StepRange(engine, 0, 50, [&](Sample& sample) { noise.Add(sample); });
+  const tests::Seen seen = StepRange(engine, 50, 250, [&](Sample& sample) {
+    noise.Add(sample);
+    tests::AddF6(sample, 1.04);
+  });
+  EXPECT_EQ(FaultSetName(models, seen.last.isolated), "f6");
+}
+
+// Without X or a pressure the errors of a healthy valve are wide, and a
+// transducer as wrong as there is is what comes nearest to anything else.
+TEST(RulesTest, ALookWhoseFaultIsAsLargeAsThereIsFitsNothing) {
+  for (const double strength : {-1.0, -0.5}) {
+    SecondLook look;
+    look.ranked.resize(2);
+    look.ranked[0].fault = 12;
+    look.ranked[0].strength = strength;
+    look.ranked[1].distance = 1000.0;
+    look.misfit = 3.0;
+    look.readings = 100.0;
+    look.complete = false;
+    EXPECT_EQ(AnswerOf(look).outcome,
+              strength == -1.0 ? LookOutcome::kNoneFits : LookOutcome::kNamed);
+  }
+}
+
+}  // namespace
+}  // namespace fdi
