@@ -27,9 +27,9 @@ await() {  # SECONDS WORD FILE
   timeout "$1" sh -c 'until grep -q "$0" "$1"; do sleep 0.1; done' "$2" "$3" ||
     fail "no $2 in $3 within $1 s: $(tail -5 "$3")"
 }
-# The retained state of a valve has WORD within 40 s.
+# The retained state of a valve has WORD within 150 s.
 expect_state() {  # VALVE WORD
-  for _ in $(seq 80); do
+  for _ in $(seq 300); do
     mosquitto_sub -p $port -C 1 -W 2 -t "fdi/north/$1/state" >state.json \
       2>/dev/null || true
     ! grep -q "$2" state.json || return 0
