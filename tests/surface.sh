@@ -7,7 +7,7 @@
 # Usage: surface.sh FOLDER_OF_THE_PROGRAMS
 set -euo pipefail
 bin=$(realpath "${1:?folder of the programs}")
-max_verbs=47
+max_verbs=49
 max_options=260
 max_shown=12
 

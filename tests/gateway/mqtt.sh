@@ -48,7 +48,7 @@ mosquitto_sub() { command mosquitto_sub -u fdi -P s3cret "$@"; }
 
 "$bin/fdi-trainer" train --campaign "$tests/survival/quick.toml" \
   >/dev/null 2>train.log
-"$bin/fdi-simulator" run --no-publish --duration 300 --seed 1 --export V1.csv \
+"$bin/fdi-simulator" run --no-publish --duration 300 --seed 1 -o V1.csv \
   --parameters paper-operating-point --log-level error >/dev/null
 cat >plant.toml <<'END'
 [defaults]
