@@ -45,7 +45,7 @@ std::string ReasonOf(const Json& quality) {
       {"MODEL_UNSUITED", "its models do not suit it"},
       {"UNASSIGNED", "it has no models, and its loop is not judged yet"},
       {"STALE", "its readings have ended"}};
-  const std::string name =
+  std::string name =
       quality.is_string() ? quality.get<std::string>() : std::string("STALE");
   for (const auto& [known, reason] : kReasons) {
     if (name == known) {

@@ -109,7 +109,7 @@ void AddInVerb(report::Program& program) {
                 "Print the tags of the table, one a line, and exit");
   verb.add_option("--http", options.http,
                   "Serve /metrics, /tags and /healthz on loopback")
-      ->type_name("[ADDRESS:]PORT");
+      ->type_name("PORT|ADDRESS:PORT");
 }
 
 }  // namespace fdi::gateway

@@ -137,7 +137,7 @@ void AddOutVerb(report::Program& program) {
       ->type_name("GLOB");
   verb.add_option("--http", options.http,
                   "Serve /metrics and /healthz on loopback")
-      ->type_name("[ADDRESS:]PORT");
+      ->type_name("PORT|ADDRESS:PORT");
 }
 
 }  // namespace fdi::gateway

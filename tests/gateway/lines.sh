@@ -23,7 +23,7 @@ valves="V1 V2 V3"
   >/dev/null 2>train.log
 for valve in $valves; do
   "$bin/fdi-simulator" run --no-publish --duration 120 --seed "${valve#V}" \
-    --parameters paper-operating-point --export "$valve.csv" --log-level error \
+    --parameters paper-operating-point -o "$valve.csv" --log-level error \
     >/dev/null
 done
 cat >plant.toml <<'END'
