@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -26,6 +28,22 @@ class OnboardingTest : public study::StudyProgram {
   }
   std::string Reference(const std::string& name) const {
     return (folder_ / "valve-reference" / (name + ".csv")).string();
+  }
+  // The recording with a reading of `column` at its end every 211 s.
+  void WriteSpoilt(const std::string& name, int column,
+                   const std::string& end) const {
+    std::ifstream in(Reference(name));
+    std::ofstream out(Path("spoilt.csv"));
+    std::string line;
+    for (int row = 0; std::getline(in, line); ++row) {
+      std::stringstream cells(line);
+      std::string cell;
+      for (int c = 0; std::getline(cells, cell, ','); ++c) {
+        const bool wrong = c == column && row > 0 && row % 211 == 0;
+        out << (c > 0 ? "," : "") << (wrong ? end : cell);
+      }
+      out << '\n';
+    }
   }
   void Onboard(const std::string& name, const std::string& healthy) const {
     const Outcome outcome = Run("onboard --valve " + name + " --file " +
@@ -105,6 +123,18 @@ TEST_F(OnboardingTest, FaultsOfAnotherModelAreSeenAndNamed) {
   EXPECT_GE(detected, all ? 23 : 5);
   EXPECT_GE(contained, all ? 18 : 5);
   EXPECT_GE(exact, all ? 14 : 4);
+
+  const auto episodes = [&] {
+    return RunJson(
+        "evaluate --model-set REF --file spoilt.csv")["summary"]
+                                                     ["fault_free_episodes"];
+  };
+  WriteSpoilt("plant_faultfree_212", 2, "5000");
+  EXPECT_EQ(episodes(), 0) << "P1";
+  WriteSpoilt("plant_faultfree_212", 5, "100");
+  EXPECT_EQ(episodes(), 0) << "X";
+  WriteSpoilt("plant_faultfree_212", 6, "0");
+  EXPECT_EQ(episodes(), 0) << "F";
 }
 
 }  // namespace
