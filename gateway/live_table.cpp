@@ -138,8 +138,6 @@ LiveTable ReadLiveTable(const std::filesystem::path& path, bool by_topics) {
       valve.id = row.name;
       valve.group = row.group;
       valve.map = ColumnsOf(row, match);
-      valve.auto_words = row.auto_words;
-      valve.manual_words = row.manual_words;
       const bool periodic =
           row.report == "periodic" || (by_topics && row.report.empty());
       valve.report = periodic ? importer::Reporting::kPeriodic

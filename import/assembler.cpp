@@ -37,16 +37,10 @@ std::optional<ValveMode> ModeOf(const LiveValve& valve,
   const std::string word = reading.word.empty() && reading.value
                                ? NumberText(*reading.value)
                                : std::string(reading.word);
-  const auto is_listed = [&](const std::vector<std::string>& words) {
-    return std::ranges::any_of(words, [&](const std::string& listed) {
-      return SameName(listed, word);
-    });
-  };
-  if (is_listed(valve.auto_words)) {
-    return ValveMode::kAuto;
-  }
-  if (is_listed(valve.manual_words)) {
-    return ValveMode::kManual;
+  for (const auto& [known, mode] : valve.map.mode_words) {
+    if (SameName(known, word)) {
+      return mode;
+    }
   }
   return ModeOfWord(word);
 }
@@ -57,6 +51,11 @@ std::optional<double> Converted(const ColumnMapping& mapping, double reading) {
   if (!std::isfinite(reading) || reading < mapping.lowest ||
       reading > mapping.highest) {
     return std::nullopt;
+  }
+  if (mapping.root) {
+    const auto [low, high] = *mapping.root;
+    const double share = std::max((reading - low) / (high - low), 0.0);
+    reading = low + (high - low) * std::sqrt(share);
   }
   // The identity is left out, because 0 + 1 * value would lose the sign of -0.
   double value = mapping.scale != 1.0 || mapping.offset != 0.0

@@ -27,11 +27,9 @@ enum class Reporting : std::uint8_t {
 struct LiveValve {
   std::string id;
   std::string group;
-  /// columns (ColumnMapping::column is the tag), mode_column and flow_unit are
-  /// used; ValveColumns() makes them.
+  /// columns (ColumnMapping::column is the tag), mode_column, mode_words and
+  /// flow_unit are used; ValveColumns() makes them.
   ColumnMap map;
-  std::vector<std::string> auto_words;
-  std::vector<std::string> manual_words;
   Reporting report{Reporting::kException};
   std::int64_t max_age_ns{0};  ///< With kPeriodic.
 };

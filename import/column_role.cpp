@@ -423,6 +423,8 @@ void TakeName(const std::string& name, const std::string& about,
   const auto tag = RoleOfTag(parts);
   const unsigned clues =
       CluesOf(plain, parts) | (tag == Role::kValve ? kValveTag : 0U);
+  guess.of_measurement = ((clues | (tag ? Bit(*tag) : 0U)) & kMeasurements &
+                          ~Bit(Role::kLevel)) != 0;
   guess.by_word = true;
   const unsigned seen =
       (clues & kFlowValve) != 0 ? clues & ~kMeasurements : clues;

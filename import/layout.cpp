@@ -255,7 +255,7 @@ constexpr OtherForm kOtherForms[] = {
      "jq -r '\"time,value,good\", (.Items[] | [.Timestamp, .Value, .Good] | "
      "@csv)' FILE.json > FILE.csv, one file a tag"},
     {"JSON lines", "{", "\"t_s\"",
-     "fdi-simulator replay --csv - < FILE, which publishes them"},
+     "fdi-simulator replay --file - < FILE, which publishes them"},
     {"JSON", "{", "", "jq -r '.[] | [.time, .tag, .value] | @csv'"},
     {"JSON", "[", "\":", "jq -r '.[] | [.time, .tag, .value] | @csv'"},
 };

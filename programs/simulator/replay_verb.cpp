@@ -225,8 +225,7 @@ void AddReplayVerb(report::Program& program) {
       ->check(CLI::Range(1e-3, 3600.0))
       ->default_str("")
       ->type_name("S");
-  report::ShowInHelpAll(verb, {"--resample", "--decimal", "--date", "--skip",
-                               "--wait-reader", "--keep-alive"});
+  report::ShowInHelpAll(verb, {"--resample", "--wait-reader", "--keep-alive"});
 }
 
 }  // namespace fdi::simulator

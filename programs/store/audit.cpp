@@ -725,8 +725,8 @@ void AddAuditVerb(report::Program& program) {
       "FILE-2.png, ... by rank");
   options.table.AddTo(verb);
   program.AllowCsv(verb, "One line per window");
-  report::ShowInHelpAll(verb, {"--ignore-x", "--service", "--window",
-                               "--resample", "--decimal", "--date", "--skip"});
+  report::ShowInHelpAll(verb,
+                        {"--ignore-x", "--service", "--window", "--resample"});
 }
 
 }  // namespace fdi::storage

@@ -542,9 +542,9 @@ void AddOptions(CLI::App& verb, OnboardOptions& options) {
   verb.add_flag("--gains", options.gains,
                 "Compute what each missing transmitter would add; takes the "
                 "time of an onboarding for each");
-  report::ShowInHelpAll(
-      verb, {"--resample", "--decimal", "--date", "--skip", "--save-type",
-             "--false-alarms-per-hour", "--no-coverage", "--gains"});
+  report::ShowInHelpAll(verb,
+                        {"--resample", "--save-type", "--false-alarms-per-hour",
+                         "--no-coverage", "--gains"});
 }
 
 }  // namespace

@@ -607,8 +607,7 @@ void AddOptions(CLI::App& verb, RelearnOptions& options) {
   verb.add_flag("--dry-run", options.dry_run,
                 "Show what would be learnt and exit")
       ->configurable(false);
-  report::ShowInHelpAll(verb, {"--resample", "--decimal", "--date", "--skip",
-                               "--type", "--jobs"});
+  report::ShowInHelpAll(verb, {"--resample", "--type", "--jobs"});
 }
 
 }  // namespace

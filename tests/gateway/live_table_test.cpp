@@ -73,7 +73,7 @@ sp = "{loop}.SP"
   EXPECT_EQ(flow.map.mode_column, "FIC101.MODE");
   EXPECT_EQ(flow.report, importer::Reporting::kPeriodic);
   EXPECT_EQ(flow.max_age_ns, 5'000'000'000);
-  EXPECT_THAT(flow.auto_words, ElementsAre("2"));
+  EXPECT_EQ(flow.map.mode_words.at("2"), ValveMode::kAuto);
   EXPECT_THAT(SignalsOf(table.valves[1]),
               ElementsAre(Signal::kCv, Signal::kX, Signal::kP1, Signal::kPv,
                           Signal::kSp));

@@ -325,9 +325,16 @@ TEST_F(AssemblerTest, AHeaderOfTwoValvesIsReadByBoth) {
   EXPECT_THAT(With("V1", Signal::kP1), ElementsAre(1.0));
 }
 
+TEST(ConvertedTest, TheFlowOfAPressureDifferenceGoesWithItsRoot) {
+  ColumnMapping mapping{"DP", Signal::kF, 2.5, -10.0};
+  mapping.root = std::pair(4.0, 20.0);
+  EXPECT_EQ(Converted(mapping, 8.0), 20.0);
+  EXPECT_EQ(Converted(mapping, 3.9), 0.0);
+}
+
 TEST_F(AssemblerTest, WordsOfAModeAreThoseOfTheRowThenTheUsualOnes) {
   LiveValve valve = ValveNamed("V1");
-  valve.auto_words = {"2"};
+  valve.map.mode_words["2"] = ValveMode::kAuto;
   Make({valve});
   const auto say = [&](double s, std::string_view word,
                        std::optional<double> value) {
