@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 #include <limits>
 
 #include "diagnosis/observers/detection.h"
@@ -13,6 +14,12 @@ constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 constexpr std::uint32_t SidesOf(std::size_t channel) {
   return std::uint32_t{3} << (2 * channel);
+}
+
+// Bit 0: below the threshold, bit 1: above.
+std::uint32_t SidesBeyond(const ChannelSpec& channel, double residual) {
+  return (residual < channel.lower_threshold ? 1U : 0U) |
+         (residual > channel.upper_threshold ? 2U : 0U);
 }
 
 }  // namespace
@@ -48,17 +55,23 @@ const Sample& LoneReadings::Step(ObserverBank& bank, const Sample& sample) {
     bank.Amend(0, judged_.values, original_.uncertain());
   }
   bank.Step(sample);
-  Sides beyond = Beyond(bank);
+  Read(bank);
   if (held != 0) {
-    const bool real = (beyond & held) != 0;
+    const bool real = (Beyond() & held) != 0;
     const Sample& past = real ? original_ : judged_;
     bank.Amend(1, past.values, past.uncertain());
     bank.StepAgain(sample);
-    beyond = real ? Beyond(bank) : beyond;
+    if (real) {
+      Read(bank);
+    }
   }
-  const Sides lone = has_past_ ? TakeRare(beyond & ~beyond_) : 0;
+  const Sides beyond = Beyond();
+  const Sides lone = TakeRare(has_past_ ? beyond & Jumped() & ~beyond_ : 0);
   beyond_ = beyond;
   has_past_ = true;
+  for (std::size_t c = 0; c < now_.size(); ++c) {
+    last_[c] = std::isnan(now_[c]) ? last_[c] : now_[c];
+  }
   if (lone != 0) {
     HoldOut(bank, sample, lone);
   } else {
@@ -67,22 +80,33 @@ const Sample& LoneReadings::Step(ObserverBank& bank, const Sample& sample) {
   return judged_;
 }
 
-// A channel that was not read stays where it was: between readings of slow data
-// stand interpolated ones.
-LoneReadings::Sides LoneReadings::Beyond(const ObserverBank& bank) const {
-  Sides beyond = 0;
+void LoneReadings::Read(const ObserverBank& bank) {
   for (std::size_t c = 0; c < models_->channels.size(); ++c) {
     const int channel = static_cast<int>(c);
-    if (!bank.active(channel) || !bank.measured(channel)) {
-      beyond |= beyond_ & SidesOf(c);
-      continue;
-    }
-    const double residual = CertainResidual(bank, channel);
-    const ChannelSpec& spec = models_->channels[c];
-    beyond |= (residual < spec.lower_threshold ? Sides{1} : Sides{0}) << 2 * c;
-    beyond |= (residual > spec.upper_threshold ? Sides{2} : Sides{0}) << 2 * c;
+    now_[c] = bank.active(channel) && bank.measured(channel)
+                  ? CertainResidual(bank, channel)
+                  : kNan;
+  }
+}
+
+// A channel that was not read stays where it was: between readings of slow data
+// stand interpolated ones.
+LoneReadings::Sides LoneReadings::Beyond() const {
+  Sides beyond = 0;
+  for (std::size_t c = 0; c < models_->channels.size(); ++c) {
+    beyond |= std::isnan(now_[c])
+                  ? beyond_ & SidesOf(c)
+                  : SidesBeyond(models_->channels[c], now_[c]) << 2 * c;
   }
   return beyond;
+}
+
+LoneReadings::Sides LoneReadings::Jumped() const {
+  Sides jumped = 0;
+  for (std::size_t c = 0; c < models_->channels.size(); ++c) {
+    jumped |= SidesBeyond(models_->channels[c], now_[c] - last_[c]) << 2 * c;
+  }
+  return jumped;
 }
 
 LoneReadings::Sides LoneReadings::TakeRare(Sides lone) {
@@ -105,7 +129,7 @@ void LoneReadings::HoldOut(ObserverBank& bank, const Sample& sample,
   SignalMask doubtful = 0;
   for (std::size_t c = 0; c < models_->channels.size(); ++c) {
     if ((lone & SidesOf(c)) != 0) {
-      residuals_[c] = CertainResidual(bank, static_cast<int>(c));
+      residuals_[c] = now_[c];
       doubtful = static_cast<SignalMask>(doubtful | doubtful_[c]);
     }
   }

@@ -12,8 +12,10 @@ namespace fdi {
 
 /// Holds out single wrong readings, as loose wires and lost telegrams make
 /// them. A reading is held out where the residual of the normal observer passes
-/// a threshold that it did not pass at the reading before. It then counts as
-/// UNCERTAIN, with the last value in its place, and the next reading decides:
+/// a threshold that it did not pass at the reading before, and has changed by
+/// more than that threshold since then; a fault that hovers about a threshold
+/// is not held out. The reading then counts as UNCERTAIN, with the last value
+/// in its place, and the next one decides:
 ///
 ///  1. The next one passes that threshold, too: the step was real. The past of
 ///     the observers gets the reading back, and nothing more is held out.
@@ -52,7 +54,9 @@ class LoneReadings {
   /// Two bits by channel: below, above.
   using Sides = std::uint32_t;
 
-  Sides Beyond(const ObserverBank& bank) const;
+  void Read(const ObserverBank& bank);
+  Sides Beyond() const;
+  Sides Jumped() const;
   Sides TakeRare(Sides lone);
   void HoldOut(ObserverBank& bank, const Sample& sample, Sides lone);
 
@@ -64,6 +68,8 @@ class LoneReadings {
   Sides held_{0};
   bool has_past_{false};
   std::array<double, kMaxChannels> residuals_;
+  std::array<double, kMaxChannels> now_{};   // NaN: not read
+  std::array<double, kMaxChannels> last_{};  // that was read
   std::array<double, kMaxChannels> load_{};  // readings held out of late
 };
 
