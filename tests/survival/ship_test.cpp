@@ -419,8 +419,9 @@ TEST_F(ShipTest, RefusalsHaveAReasonAndCode3) {
   refused(Store("ship --init --db '" + server_->Url("empty", "room") + "'"),
           "permission denied for database empty");
   EXPECT_EQ(Ship("a", "", "room").code, 0);
-  refused(Ship("a", "--prune --history-age 1s --trust-clock", "room"),
-          "permission denied for table episode");
+  refused(
+      Store("prune --history-age 1s --trust-clock --db '" + Url("room") + "'"),
+      "permission denied for table episode");
   EXPECT_EQ(Store("history list --db '" + Url("screen") + "'").code, 0);
   owner.Run("UPDATE fdi.plant SET version = version + 1");
   refused(Ship("a"),

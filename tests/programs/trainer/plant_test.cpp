@@ -144,7 +144,7 @@ TEST_F(PlantTest, ADryRunStoresNothingAndListsTags) {
 
 TEST_F(PlantTest, PartsOfTheTableShareADataDirectory) {
   const std::string table = "A,,,,,,,,,\nB,,,,,,,,,\nD,,,,,,,,,\n";
-  EXPECT_EQ(Onboard(table, "--rows '[AB]' --jobs 1").size(), 2U);
+  EXPECT_EQ(Onboard(table, "--valve '[AB]' --jobs 1").size(), 2U);
   const auto all = Onboard(table, "--jobs 2");
   EXPECT_EQ(all.at("A")["unchanged"], true);
   EXPECT_EQ(all.at("B")["unchanged"], true);
