@@ -99,41 +99,44 @@ class PointWriter {
         out_(out) {}
 
   // Reduces groups of equal size to their extremes, in their original order. A
-  // group with a break or a missing value is written in full, so that the break
-  // stays in place.
+  // break or a missing value ends a piece of the curve, so that it stays in
+  // place, and each piece of a group has its own extremes.
   void Write(std::size_t groups) {
     const std::size_t count = std::min(x_.size(), y_.size());
-    // `step` is rounded down and each group leaves two points at most, so a
+    // `step` is rounded down and each piece leaves two points at most, so a
     // curve without breaks has at most about three times `groups` points.
     const std::size_t step = std::max<std::size_t>(1, count / groups);
     for (std::size_t i = 0; i < count; i += step) {
-      const std::size_t end = std::min(i + step, count);
-      IsWhole(i, end) ? Extremes(i, end) : All(i, end);
+      WriteGroup(i, std::min(i + step, count));
     }
   }
 
  private:
   bool IsGap(std::size_t i) const { return i > 0 && x_[i] - x_[i - 1] > gap_; }
-  bool IsWhole(std::size_t begin, std::size_t end) const {
-    for (std::size_t i = begin; i < end; ++i) {
-      if (IsGap(i) || !std::isfinite(y_[i])) {
-        return false;
-      }
-    }
-    return true;
-  }
   std::string X(std::size_t i) const {
     return GnuplotNumber((x_[i] + shift_) / unit_);
   }
   void Point(std::size_t i) {
     out_ << X(i) << ' ' << GnuplotNumber(y_[i]) << '\n';
   }
-  void All(std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) {
+  void WriteGroup(std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end;) {
       if (IsGap(i)) {
         out_ << X(i) << " NaN\n";
       }
-      Point(i);
+      std::size_t next = i + 1;
+      if (!std::isfinite(y_[i])) {
+        Point(i);
+        while (next < end && !std::isfinite(y_[next]) && !IsGap(next)) {
+          ++next;
+        }
+      } else {
+        while (next < end && std::isfinite(y_[next]) && !IsGap(next)) {
+          ++next;
+        }
+        Extremes(i, next);
+      }
+      i = next;
     }
   }
   void Extremes(std::size_t begin, std::size_t end) {

@@ -582,7 +582,7 @@ TEST_F(ShiftTest, EverybodySaysTheSameOfEveryAlarm) {
   mended[1].strength = 0.9;
   Moment("mended", mended);
 
-  Store("history ack --by anna --comment 'seen'");
+  Store("history ack --valve '*' --by anna --comment 'seen'");
   Store("history shelve FV-06 --off --by jan");
   Moment("acknowledged at the end of the shift",
          {{"FV-06", "ACKED", "f7", "critical", 0.9}});
