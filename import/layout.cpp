@@ -218,6 +218,7 @@ class LayoutFinder {
   [[noreturn]] void RefuseSign(const SignCell& seen,
                                const std::string& reason) const;
   void FindTags();
+  std::optional<std::size_t> ValuesBeside(std::size_t tag) const;
   void FindQualities();
   bool HoldsWords(const std::string& name) const;
   void ChooseGood(const std::string& name, const WordCounts& words);
@@ -721,6 +722,36 @@ void LayoutFinder::TakeDate(const Cells& cells) {
   }
 }
 
+// The column of values of a long table, if there is one: beside several columns
+// of values, words are states, not tags.
+std::optional<std::size_t> LayoutFinder::ValuesBeside(std::size_t tag) const {
+  std::optional<std::size_t> value;
+  int best = 0;
+  int candidates = 0;
+  for (std::size_t c = 0; c < columns_.size(); ++c) {
+    const Column& column = columns_[c];
+    if (c == time_ || c == tag || c == clock_ ||
+        !column.Mostly(column.numbers) || column.values.empty() ||
+        IsQualityColumn(Name(c), column.words)) {
+      continue;
+    }
+    const bool named = HasWord(PlainText(Name(c)),
+                               "value|wert|valor|valeur|wartosc|reading|data");
+    const bool varies = std::ranges::any_of(
+        column.values, [&](double v) { return v != column.values.front(); });
+    const bool timed =
+        HasWord(PlainText(Name(c)), "time|zeit|stamp|id") ||
+        TimeUnitOf(Name(c), column.values.front()).form != TimeForm::kElapsed;
+    candidates += varies && !timed ? 1 : 0;
+    if (const int score = 1 + (named ? 4 : 0) + (varies && !timed ? 2 : 0);
+        score > best) {
+      best = score;
+      value = c;
+    }
+  }
+  return candidates == 1 || best >= 5 ? value : std::nullopt;
+}
+
 // A table is long if one column has few distinct names, each at many times,
 // beside one of values. A map by hand names tags that are in no header.
 void LayoutFinder::FindTags() {
@@ -770,32 +801,7 @@ void LayoutFinder::FindTags() {
     }
     return;
   }
-  std::optional<std::size_t> value;
-  int best = 0;
-  int candidates = 0;
-  for (std::size_t c = 0; c < columns_.size(); ++c) {
-    const Column& column = columns_[c];
-    if (c == time_ || c == tag || c == clock_ ||
-        !column.Mostly(column.numbers) || column.values.empty() ||
-        IsQualityColumn(Name(c), column.words)) {
-      continue;
-    }
-    const bool named = HasWord(PlainText(Name(c)),
-                               "value|wert|valor|valeur|wartosc|reading|data");
-    const bool varies = std::ranges::any_of(
-        column.values, [&](double v) { return v != column.values.front(); });
-    const bool timed =
-        HasWord(PlainText(Name(c)), "time|zeit|stamp|id") ||
-        TimeUnitOf(Name(c), column.values.front()).form != TimeForm::kElapsed;
-    candidates += varies && !timed ? 1 : 0;
-    if (const int score = 1 + (named ? 4 : 0) + (varies && !timed ? 2 : 0);
-        score > best) {
-      best = score;
-      value = c;
-    }
-  }
-  // Beside several columns of values, words are states, not tags.
-  if (value && (candidates == 1 || best >= 5)) {
+  if (const auto value = ValuesBeside(*tag)) {
     map().long_table = LongTable{Name(*tag), Name(*value), ""};
   }
 }

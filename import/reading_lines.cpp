@@ -26,8 +26,8 @@ constexpr std::array<std::string_view, 5> kReadingColumns = {
     "time", "tag", "value", "quality", "source"};
 
 std::string Shortened(std::string_view text) {
-  constexpr std::size_t kMost = 60;
-  return Quoted(std::string(text.substr(0, kMost)));
+  constexpr std::size_t kMostShown = 60;
+  return Quoted(std::string(text.substr(0, kMostShown)));
 }
 
 }  // namespace

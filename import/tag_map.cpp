@@ -174,6 +174,27 @@ UnitConversion GasConversion(TomlReader& table, const std::string& name,
   return {*NormalVolume(name) * *molar_mass / kMolarVolume * 1e-3, 0.0, kMass};
 }
 
+// A card shows a broken wire or a short circuit by counts beyond its range: 3.6
+// and 21 mA, 32767. A tenth of the range is left to overrange.
+void LimitCounts(const std::vector<double>& raw, ColumnMapping& mapping) {
+  const double margin = 0.1 * std::abs(raw[1] - raw[0]);
+  mapping.lowest = std::min(raw[0], raw[1]) - margin;
+  mapping.highest = std::max(raw[0], raw[1]) + margin;
+}
+
+// Whether a command is half of a split range, and the valve at its end beyond.
+bool IsHalfOfARange(Signal signal, const std::string& unit,
+                    const std::vector<double>& raw, double scale) {
+  if (signal != Signal::kCv && signal != Signal::kSp) {
+    return false;
+  }
+  if (raw.empty()) {
+    return unit == "%" && scale > 1.0;
+  }
+  const double most = raw.size() == 2 ? std::max(raw[0], raw[1]) : 0.0;
+  return unit != "mA" && most <= 100.0 && most > 25.0;
+}
+
 void ReadUnit(TomlReader& table, Signal signal, ColumnMap& map,
               ColumnMapping& mapping) {
   const bool flow = signal == Signal::kF;
@@ -233,18 +254,10 @@ void ReadUnit(TomlReader& table, Signal signal, ColumnMap& map,
   mapping.scale = unit->scale * scale;
   mapping.offset = unit->offset + unit->scale * offset;
   mapping.unit = name;
-  const bool command = signal == Signal::kCv || signal == Signal::kSp;
-  const bool half = name != "mA" && raw.size() == 2 &&
-                    std::max(raw[0], raw[1]) <= 100.0 &&
-                    std::max(raw[0], raw[1]) > 25.0;
-  if (command && (half || (raw.empty() && name == "%" && scale > 1.0))) {
-    mapping.clamped = true;  // Half of a split range, and the valve at its end.
+  if (IsHalfOfARange(signal, name, raw, scale)) {
+    mapping.clamped = true;
   } else if (counts && raw.size() == 2) {
-    // A card shows a broken wire or a short circuit by counts beyond its range:
-    // 3.6 and 21 mA, 32767. A tenth of the range is left to overrange.
-    const double margin = 0.1 * std::abs(raw[1] - raw[0]);
-    mapping.lowest = std::min(raw[0], raw[1]) - margin;
-    mapping.highest = std::max(raw[0], raw[1]) + margin;
+    LimitCounts(raw, mapping);
   }
   mapping.quality = table.Text("quality").value_or("");
   if (flow) {

@@ -301,7 +301,7 @@ void Episode::Step(const Sample& sample, const ObserverBank& bank,
 }
 
 // One case for each rule of an episode, in any order: kRules has that in which
-// they act.
+// they act. These say which faults are supported, and whether any may be.
 void Episode::Apply(Rule rule, Proposal& p) {
   Verdict& verdict = p.verdict;
   FaultSet& supported = p.supported;
@@ -360,6 +360,16 @@ void Episode::Apply(Rule rule, Proposal& p) {
     case Rule::kNothingSupported:
       p.over = supported == 0;
       break;
+    default:
+      ApplyToName(rule, p);
+  }
+}
+
+// What is supported becomes the name, or does not.
+void Episode::ApplyToName(Rule rule, Proposal& p) {
+  Verdict& verdict = p.verdict;
+  FaultSet& supported = p.supported;
+  switch (rule) {
     case Rule::kGroups:
       supported = WithGroups(supported, verdict);
       break;

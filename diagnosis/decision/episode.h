@@ -179,6 +179,7 @@ class Episode {
   };
 
   void Apply(Rule rule, Proposal& proposal);
+  void ApplyToName(Rule rule, Proposal& proposal);
   void ApplyEvidence(Verdict& verdict) const;
   void Open(std::int64_t stamp_ns, Verdict& verdict);
   FaultSet Proven(const Verdict& verdict);
