@@ -1,9 +1,8 @@
 #!/usr/bin/env bash
-# What each rule of diagnosis/decision/rules.h buys: every set of runs below is
-# scored with each rule left out, and docs/results/ablation.md gets the table.
-# What is in DIR is not made again, so that it goes on where it was stopped; a
-# DIR of another version has to be removed. By the observers alone, without
-# looks; needs FDI_REFERENCE_DATA. One process at a time, some three hours of
+# Measures each rule of diagnosis/decision/rules.h: scores every set of runs
+# below with each rule left out, and writes docs/results/ablation.md. Results in
+# DIR are kept, so that a stopped run continues; remove a DIR of another version.
+# Scores the observers only, without looks; needs FDI_REFERENCE_DATA. One process at a time, some three hours of
 # CPU for all, half of which are the ramps.
 #
 #     bench/ablation.sh build/release/bin DIR [COLUMN...]
@@ -101,8 +100,8 @@ for n in 1 2; do
   ablate loop-own-$n own "${files[@]}"
 done
 
-# What sets of five faults call other ones (bench/untrained.sh): by the paper's
-# set, and by the onboarded valve's.
+# Faults that a set of five does not know (bench/untrained.sh): the paper's set
+# and the onboarded valve's.
 untrained=(f2 f4 f5 f9 f10 f11 f12 f12- f13 f13- f15 f16 f17 f17- f18 f19- t1 t1-
   p1 p1- p2 p2-)
 for n in 1 2; do

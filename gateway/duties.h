@@ -21,8 +21,8 @@ struct Metric {
   double value{0.0};
 };
 
-/// What a service owes its host beside its work: it tells systemd that it is
-/// ready and gets on, and serves its figures.
+/// The duties of a service to its host: tells systemd that it is ready and
+/// alive, and serves its metrics.
 class Duties {
  public:
   /// @param address for /metrics and /healthz, "[ADDRESS:]PORT"; empty: none.

@@ -59,7 +59,7 @@ bool LineSource::Poll(std::chrono::milliseconds timeout,
   }
   buffer_.append(bytes.data(), static_cast<std::size_t>(count));
   std::size_t begin = 0;
-  // What was searched before is not searched again.
+  // Searches only the bytes that are new.
   std::size_t end =
       buffer_.find('\n', buffer_.size() - static_cast<std::size_t>(count));
   for (; end != std::string::npos; end = buffer_.find('\n', begin)) {

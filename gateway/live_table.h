@@ -23,7 +23,7 @@ struct RefusedRow {
   std::string why;
 };
 
-/// What a plant table says of its running plant.
+/// The live part of a plant table: its valves, tags and topics.
 struct LiveTable {
   std::int64_t period_ns{1'000'000'000};  ///< By the key `resample`.
   std::vector<importer::LiveValve> valves;

@@ -230,7 +230,7 @@ void MqttClient::Run(const std::stop_token& stop) {
     stopped.wait_for(lock, stop, pause, [] { return false; });
     pause = std::min(2 * pause, kLongestPause);
   }
-  // What was published last still goes out, then the farewell.
+  // Sends the last messages, then says good-bye.
   for (int i = 0; connected_ && i < 10; ++i) {
     if (!mosquitto_want_write(library_)) {
       break;

@@ -34,7 +34,7 @@ struct MqttOptions {
   void AddTo(CLI::App& verb);
 };
 
-/// What a broker told, in order.
+/// An event of the connection, in order of arrival.
 struct MqttEvent {
   enum class Kind : std::uint8_t { kConnected, kLost, kMessage };
   Kind kind{Kind::kMessage};
@@ -66,9 +66,9 @@ class MqttClient {
   /// Says good-bye, so that the broker does not publish the will.
   void Stop();
 
-  /// What has come, oldest first, after waiting up to `timeout`.
+  /// Takes the events so far, oldest first, after waiting up to `timeout`.
   void Take(std::vector<MqttEvent>& events, std::chrono::milliseconds timeout);
-  /// Of QoS 0 on the way in; call at each kConnected.
+  /// Subscribes with QoS 0; call it at each kConnected.
   void Subscribe(const std::vector<std::string>& topics);
   void Unsubscribe(const std::vector<std::string>& topics);
   /// QoS 1. @returns false if there is no connection, or the message does not

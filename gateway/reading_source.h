@@ -20,7 +20,7 @@ struct ReadingHandlers {
       alive;
   /// The connection of the source is lost.
   std::function<void(std::string_view source)> ended;
-  /// What cannot be read. @param about the tag, topic or line.
+  /// Called for input that cannot be read. @param about the tag, topic or line.
   std::function<void(std::string_view about, std::string_view why)> wrong;
 };
 
@@ -36,8 +36,8 @@ class ReadingSource {
   virtual void Use(const LiveTable& /*table*/) {}
   /// Readings that were dropped because they came too fast.
   virtual std::uint64_t dropped() const { return 0; }
-  /// Whether the samples may wait for a reader that is behind, which holds up
-  /// the source.
+  /// True if samples may wait for a reader that is behind, which holds up the
+  /// source.
   virtual bool may_wait() const = 0;
 };
 

@@ -14,7 +14,7 @@
 
 namespace fdi::gateway {
 
-/// What goes out by MQTT.
+/// An outgoing MQTT message.
 struct Outgoing {
   std::string topic;
   std::string payload;
@@ -54,7 +54,7 @@ class ValveStates {
   /// Events that have come, then states that have changed, or were told a
   /// minute ago: `as_of_utc` goes on. Call once a second.
   std::vector<Outgoing> Due(std::int64_t now_ns, Clock::time_point now);
-  /// What the monitor's topic says while this program does not live.
+  /// The last will: the monitor's topic while this program is not running.
   Outgoing Farewell() const;
 
   std::size_t valves() const { return valves_; }

@@ -8,6 +8,7 @@
 
 #include "base/log.h"
 #include "diagnosis/records/partitions.h"
+#include "monitor/bus/dds_options.h"
 #include "simulator/second_look/valve_physics.h"
 #include "storage/database/data_directory.h"
 #include "storage/models/models.h"
@@ -24,22 +25,9 @@ constexpr milliseconds kFound(5000);
 // Looks before a reader that is behind is said.
 constexpr int kStalled = 50;
 
-idl::DdsOptions DdsOptionsOf(const report::GlobalOptions& options,
-                             std::size_t valves) {
-  idl::DdsOptions dds;
-  dds.domain = options.domain;
-  dds.interfaces = options.interface;
-  dds.transport = options.transport;
-  dds.qos_file = options.qos_file.string();
-  dds.security = options.security.string();
-  dds.max_valves = std::max(dds.max_valves, static_cast<int>(valves));
-  idl::Validate(dds);
-  return dds;
-}
-
 // A table that is read again may have more rows.
-std::size_t Room(std::size_t valves) {
-  return 2 * valves + 100;
+int Room(std::size_t valves) {
+  return static_cast<int>(2 * valves + 100);
 }
 
 // The letters that --partition accepts.
@@ -69,7 +57,9 @@ ValveWire::ValveWire(const ValveWireOptions& options,
     : options_(options),
       context_(context),
       signals_(signals),
-      participant_(DdsOptionsOf(context.options, Room(options.valves)),
+      participant_(monitor::DdsOptionsOf(context.options,
+                                         std::max(idl::DdsOptions{}.max_valves,
+                                                  Room(options.valves))),
                    context.log, "fdi-gateway") {
   if (!options_.by_group) {
     WriterOf("");
@@ -85,7 +75,7 @@ ValveWire::Writer& ValveWire::WriterOf(const std::string& group) {
         participant_,
         idl::PublisherOptions{
             options_.lossless ? idl::Profile::kLossless : idl::Profile::kLive,
-            static_cast<int>(Room(options_.valves)),
+            Room(options_.valves),
             partition.empty()
                 ? ParsePartitions(context_.options.partition, false)
                 : std::vector{partition}});

@@ -249,7 +249,7 @@ void Assembler::Speak(std::size_t index, std::int64_t stamp_ns,
     source.newest_ns = stamp_ns;
   }
   const std::int64_t step_ns = stamp_ns - source.newest_ns;
-  // What follows a lost connection has no step: time passed meanwhile.
+  // After a lost connection a step is no leap, because time has passed.
   const std::int64_t leap_ns = std::max(kLeapNs, 10 * options_.period_ns);
   if (step_ns > leap_ns && step_ns > 2 * since_ns) {
     Note(NoteKind::kClockLeaps, source.name, step_ns);

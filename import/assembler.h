@@ -34,8 +34,7 @@ struct LiveValve {
   std::int64_t max_age_ns{0};  ///< With kPeriodic.
 };
 
-/// What a source says of a tag: a value, or with quality BAD that there is
-/// none.
+/// A reading of a tag by a source; with quality BAD there is no value.
 struct TagReading {
   std::string_view tag;
   /// Who says it: a connection or a device with one clock.
@@ -66,7 +65,7 @@ enum class Taken : std::uint8_t {
   kBadValue,  ///< Neither a number in range nor, of a mode, a known word.
 };
 
-/// What happens to sources and tags beside the samples.
+/// An event of a source or tag that is no sample.
 struct AssemblyNote {
   enum class Kind : std::uint8_t {
     kSourceSilent,  ///< What it said is no longer held.
@@ -81,7 +80,7 @@ struct AssemblyNote {
   std::int64_t by_ns{0};  ///< How long it was silent; how far the clock moved.
 };
 
-/// What came of a tag since the start.
+/// Counts of a tag's readings since the start.
 struct TagCounts {
   std::uint64_t readings{0};
   std::uint64_t bad{0};      ///< Of these: without a usable value or stamp.
@@ -133,7 +132,7 @@ class Assembler {
   /// Writes all instants that a source has reached: nothing will follow.
   void Finish(const Sink& sink);
 
-  /// Whether a valve has this tag.
+  /// True if a valve has this tag.
   bool Knows(std::string_view tag) const { return tags_.contains(tag); }
   /// Calls with each tag and its counts, in no order.
   void ForEachTag(const std::function<void(const std::string&,

@@ -272,8 +272,8 @@ bool HasForm(std::string_view text, std::string_view form) {
   return true;
 }
 
-// What comes behind a valve says which of its signals it is: XQ01 is read from
-// it, YQ01 written to it.
+// The code after that of a valve tells which signal it is: XQ01 is read from
+// the valve, YQ01 is written to it.
 std::optional<Role> RoleOfPlantCode(const Parts& parts) {
   std::string joined;
   for (const std::string& part : parts) {
@@ -447,7 +447,7 @@ void TakeName(const std::string& name, const std::string& about,
   if (guess.role) {
     return;
   }
-  // What a card reads of a valve is its position.
+  // An input card reads the position of a valve.
   const bool read = std::ranges::any_of(
       parts, [](const std::string& part) { return Letters(part) == "ai"; });
   guess.role = tag == Role::kValve && read ? Role::kPosition
@@ -544,7 +544,7 @@ std::vector<std::string> DistinctParts(const std::vector<std::string>& names,
   const auto ending = [&](const std::string& name) {
     const std::size_t at = name.find_last_of(kCuts);
     const bool none = at == std::string::npos || at == 0;
-    // Of a block, which tells what comes out.
+    // The output of a function block carries the name of the block.
     return none || SameName(name.substr(at + 1), "out") ? std::string()
                                                         : name.substr(at);
   };

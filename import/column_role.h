@@ -9,7 +9,7 @@
 
 namespace fdi::importer {
 
-/// What a column may hold. Both pressures are kPressure until words or sizes
+/// The content of a column. Both pressures are kPressure until words or sizes
 /// tell them apart; kValve is the tag of a valve, its command or its position.
 enum class Role {
   kOther,  ///< No signal: a pressure difference, a speed, a limit of an alarm.
@@ -28,11 +28,11 @@ enum class Role {
   kMeasured,  ///< The process value of its tag, whatever that measures.
 };
 
-/// What the name of a column, the text below it and its unit say.
+/// The role of a column by its name, the text below it and its unit.
 struct RoleGuess {
   std::optional<Role> role;
   bool by_word{false};  ///< Not by the letters of a tag, which are less sure.
-  /// What its last part says by itself: kMeasured of FIC101.PV.
+  /// The role of the last part alone: kMeasured of FIC101.PV.
   std::optional<Role> attribute;
   std::string unit;  ///< As the name or the text below it states it.
   std::string tag;   ///< "FIC101." of FIC101.PV; empty: no tag is in front.

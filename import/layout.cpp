@@ -92,7 +92,7 @@ bool IsValue(std::string_view cell) {
          IsClock(cell);
 }
 
-// Of a row of types below the names: F is a number there, and no Fahrenheit.
+// A cell in a row of types below the names, where F is a float, not Fahrenheit.
 bool IsTypeCell(const std::string& cell) {
   return IsListedWord(PlainText(cell),
                       "|d|f|i|l|b|s|date|datetime|datetime:rfc3339|time|double|"
@@ -233,7 +233,7 @@ class LayoutFinder {
   std::size_t data_line_{1};
   std::optional<std::size_t> time_;
   std::optional<std::size_t> clock_;
-  // Of all rows.
+  // Over all rows.
   Signs signs_;
   std::array<OrderFit, 3> orders_{};
   std::size_t dates_{0};
@@ -662,7 +662,7 @@ void LayoutFinder::ReadRows() {
                 });
 }
 
-// Whether a column may hold tags or qualities.
+// True if a column may hold tags or qualities.
 bool LayoutFinder::MayHoldWords(std::size_t c) const {
   const ColumnMap& map = layout_.map;
   const bool stated =

@@ -400,7 +400,7 @@ RawTable ReadToml(TomlReader& file, PlantTable& table) {
   return raw;
 }
 
-// Whether a line that begins with # may be meant as a row, of a name like #12.
+// True if a line that begins with # may be a row, with a name like #12.
 bool MayBeRow(std::string_view line, char separator, std::size_t columns) {
   CsvCells cells(separator);
   return columns > 1 && cells.TakeLine(line) && cells.cells().size() >= columns;

@@ -52,7 +52,7 @@ bool IsNoReading(std::string_view cell,
 
 /// Whether `text` contains one of `words`, which are separated by bars.
 bool HasWord(std::string_view text, std::string_view words);
-/// Whether `text` is one of `words`, each with a bar before and behind it.
+/// True if `text` is one of `words`, each with a bar before and after it.
 bool IsListedWord(std::string_view text, std::string_view words);
 
 }  // namespace fdi::importer

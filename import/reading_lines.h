@@ -11,7 +11,7 @@
 
 namespace fdi::importer {
 
-/// What one line or one payload says.
+/// The content of one line or payload.
 struct Said {
   enum class Kind : std::uint8_t { kNothing, kReading, kAlive, kWrong };
   Kind kind{Kind::kNothing};

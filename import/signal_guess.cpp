@@ -22,7 +22,7 @@
 namespace fdi::importer {
 namespace {
 
-/// What a role weighs for a signal of a valve, in the order in which the
+/// The weight of a role for a signal of a valve, in the order in which the
 /// signals choose.
 struct Claim {
   Signal signal;
@@ -51,7 +51,7 @@ constexpr double kSwitch = -8.0;      // Two values at most.
 constexpr double kMovesFirst = 1.0;   // Of two valves, the command.
 constexpr double kHigher = 6.0;       // Of two pressures; above a word.
 
-/// What a column weighs for a signal of a loop, by the last part of its name
+/// The weight of a column for a signal of a loop, by the last part of its name
 /// and by its role. The first row of the signal that holds counts.
 struct LoopClaim {
   Signal signal;
@@ -88,11 +88,11 @@ constexpr UnitOfSize kUnitsOfSize[] = {
     {Signal::kT1, 450.0, "degC"}, {Signal::kT1, 250.0, "K"},
     {Signal::kT1, 0.0, "degC"},   {Signal::kP1, 2e4, "Pa"},
     {Signal::kP1, 100.0, "kPa"},  {Signal::kP1, 0.0, "bar"}};
-/// Of a transmitter whose counts or currents have no stated range.
+/// Units of a transmitter whose counts or currents have no stated range.
 constexpr std::pair<Signal, std::string_view> kUnitsOfSpan[] = {
     {Signal::kF, "t/h"}, {Signal::kT1, "degC"}, {Signal::kP1, "bar"}};
 
-// What cards and registers have at 100 %: tenths and hundredths of a per cent,
+// Counts of cards and registers at 100 %: tenths and hundredths of a per cent,
 // 12, 15 and 16 bits, and the 27648 of Siemens.
 constexpr double kFullScales[] = {1000.0,  4095.0,  10000.0,
                                   27648.0, 32767.0, 65535.0};
@@ -117,9 +117,9 @@ void Say(SniffedColumn& column, const std::string& what) {
   column.guessed += (column.guessed.empty() ? "" : "; ") + what;
 }
 
-// Whether the readings lie in [low, high], but for a few outliers and a few
-// numbers that repeat, such as -9999 or 32767: codes of a state. Readings that
-// vary less than what lies beyond are no readings beside codes.
+// True if the readings lie in [low, high], except a few outliers and a few
+// repeated numbers such as -9999 or 32767, which are codes of a state. If the
+// readings vary less than those numbers, the numbers are no codes.
 bool IsWithin(const SniffedColumn& column, double low, double high) {
   std::map<double, std::size_t> within;
   std::map<double, std::size_t> beyond;
@@ -150,11 +150,11 @@ std::pair<double, double> PercentRange(const SniffedColumn& column) {
   return {-15.0 / scale, 115.0 / scale};
 }
 
-// Whether most values fit a percentage in a unit, or without one; sets the unit
+// True if most values fit a percentage in a unit, or without one; sets the unit
 // where none is stated.
 bool FitsPercent(SniffedColumn& column) {
   if (column.unit.empty()) {
-    // What may be a percentage is no code beside shares.
+    // Beside shares, a value that may be a percentage is no code.
     const auto count = [&](double low, double high) {
       return std::ranges::count_if(
           column.values, [&](double v) { return v >= low && v <= high; });
@@ -184,7 +184,7 @@ std::optional<double> FullScale(const SniffedColumn& column) {
   return std::nullopt;
 }
 
-// Whether most values fit a signal in a unit, or without one; sets unit, raw
+// True if most values fit a signal in a unit, or without one; sets unit, raw
 // and span. Most, because a few states and outliers are in every export.
 //
 // @param full the counts at 100 %, if the table has counts; else 0.
@@ -283,8 +283,8 @@ double Correlation(const SniffedColumn& a, const SniffedColumn& b) {
   return strongest;
 }
 
-// Whether b follows a rather than a b: what moves first is the command. 0 if
-// neither is seen.
+// Positive if b follows a, negative if a follows b, 0 if neither: the command
+// moves first.
 double Lead(const SniffedColumn& a, const SniffedColumn& b) {
   const auto follows = [](const SniffedColumn& first,
                           const SniffedColumn& second) {
@@ -303,7 +303,7 @@ double Lead(const SniffedColumn& a, const SniffedColumn& b) {
   return follows(a, b) - follows(b, a);
 }
 
-// Whether the readings are those of a counter: a flow falls now and then.
+// True if the readings are those of a counter: a flow falls now and then.
 bool IsTotal(const SniffedColumn& column) {
   constexpr std::size_t kEnough = 60;
   return column.values.size() >= kEnough &&
@@ -441,7 +441,7 @@ bool SignalGuess::TakeKnown(Candidate& candidate) const {
   return candidate.known.has_value();
 }
 
-// Whether the values fit the role; says why not.
+// True if the values fit the role; else notes why not.
 bool SignalGuess::IsCandidate(Candidate& candidate) {
   SniffedColumn& column = *candidate.column;
   const RoleGuess& guess = candidate.guess;

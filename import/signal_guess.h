@@ -28,7 +28,7 @@ struct SniffedColumn {
 
   /// Quantile of the values, which are not empty; `share` in [0, 1].
   double Quantile(double share) const;
-  /// Whether most of its cells are numbers or no readings.
+  /// True if most of its cells are numbers or no readings.
   bool HasReadings() const {
     return !values.empty() && 2 * (values.size() + missing) >= cells;
   }

@@ -336,9 +336,9 @@ Sniffed ScanColumns(const TextLines& lines, const std::string& source,
 
 namespace {
 
-// What the importer makes of the table with the map as it is written. Where it
-// reads the rows as they are, what it says about them counts, and not what
-// resampling makes of them.
+// Reads the table as the importer does, with the map as it is written. If the
+// rows can be read as they are, their notes count instead of those of the
+// resampled rows.
 void ReadWithMap(const TextLines& lines, const std::string& source,
                  Sniffed& found) {
   CsvOptions options{.source = source, .required = 0, .split_gaps = true};

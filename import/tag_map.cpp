@@ -182,7 +182,8 @@ void LimitCounts(const std::vector<double>& raw, ColumnMapping& mapping) {
   mapping.highest = std::max(raw[0], raw[1]) + margin;
 }
 
-// Whether a command is half of a split range, and the valve at its end beyond.
+// True if a command is half of a split range, beyond which the valve is at its
+// end.
 bool IsHalfOfARange(Signal signal, const std::string& unit,
                     const std::vector<double>& raw, double scale) {
   if (signal != Signal::kCv && signal != Signal::kSp) {

@@ -129,8 +129,8 @@ class Program {
   int RunVerb(int argc, const char* const* argv);
   int ExitCodeOf(const std::exception& error) const;
   int Print(const Report& report) const;
-  /// What is to be said about a word of the command line that was removed or
-  /// left out; the first such word counts.
+  /// The message about the first word of the command line that was removed or
+  /// left out.
   std::optional<std::string> MissingWord() const;
   void RefuseUnknownVerb() const;
   void PrintError(const std::string& message) const;

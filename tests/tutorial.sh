@@ -77,7 +77,7 @@ head -n 1 <&3 | grep >/dev/null ' 200 ' || fail "the page does not answer"
 kill -TERM "$service"
 wait "$service" || fail "the monitor ended with $?"
 service=
-# What the pages tell.
+# Checks the output that README shows.
 check_README() {
   fdi-store history list | grep >/dev/null 'f19 *Flow transmitter wrong *sure' ||
     fail "the history is not as README shows it"

@@ -334,7 +334,7 @@ void Episode::Apply(Rule rule, Proposal& p) {
       supported = IsAllOf(supported, misfits_) ? 0 : supported;
       break;
     case Rule::kRecognisedAlone:
-      // What is recognised fits over t_k samples, be single ones rare for it.
+      // A recognised fault fits over t_k samples, even if single ones are rare.
       supported = supported == 0 ? recognised_ : supported;
       break;
     case Rule::kHeld:
@@ -365,7 +365,7 @@ void Episode::Apply(Rule rule, Proposal& p) {
   }
 }
 
-// What is supported becomes the name, or does not.
+// These decide whether the supported faults become the name.
 void Episode::ApplyToName(Rule rule, Proposal& p) {
   Verdict& verdict = p.verdict;
   FaultSet& supported = p.supported;
@@ -790,7 +790,7 @@ void Episode::HoldName(Proposal& proposal) {
   }
 }
 
-// What contends for the name begins anew when the block ends.
+// A contender for the name starts over when the block ends.
 void Episode::Block(Proposal& proposal) {
   contender_run_ = 0;
   left_.clear();

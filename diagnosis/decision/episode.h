@@ -169,7 +169,7 @@ class Episode {
   void HoldIsolation(bool hold) { isolation_held_ = hold; }
 
  private:
-  // What the rules make of one sample.
+  // The result of the rules for one sample.
   struct Proposal {
     const Sample& sample;
     const Findings& findings;

@@ -51,7 +51,7 @@ const Sample& LoneReadings::Step(ObserverBank& bank, const Sample& sample) {
   held_ = 0;
   residuals_.fill(kNan);
   if (held != 0) {
-    // What is UNCERTAIN would keep the reading that decides from being judged.
+    // An UNCERTAIN past would keep the deciding reading from being judged.
     bank.Amend(0, judged_.values, original_.uncertain());
   }
   bank.Step(sample);

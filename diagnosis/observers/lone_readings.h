@@ -45,7 +45,7 @@ class LoneReadings {
   /// @returns the sample as it is to be judged; valid until the next call.
   const Sample& Step(ObserverBank& bank, const Sample& sample);
 
-  /// Whether a reading of the last sample is held out.
+  /// True if a reading of the last sample is held out.
   bool holds() const { return held_ != 0; }
   /// By channel, the residual of the reading that is held out; else NaN.
   std::span<const double> residuals() const { return residuals_; }

@@ -36,7 +36,7 @@ std::unique_ptr<ReadingSource> OpenSource(const InOptions& options,
   return std::make_unique<LineSource>(options.lines);
 }
 
-// What a client has to subscribe to.
+// The tags that a client has to subscribe to.
 report::Report ListTags(const std::string& plant) {
   std::set<std::string> tags;
   for (const importer::LiveValve& valve : ReadLiveTable(plant, false).valves) {

@@ -33,7 +33,8 @@ struct OutOptions {
   std::string http;
 };
 
-// What the broker has kept of us from before: valves that may be gone.
+// States that the broker has kept from an earlier run: these valves may be
+// gone.
 class Former {
  public:
   explicit Former(const std::string& prefix) : prefix_(prefix) {}

@@ -111,8 +111,8 @@ class TableOutput {
   Clock::time_point shown_{Clock::now()};
 };
 
-// Whether the table is drawn again in its place. What is limited is for a file,
-// even if it is shown on a terminal.
+// True if the table is redrawn in place. Limited output is for a file, even if
+// it is shown on a terminal.
 bool IsInPlace(const WatchOptions& options, bool json) {
   return options.table && !json && options.for_s == 0.0 &&
          options.expect == 0 && isatty(STDOUT_FILENO) != 0;

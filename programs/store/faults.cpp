@@ -39,7 +39,8 @@ std::string EffectText(int fault, double strength) {
   return text;
 }
 
-// What a fault does to a simulated valve; null for what only the floor finds.
+// Adds the effect of each fault on a simulated valve; null for findings of the
+// floor.
 void AddEffects(Json& faults) {
   for (Json& row : faults) {
     row.update(

@@ -54,8 +54,8 @@ void AddMaintenanceVerbs(report::Program& program);
 void AddPlannerVerbs(report::Program& program);  ///< health, worklist
 void AddShipVerb(report::Program& program);
 
-/// What is shelved or planned to be; with filter.since_ns also what was shelved
-/// since then.
+/// Lists present and planned shelves; with filter.since_ns also those that have
+/// ended since then.
 Report ListShelf(History& history, const EpisodeFilter& filter,
                  const Context& context);
 
@@ -80,7 +80,7 @@ struct EpisodeOptions {
   report::TimeWindow window;
 
   void AddTo(CLI::App& verb);
-  /// Whether one of them narrows the list.
+  /// True if one of them narrows the list.
   bool given() const {
     return !valve.empty() || !fault.empty() || state != "any" ||
            !window.since.empty() || !window.until.empty();
@@ -106,7 +106,7 @@ struct HistoryOptions {
   bool shelved{false};   ///< The shelf instead.
 };
 
-/// What `prune --db` deletes from the plant's history.
+/// The limits of `prune --db`, which deletes from the plant's history.
 struct PlantPrune {
   std::string url;
   std::string history_age;

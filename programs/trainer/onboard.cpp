@@ -460,7 +460,7 @@ report::Report OnboardValve(const OnboardOptions& options,
   return report;
 }
 
-// What could be seen of a valve of the type with these signals.
+// Reports which faults of a valve of the type these signals could show.
 report::Report Assess(const OnboardOptions& options,
                       const report::Context& context) {
   if (options.signals.empty() || !options.runs.empty() ||

@@ -94,7 +94,7 @@ bool IsImmutable(const std::filesystem::path& path, Access access) {
          !std::filesystem::exists(WalPath(path), error) && !error;
 }
 
-// Whether SQLite finds the room for its shared memory.
+// True if SQLite finds the room for its shared memory.
 bool HasRoomToRead(SQLite::Database& connection) {
   try {
     connection.execAndGet("PRAGMA user_version");

@@ -17,7 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Of the open file description, because a lock of the process would be lost
+// Locks the open file description, because a lock of the process would be lost
 // when any descriptor of the file is closed. SQLite locks the -shm instead.
 bool LockLog(int file, int command, short type) {
   struct flock lock {};
@@ -27,7 +27,7 @@ bool LockLog(int file, int command, short type) {
   return fcntl(file, command, &lock) == 0 && lock.l_type != F_UNLCK;
 }
 
-// Whether another descriptor than `file` holds the lock.
+// True if another descriptor than `file` holds the lock.
 bool IsHeldByOthers(int file) {
   return LockLog(file, F_OFD_GETLK, F_WRLCK);
 }

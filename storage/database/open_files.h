@@ -23,7 +23,7 @@ namespace fdi::storage {
 class OpenFiles {
  public:
   OpenFiles() = default;
-  /// Of a database that was just opened.
+  /// @param database one that was just opened.
   /// @throws SqliteError (IsBusy) if others work with another log.
   explicit OpenFiles(std::filesystem::path database);
   ~OpenFiles();
@@ -39,12 +39,12 @@ class OpenFiles {
   /// the name of a log keeps `NAME-wal.replaced`.
   void PutBack() const;
 
-  /// Whether all are still the files of these names.
+  /// True if all are still the files of these names.
   bool InPlace() const { return HasDatabase() && HasLog() && HasGate(); }
   bool HasDatabase() const { return database_ && IdOf("") == database_; }
   /// The -wal and the -shm.
   bool HasLog() const { return Has("-wal", wal_) && Has("-shm", shm_); }
-  /// Whether our WAL lies beside another database, or none.
+  /// True if our WAL lies beside another database, or none.
   bool LeftWal() const { return wal_ && Has("-wal", wal_) && !HasDatabase(); }
 
  private:

@@ -1,4 +1,4 @@
-// What payloads of a broker say, and which URLs name one.
+// Payloads and URLs of a broker.
 #include "gateway/mqtt_source.h"
 
 #include <gmock/gmock.h>

@@ -1,4 +1,4 @@
-// What goes out by MQTT of a valve: never NORMAL where nobody judges it.
+// The outgoing states of a valve: never NORMAL while nobody judges it.
 #include "gateway/valve_states.h"
 
 #include <fstream>

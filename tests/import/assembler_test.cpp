@@ -201,7 +201,7 @@ TEST_F(AssemblerTest, ALostConnectionVoidsWhatItSaid) {
   Advance(8.0);
   EXPECT_EQ(With("V1", Signal::kX).back(), 5.0);
   EXPECT_THAT(With("V1", Signal::kX, false), ElementsAre(6.0));
-  // Of the new connection only what it has said counts.
+  // Only readings of the new connection count.
   for (int s = 10; s <= 12; ++s) {
     Say(s, "V1.OP", 40.0);
     Advance(s);

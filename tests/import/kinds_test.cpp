@@ -1255,7 +1255,7 @@ TEST(KindsTest, TheReferenceFilesGiveWhatTheirTableSays) {
   }
 }
 
-// What sniff writes, the importer takes: of every file, or it says why not.
+// The importer takes the map that sniff writes for a file, or says why not.
 TEST(KindsTest, EveryReferenceFileIsReadWithItsMapOrRefusedForAReason) {
   const char* folder = std::getenv("FDI_REFERENCE_DATA");
   if (folder == nullptr) {

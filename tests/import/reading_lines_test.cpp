@@ -1,4 +1,4 @@
-// What lines of readings say.
+// Lines of readings.
 #include "import/reading_lines.h"
 
 #include <gmock/gmock.h>

@@ -287,7 +287,7 @@ TEST_F(ModelsTest, ChangeCounterTellsOfActivationsAndAssignmentsOnly) {
   EXPECT_TRUE(counter.Changed());
 }
 
-// What was stored is in the log as long as the service looks for changes.
+// A stored set is in the log as long as the service looks for changes.
 TEST_F(ModelsTest, WhatWasStoredStaysIfItsLogIsDeleted) {
   const auto file = file_.parent_path() / "other.db";
   { ModelStore(file, Access::kOccasionalWriter); }

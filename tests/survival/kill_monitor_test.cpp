@@ -89,7 +89,7 @@ class KilledMonitor : public testing::Test {
         {[this](const FaultEvent& m, const idl::Reception&) { Keep(m); }, {}},
         milliseconds(0));
   }
-  // What is sent again is what was sent.
+  // An event that is sent again equals the first one.
   void Keep(const FaultEvent& event) {
     const Step step{event.episode_id,
                     std::string(TransitionName(event.transition.kind)),

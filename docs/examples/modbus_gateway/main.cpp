@@ -103,7 +103,8 @@ void Print(Tag& tag, double value, double stamp_s) {
   ++(usable ? readings : bad);
 }
 
-// What the PLC does not tell is not held. A stamp behind the last reading.
+// Nothing is held while the PLC is silent. The stamp is just after the last
+// reading.
 void PrintBad(const Block& block) {
   for (Tag* tag : block.tags)
     if (tag->name != kClock)

@@ -1,4 +1,4 @@
-// What `onboard` refuses; what it does is tested at length with the system.
+// Refusals of `onboard`; its results are tested with the system.
 #include "tests/programs/trainer/fixture.h"
 
 namespace fdi::trainer {
