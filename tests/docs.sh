@@ -3,7 +3,8 @@
 # and every event that warns stands in docs/troubleshooting.md, and no id there
 # is one that nothing logs. Links between documents lead somewhere, each page is
 # in one part of docs/README.md, README.md and docs/results.md keep their
-# lengths, and docs/faults.md is up to date.
+# lengths, docs/method.md has a row for every rule of the decision, and
+# docs/faults.md is up to date.
 set -u
 cd "$(dirname "$0")/.."
 failed=0
@@ -74,6 +75,16 @@ words=$(wc -w <README.md)
 lines=$(wc -l <docs/results.md)
 [ "$lines" -le 120 ] || complain "docs/results.md has $lines lines, at most 120"
 tests/faults_page.sh --check || failed=1
+
+# docs/method.md explains every rule that can be left out, in the order in which
+# they act.
+rules=$(perl -0ne 'print "$1\n" while /\{Rule::k\w+, Stage::k\w+,\s*"(\w+)"/g' \
+  diagnosis/decision/rules.h)
+[ "$(wc -l <<<"$rules")" -gt 15 ] || complain "found few rules in rules.h"
+explained=$(sed -n '/^### The rules/,/^## /s/^| `\([a-z_]*\)` |.*/\1/p' \
+  docs/method.md)
+diff <(echo "$rules") <(echo "$explained") ||
+  complain "docs/method.md has other rules (>) than rules.h (<), or another order"
 
 # Pages below a folder that the table names belong to its part.
 part=
