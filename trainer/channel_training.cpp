@@ -417,7 +417,7 @@ TsModel FitFaultChannel(const ChannelPlan& plan, const TsModel& normal_model,
   TsModel own =
       FitRows(plan, regressors, fault_rows, condition, options, past_output);
   const double own_error = error(own);
-  // The simplest explanation first (docs/method.md, 3): the normal model, then
+  // The simplest explanation first (docs/method.md): the normal model, then
   // one of both data, then one of the fault's own.
   if (error(normal_model) <= kReuseTolerance * own_error) {
     return normal_model;

@@ -324,7 +324,7 @@ std::vector<InterpolationSums> CompareWithNeighbours(
 //
 // σ the deviation of its residual: an error well inside the noise does no harm.
 // The monitor takes κ times the move as the deviation of an interpolated
-// prediction (docs/method.md, 4).
+// prediction (docs/method.md).
 void SetInterpolationErrors(const std::vector<InterpolationSums>& sums,
                             Observer& observer) {
   for (std::size_t c = 0; c < sums.size(); ++c) {

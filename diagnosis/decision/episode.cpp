@@ -544,7 +544,7 @@ FaultSet Episode::FactorsFrom(double threshold, const Verdict& verdict) const {
   return from & ~floor_names_;
 }
 
-// Among faults that training could not separate (docs/method.md, 10), noise may
+// Among faults that training could not separate (docs/method.md), noise may
 // favour one throughout the window. The others of its group join it unless they
 // are refuted, that is, below T/2.
 FaultSet Episode::WithGroups(FaultSet set, const Verdict& verdict) const {

@@ -9,7 +9,7 @@ namespace fdi {
 namespace {
 
 // The model of a fault is off by as much of its effect: the deviation of the
-// second look (docs/method.md, 19).
+// second look (docs/method.md).
 constexpr double kEffectError = 0.05;
 // Below this share of the largest that is predicted there is no ratio.
 constexpr double kMinShare = 0.02;

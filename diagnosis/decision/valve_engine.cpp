@@ -338,7 +338,7 @@ Quality ValveEngine::Impl::Judge(const Sample& sample) {
     return Quality::kBadInput;
   }
   // A fault moves the command, so whether the valve is abnormal has to be known
-  // before its command may disarm it (docs/method.md, 8): the floor has taken
+  // before its command may disarm it (docs/method.md): the floor has taken
   // this sample, and pending() is that of the last judged one.
   const Quality quality = diagnosis_->coverage.Judge(
       sample, diagnosis_->bank, episode_open(),

@@ -212,7 +212,7 @@ double Evaluate(const TsModel& model, const double* x) {
 }
 
 // Exact comparison suffices: a model that is adapted from the normal one keeps
-// its antecedents to the bit (docs/method.md, 3).
+// its antecedents to the bit (docs/method.md).
 bool SharesAntecedents(const TsModel& a, const TsModel& b) {
   return a.regressors == b.regressors && a.parallel == b.parallel &&
          a.output == b.output && a.regressor_min == b.regressor_min &&

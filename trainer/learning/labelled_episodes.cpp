@@ -148,7 +148,7 @@ double EstimateStrength(const std::shared_ptr<const ModelSet>& models,
   const double strength = LaterMedian(strengths);
   const double factor = LaterMedian(factors);
   // T/2 is also where the engine stops counting a fault as a possible
-  // explanation (docs/method.md, 16).
+  // explanation (docs/method.md).
   const double least = 0.5 * models->decision.isolation_threshold;
   if (factor < least || strength == 0.0) {
     throw Refusal(set + " gives " + FaultName(fault) + " a factor of " +

@@ -111,7 +111,7 @@ double LimitUse::ShareOf(std::size_t c, const WindowLimits* limits,
     case LimitKind::kUpperMean:
       return window.mean() / limits->upper_mean;
     default:
-      // The limit depends on the motion of CV (docs/method.md, 14), so the
+      // The limit depends on the motion of CV (docs/method.md), so the
       // share is that of the limit at this motion.
       return std::exp(window.log_rms() - UpperLogRms(*limits, command));
   }
