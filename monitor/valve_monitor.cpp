@@ -10,10 +10,11 @@ namespace {
 
 constexpr double kStalePeriods = 3.0;
 // A superseded source that has sent so many samples is not one that was just
-// restarted, and is there until it was silent as long as costs an unknown valve
-// its place (PipelineOptions::place_timeout).
+// restarted. Either source is there until it was silent as long as costs an
+// unknown valve its place (PipelineOptions::place_timeout), or until the valve
+// is stale, whichever is later.
 constexpr int kRivalSamples = 4;
-constexpr std::chrono::seconds kRivalPatience{60};
+constexpr std::chrono::seconds kSourcePatience{60};
 constexpr double kTokensPerSample = 0.5;
 constexpr double kTokensPerSecond = 5.0;
 // Bounds of the period of a valve without a model set, measured from its
@@ -97,6 +98,14 @@ void ValveMonitor::RecordPosition(const Sample& sample) {
 
 ValveOutcome ValveMonitor::Step(const Sample& sample, std::uint64_t writer,
                                 TimePoint received, EpisodeOutlet& outlet) {
+  // A superseded source may return once its successor has gone. Otherwise
+  // nothing would judge the valve, though its samples come.
+  if (seen_ && (ended_ || received - received_ > SourcePatience())) {
+    order_.ForgetSuperseded();
+    if (decision_) {
+      decision_->ForgetSuperseded();
+    }
+  }
   seen_ = true;
   const bool swapped = std::exchange(swapped_, false);
   if (!decision_) {
@@ -140,11 +149,14 @@ ValveOutcome ValveMonitor::Step(const Sample& sample, std::uint64_t writer,
 void ValveMonitor::Hear(Intake intake, std::uint64_t writer,
                         TimePoint received) {
   if (intake == Intake::kSuperseded) {
-    rival_samples_ = received - rival_at_ > kRivalPatience
+    rival_samples_ = received - rival_at_ > SourcePatience()
                          ? 1
                          : std::min(rival_samples_ + 1, kRivalSamples);
     rival_at_ = received;
     return;
+  }
+  if (writer != writer_) {
+    rival_samples_ = 0;  // Whoever it was may be the one that is heard now.
   }
   writer_ = writer;
   received_ = received;
@@ -154,7 +166,14 @@ void ValveMonitor::Hear(Intake intake, std::uint64_t writer,
 }
 
 bool ValveMonitor::Contested(TimePoint now) const {
-  return rival_samples_ >= kRivalSamples && now - rival_at_ <= kRivalPatience;
+  return rival_samples_ >= kRivalSamples && now - rival_at_ <= SourcePatience();
+}
+
+ValveMonitor::TimePoint::duration ValveMonitor::SourcePatience() const {
+  return std::max<TimePoint::duration>(
+      kSourcePatience,
+      std::chrono::duration_cast<TimePoint::duration>(
+          std::chrono::duration<double>(kStalePeriods * period_s())));
 }
 
 ValveOutcome ValveMonitor::StepLoop(const Sample& sample, bool superseded,

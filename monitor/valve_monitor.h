@@ -134,6 +134,7 @@ class ValveMonitor {
                  EpisodeOutlet& outlet);
   void TellOfLoop(const Sample& sample, EpisodeOutlet& outlet);
   void Hear(Intake intake, std::uint64_t writer, TimePoint received);
+  TimePoint::duration SourcePatience() const;
   bool RestartsEngine(const Sample& sample) const;
   void RecordPosition(const Sample& sample);
   void MeasurePeriod(std::int64_t stamp_ns);

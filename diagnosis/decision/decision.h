@@ -62,6 +62,9 @@ class Decision {
   std::optional<Transition> Adopt(
       EngineParts parts, std::shared_ptr<const LookSimulation> simulation);
 
+  /// See SourceOrder::ForgetSuperseded().
+  void ForgetSuperseded() { engine_.ForgetSuperseded(); }
+
   /// Forgets names and looks, as a restart of the program does; what
   /// ValveEngine::Save() keeps over one stays.
   void ForgetNames();

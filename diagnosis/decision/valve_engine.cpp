@@ -151,6 +151,7 @@ class ValveEngine::Impl {
   std::optional<Transition> EndEpisode(EndReason reason);
   std::optional<Transition> Adopt(EngineParts parts);
   void HoldIsolation(bool hold);
+  void ForgetSuperseded() { order_.ForgetSuperseded(); }
   void Suspect(bool suspected) { suspected_ = suspected; }
   void TakeName(const NameBeside& name) { beside_ = name; }
   std::vector<std::byte> Save() const;
@@ -537,6 +538,10 @@ std::optional<Transition> ValveEngine::Adopt(EngineParts parts) {
 
 void ValveEngine::HoldIsolation(bool hold) {
   impl_->HoldIsolation(hold);
+}
+
+void ValveEngine::ForgetSuperseded() {
+  impl_->ForgetSuperseded();
 }
 
 void ValveEngine::TakeName(const NameBeside& name) {

@@ -52,6 +52,9 @@ class ValveEngine {
   /// baseline is not trusted. Stays over Adopt().
   void HoldIsolation(bool hold);
 
+  /// See SourceOrder::ForgetSuperseded().
+  void ForgetSuperseded();
+
   /// What is known of the valve outside of the engine is abnormal, or is not
   /// any more: while it is, a valve that is judged has an episode, which does
   /// not clear. Ends with EndEpisode() and Adopt().

@@ -27,6 +27,10 @@ class SourceOrder {
 
   void SetPeriod(double sample_period_s);
 
+  /// Whichever source sends next is the newest one: a superseded one may return
+  /// once its successor has gone.
+  void ForgetSuperseded() { superseded_count_ = 0; }
+
  private:
   bool Superseded(std::uint64_t source_id) const;
 

@@ -241,13 +241,26 @@ TEST_F(PipelineTest, AValveThatTwoPublishersSendIsContested) {
   EXPECT_EQ(pipeline_->census().contested_valve, "V1");
   EXPECT_THAT(lines_, testing::Contains(testing::HasSubstr(
                           "two_publishers id=M118 valves=2 first=V1")));
-  // The publisher that counts is silent, the other one does not replace it.
+  // The publisher that counts is silent, the other one does not replace it at
+  // once, but after a minute: nothing else would be judged.
   for (std::uint64_t k = 20; k < 30; ++k) {
     pipeline_->OnSample("V1", PlantSample(k, kF7Offset), 1, at(k));
   }
   pipeline_->Poll(at(30));
   EXPECT_GE(pipeline_->census().stale, 1U);
   EXPECT_EQ(pipeline_->census().contested, 2U);
+  for (std::uint64_t k = 30; k < 100; ++k) {
+    pipeline_->OnSample("V1", PlantSample(k, kF7Offset), 1, at(k));
+  }
+  EXPECT_EQ(bus_.decisions.back().valve_id, "V1");
+  EXPECT_EQ(bus_.decisions.back().seq, 99U);
+  // Or at once where the stream has ended.
+  pipeline_->OnStreamEnded("bare", 2);
+  pipeline_->OnSample("bare", PlantSample(100, kF7Offset), 1, at(100));
+  EXPECT_EQ(bus_.decisions.back().valve_id, "bare");
+  EXPECT_EQ(bus_.decisions.back().seq, 100U);
+  pipeline_->Poll(at(100));
+  EXPECT_EQ(pipeline_->census().contested, 0U);
   pipeline_->Poll(at(120));
   EXPECT_EQ(pipeline_->census().contested, 0U);
   Stop();

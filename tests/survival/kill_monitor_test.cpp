@@ -290,7 +290,8 @@ TEST_F(KilledMonitor, LosesNoPersistedEventAndDiagnosesAgain) {
     const auto monitor =
         Start(round % 2 == 0 ? "--record" : "--record=lossless");
     const auto answered = AwaitAnswers(static_cast<std::size_t>(valves));
-    ASSERT_TRUE(answered.has_value()) << monitor->errors();
+    ASSERT_TRUE(answered.has_value())
+        << answers_.size() << " of " << valves << "; " << monitor->errors();
     starts.push_back(*answered);
     TakeFor(moments.Within(milliseconds(0), milliseconds(3500)));
     monitor->Signal(SIGKILL);
