@@ -2,10 +2,13 @@
 # Measures each rule of diagnosis/decision/rules.h: scores every set of runs
 # below with each rule left out, and writes docs/results/ablation.md. Results in
 # DIR are kept, so that a stopped run continues; remove a DIR of another version.
-# Scores the observers only, without looks; needs FDI_REFERENCE_DATA. One process at a time, some three hours of
-# CPU for all, half of which are the ramps.
+# Needs FDI_REFERENCE_DATA. One process at a time, some three hours of CPU for
+# all, half of which are the ramps. The observers only, but for the columns that
+# end with -looks.
 #
-#     bench/ablation.sh build/release/bin DIR [COLUMN...]
+#     [RULES="drift memory"] bench/ablation.sh build/release/bin DIR [COLUMN...]
+#
+# RULES: these only, beside the program as it is.
 set -euo pipefail
 bin=$(realpath "$1")
 mkdir -p "$2"
@@ -15,12 +18,14 @@ cd "$(dirname "$0")/.."
 data=$FDI_REFERENCE_DATA
 export FDI_DATA=$dir/data
 mkdir -p "$dir/runs"
+rules=()
+for rule in ${RULES:+none $RULES}; do rules+=(--rule "$rule"); done
 
 quietly() { "$@" >"$dir/out" 2>"$dir/log" || { cat "$dir/log" >&2; exit 1; }; }
 
 simulate() {  # NAME SEED SECONDS OPTION...
   [ -f "$dir/runs/$1.csv" ] || quietly "$bin/fdi-simulator" run --no-publish \
-    --speed max --seed "$2" --duration "$3" --export "$dir/runs/$1.csv" "${@:4}"
+    --speed max --seed "$2" --duration "$3" -o "$dir/runs/$1.csv" "${@:4}"
 }
 
 once() {  # NAME COMMAND...
@@ -29,17 +34,18 @@ once() {  # NAME COMMAND...
 
 is_wanted() { [ "$wanted" = "  " ] || [[ $wanted == *" $1 "* ]]; }
 
-ablate() {  # COLUMN SET FILE...
-  local files=()
+ablate() {  # COLUMN "SET [OPTION...]" FILE...
+  local set files=()
+  read -ra set <<<"$2"
   for file in "${@:3}"; do files+=(--file "$file"); done
   quietly "$bin/fdi-study" ablate --parts "$dir/parts" --column "$1" \
-    --model-set "$2" "${files[@]}"
+    --model-set "${set[@]}" "${files[@]}" "${rules[@]}"
   cat "$dir/out"
 }
 
-ablate_campaign() {  # COLUMN CAMPAIGN SEED_OFFSET
+ablate_campaign() {  # COLUMN CAMPAIGN SEED_OFFSET [SET]
   quietly "$bin/fdi-study" ablate --parts "$dir/parts" --column "$1" \
-    --model-set benchmark --campaign "$2" --seed-offset "$3"
+    --model-set "${4:-benchmark}" --campaign "$2" --seed-offset "$3" "${rules[@]}"
   cat "$dir/out"
 }
 
@@ -137,6 +143,26 @@ for n in 1 2; do
     done
     ablate untrained-own-$n five "${files[@]}"
   fi
+  if is_wanted untrained-benchmark-$n; then
+    benchmark_set
+    once seven "$bin/fdi-study" reduce benchmark --as seven --without \
+      f2,f5,f9,f10,f11,f12,f13,f15,f16,f17
+    files=()
+    for fault in f2 f5 f9 f10 f11 f12 f12- f13 f13- f15 f16 f17; do
+      for strength in .3 .6; do
+        case $fault in *-) s=-$strength ;; *) s=$strength ;; esac
+        name=open-$n-${fault%-}=$s
+        simulate "$name" ${n}5400 2100 "${open_loop[@]}" \
+          --fault "${fault%-}:abrupt@900:strength=$s"
+        files+=("$dir/runs/$name.csv")
+      done
+    done
+    ablate untrained-benchmark-$n seven "${files[@]}"
+  fi
+  if is_wanted paper-$n; then
+    once paper "$bin/fdi-trainer" train --campaign campaigns/paper.toml
+    ablate_campaign paper-$n campaigns/paper.toml ${n}1000 paper
+  fi
 done
 
 # A second fault 600 s after the first (bench/second_fault.sh).
@@ -197,6 +223,103 @@ for n in 1 2; do
   done
   ablate slow-$n benchmark "${files[@]}"
 done
+
+# Faults that grow over three days: an episode that is long, for `lasting`.
+for n in 1 2; do
+  is_wanted days-long-$n || continue
+  benchmark_set
+  seed=${n}6100
+  files=()
+  for fault in f2 f3 f6 f19; do
+    seed=$((seed + 1))
+    name=long-$n-$fault
+    simulate "$name" $seed 260100 "${open_loop[@]}" \
+      --fault "$fault:incipient@900+259200:strength=1"
+    files+=("$dir/runs/$name.csv")
+  done
+  ablate days-long-$n benchmark "${files[@]}"
+done
+
+# Flow that is lost with the pressure, in four seconds, while the command is
+# what it was; and a trim that fills until next to nothing passes.
+if is_wanted lost-flow; then
+  own_set
+  files=()
+  for share in .01 .03 .1; do
+    awk -F, -v OFS=, -v share=$share '
+      NR > 1 && $1 > 1200 { away = $1 > 1204 ? 1 : ($1 - 1200) / 4
+        $3 = $4 + (1 - away * (1 - share)) * ($3 - $4) }
+      { print $1, $2, $3, $4, $5, $6, $7 }' <(head -n 2402 \
+      "$dir/runs/own-healthy.csv") >"$dir/pump-$share.in"
+    simulate "pump-$share" 31000 2400 --excitation "csv:$dir/pump-$share.in"
+    files+=("$dir/runs/pump-$share.csv")
+  done
+  for n in 1 2; do
+    simulate grown-$n $((31100 + n)) 9000 "${level_loop[@]}" \
+      --fault f2:incipient@900+5400:strength=1
+    files+=("$dir/runs/grown-$n.csv")
+  done
+  ablate lost-flow own "${files[@]}"
+  once three "$bin/fdi-trainer" onboard --valve three --no-coverage \
+    --signals CV,X,F --file "$dir/runs/own-healthy.csv"
+  ablate lost-flow-of-three three "${files[@]}"
+fi
+
+# What a look answers: the given loop; weak faults, which the observers name now
+# and then; and a valve with 500 N of friction that is known without its
+# pressures.
+if is_wanted loop-looks; then
+  given_set
+  ablate loop-looks "LV1 --second-look" "$data"/closed-loop/loop_*.csv
+fi
+for n in 1 2; do
+  is_wanted weak-looks-$n || continue
+  own_set
+  seed=${n}8400
+  files=()
+  for fault in f1 f2 f3 f4 f6 f10 f12 f13 f18 f19; do
+    seed=$((seed + 1))
+    name=weak-$n-$fault
+    simulate "$name" $seed 3600 "${level_loop[@]}" \
+      --fault "$fault:abrupt@1200:strength=.12"
+    files+=("$dir/runs/$name.csv")
+  done
+  ablate weak-looks-$n "own --second-look" "${files[@]}"
+done
+for n in 1 2; do
+  is_wanted friction-looks-$n || continue
+  friction=("${level_loop[@]}" --set parameters.actuator.coulomb_friction_n=500)
+  simulate friction-healthy 5301 7200 "${friction[@]}"
+  once friction "$bin/fdi-trainer" onboard --valve friction --no-coverage \
+    --signals CV,X,F --file "$dir/runs/friction-healthy.csv"
+  files=()
+  for fault in f1=.6 f4=.6 f12=.65 f15=.35 f16=.6 f18=.35; do
+    simulate "friction-$n-$fault" ${n}2000 2400 "${friction[@]}" \
+      --fault "${fault%=*}:abrupt@1200:strength=${fault#*=}"
+    files+=("$dir/runs/friction-$n-$fault.csv")
+  done
+  ablate friction-looks-$n "friction --second-look" "${files[@]}"
+done
+
+# What others recorded: real events of actuator 3; single bad readings, a start
+# and faults of the collection cases-4.
+if is_wanted real; then
+  once A3 "$bin/fdi-trainer" onboard --valve A3 --no-coverage \
+    --file "$data/plant/lublin_actuator3_2001-10-11_first40min.csv"
+  ablate real A3 "$data"/real-faults/*.csv
+fi
+if is_wanted spikes; then
+  given_set
+  ablate spikes LV1 "$data/cases-4/p15_flow_spikes.csv.gz"
+fi
+if is_wanted starts; then
+  once REF "$bin/fdi-trainer" onboard --valve REF --no-coverage \
+    --map "$data/cases-4/p_map_1s.toml" \
+    --file "$data/cases-4/p01_same_at_1s.csv.gz"
+  ablate starts "REF --map $data/cases-4/p_map_1s.toml" \
+    "$data"/cases-4/{p01_same_at_1s_leak.csv,p01_same_at_1s_flowmeter.csv} \
+    "$data"/cases-4/{p17_start_after_shutdown.csv.gz,p24_position_transmitter_6pct.csv}
+fi
 
 mkdir -p docs/results
 quietly "$bin/fdi-study" ablate --parts "$dir/parts" \

@@ -38,17 +38,18 @@ constexpr const char* kNone = "none";
 constexpr const char* kIntroduction =
     R"(# What each rule of the decision buys
 Every set of runs is scored with each rule of `diagnosis/decision/rules.h` left
-out, by the observers alone, without looks:
+out, by the observers alone but for the columns that end with -looks:
 
     FDI_REFERENCE_DATA=... bench/ablation.sh build/release/bin DIR
 
-`=`: every run has the same answers as with all rules. Else: runs that are
-detected / whose answer holds the fault / is the fault / is one wrong name /
-is unknown; `w` single wrong names on the way, `s` the median times to the first
-name that holds the fault and to the one that is the fault, then the share of
-the time in which a name held it; `+` runs in which something came on top; `e`
-episodes in runs without fault and `n` those that end with a name. The sets are
-those of the script, the number behind a name is that of its seeds.
+`=`: every run has the same answers as with all rules; empty: not scored. Else:
+runs that are detected / whose answer holds the fault / is the fault / is one
+wrong name / is unknown; `w` single wrong names on the way, `s` the median times
+to the first name that holds the fault and to the one that is the fault, then
+the share of the time in which a name held it; `sure` answers that hold the
+fault / that do not; `+` runs in which something came on top; `e` episodes in
+runs without fault and `n` those that end with a name. The sets are those of the
+script, the number behind a name is that of its seeds.
 `fdi-study ablate --list` has the rules with their constants and tests.
 
 )";
@@ -200,6 +201,8 @@ std::string FiguresOf(const Part& part) {
   int unknown = 0;
   int way = 0;
   int second = 0;
+  int sure = 0;
+  int sure_wrong = 0;
   int alarms = 0;
   int false_names = 0;
   double share = 0.0;
@@ -231,6 +234,9 @@ std::string FiguresOf(const Part& part) {
     held += holds ? 1 : 0;
     exact += run[kSet] == run[kFault] ? 1 : 0;
     unknown += run[kSet].empty() ? 1 : 0;
+    if (run[kCertainty] == CertaintyName(Certainty::kSure)) {
+      ++(holds ? sure : sure_wrong);
+    }
     wrong +=
         !run[kSet].empty() && !holds && run[kSet].find('|') == std::string::npos
             ? 1
@@ -247,6 +253,7 @@ std::string FiguresOf(const Part& part) {
     add(std::to_string(way) + "w");
     add(TextOf(named) + "-" + TextOf(alone) + "s");
     add(report::FormatNumber(share / faulty, 3));
+    add("sure " + std::to_string(sure) + "/" + std::to_string(sure_wrong));
     if (second > 0) {
       add(std::to_string(second) + "+");
     }
@@ -290,7 +297,7 @@ report::Report MakeTable(const AblateOptions& options) {
       const fs::path path = options.parts / column / (name + ".csv");
       const Part part = fs::exists(path) ? ReadPart(path) : Part{};
       text += " " +
-              (part.empty()           ? "not run"
+              (part.empty()           ? ""
                : part == base[column] ? "="
                                       : FiguresOf(part)) +
               " |";
