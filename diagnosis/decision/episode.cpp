@@ -197,8 +197,7 @@ struct EpisodeRule {
 // The rules of an episode, in the order of kRules.
 constexpr auto kEpisodeRules = [] {
   constexpr auto kIs = [](const RuleRow& row) {
-    return row.stage >= Stage::kFindings && row.stage <= Stage::kEnd &&
-           row.rule != Rule::kDrift;
+    return row.stage >= Stage::kName && row.stage <= Stage::kEnd;
   };
   std::array<EpisodeRule, std::ranges::count_if(kRules, kIs)> rules{};
   std::size_t next = 0;
@@ -306,16 +305,11 @@ void Episode::Apply(Rule rule, Proposal& p) {
   Verdict& verdict = p.verdict;
   FaultSet& supported = p.supported;
   switch (rule) {
-    case Rule::kForgetFindings:
-      ForgetFindings(p.findings.floor, verdict);
-      break;
     case Rule::kSupport:
       isolation_.Push(
           FactorsFrom(models_->decision.isolation_threshold, verdict));
       supported = isolation_.Supported();
-      break;
-    case Rule::kRecognise:
-      Recognise();
+      CountSupport(supported);
       break;
     case Rule::kMisfits:
       // A stuck transmitter is certain, whatever its observers say.
@@ -327,22 +321,20 @@ void Episode::Apply(Rule rule, Proposal& p) {
     case Rule::kWithdraw:
       Withdraw(verdict);
       break;
-    case Rule::kCountShares:
-      CountSupport(supported);
-      break;
     case Rule::kMisfitIsNoName:
       supported = IsAllOf(supported, misfits_) ? 0 : supported;
       break;
-    case Rule::kRecognisedAlone:
-      // A recognised fault fits over t_k samples, even if single ones are rare.
-      supported = supported == 0 ? recognised_ : supported;
+    case Rule::kRecognise:
+      Recognise();
+      // It fits over t_k samples, even if those with its factor are rare.
+      supported = supported == 0 ? recognised_ : Recognised(supported);
       break;
     case Rule::kHeld:
       if (isolation_held_) {
         Block(p);
       }
       break;
-    case Rule::kDriftBlocks:
+    case Rule::kDrift:
       if (p.findings.drift) {
         Block(p);
       }
@@ -373,9 +365,6 @@ void Episode::ApplyToName(Rule rule, Proposal& p) {
     case Rule::kGroups:
       supported = WithGroups(supported, verdict);
       break;
-    case Rule::kTaughtStands:
-      supported = Recognised(supported);
-      break;
     case Rule::kFourAtMost:
       // A set this large is no diagnosis: its faults remain candidates. Sets
       // without a floor keep their answers.
@@ -388,9 +377,6 @@ void Episode::ApplyToName(Rule rule, Proposal& p) {
       break;
     case Rule::kLossBeside:
       supported |= LossBeside(supported, floor_, p.sample, verdict);
-      break;
-    case Rule::kEarlyReplaced:
-      ReplaceEarly(p);
       break;
     case Rule::kFirstName:
       NameFirst(p);
@@ -407,7 +393,10 @@ void Episode::ApplyToName(Rule rule, Proposal& p) {
     case Rule::kFloorNames:
       NameFloor(verdict);
       break;
-    case Rule::kDropFindings:
+    case Rule::kForgetFindings:
+      if (p.findings.settled) {
+        ForgetFindings(p.findings.floor, verdict);
+      }
       DropFindings(verdict);
       break;
     case Rule::kCleared:
@@ -546,10 +535,10 @@ FaultSet Episode::FactorsFrom(double threshold, const Verdict& verdict) const {
 
 // Among faults that training could not separate (docs/method.md), noise may
 // favour one throughout the window. The others of its group join it unless they
-// are refuted, that is, below T/2.
+// are refuted, that is, below T/2, or one is recognised, which stands for all.
 FaultSet Episode::WithGroups(FaultSet set, const Verdict& verdict) const {
   if (!Acts(Rule::kGroups)) {
-    return set;
+    return Recognised(set);
   }
   FaultSet joined = set;
   const FaultSet close =
@@ -563,7 +552,7 @@ FaultSet Episode::WithGroups(FaultSet set, const Verdict& verdict) const {
       joined |= members & close;
     }
   }
-  return joined;
+  return Recognised(joined);
 }
 
 // Wald's sequential test: before t_k, the few faults that are left once the
@@ -637,7 +626,7 @@ FaultSet Episode::Recognised(FaultSet set) const {
 // has grown, or meets a command that shows it: it explains the loss.
 bool Episode::ExplainsLoss(FaultSet set, const Verdict& verdict) const {
   const FaultSet known = set & ~floor_names_;
-  return Acts(Rule::kExplainsLoss) && faults_.judges_fit() && known != 0 &&
+  return faults_.judges_fit() && known != 0 &&
          (known & ~verdict.isolated) == 0 &&
          (verdict.isolated & floor_names_) == 0 &&
          stood_ >= 0.5 * models_->decision.evidence_window;
@@ -724,8 +713,7 @@ void Episode::NameEarly(const Sample& sample, FaultSet beginning,
   const bool narrower =
       (proven & ~named) == 0 && std::popcount(proven) == 1 && proven != named;
   const bool early = proven != 0 && ((proven & named) == 0 || narrower);
-  const FaultSet name =
-      early ? Recognised(WithGroups(proven, verdict)) : verdict.isolated;
+  const FaultSet name = early ? WithGroups(proven, verdict) : verdict.isolated;
   const FaultSet loss = LossBeside(name, floor_ | beginning, sample, verdict);
   if ((early && (loss & ~floor_) == 0) || (loss & floor_ & ~name) != 0) {
     early_ = early_ || early;
@@ -801,26 +789,20 @@ bool Episode::LooksNormal(const Verdict& verdict) const {
   return verdict.normal_factor >= models_->decision.isolation_threshold;
 }
 
-void Episode::NameAtOnce(Proposal& proposal) {
+// The first set of equation (6) replaces findings of the floor and a name from
+// before t_k.
+void Episode::NameFirst(Proposal& proposal) {
+  const FaultSet isolated = proposal.verdict.isolated;
+  const bool early =
+      std::exchange(early_, false) && proposal.supported != isolated;
+  if (!early && (isolated & ~floor_names_) != 0) {
+    return;
+  }
   if ((proposal.supported & ~floor_names_) != 0) {
     contender_run_ = 0;
     Name(proposal.supported, proposal.verdict);
   }
   proposal.over = true;
-}
-
-void Episode::ReplaceEarly(Proposal& proposal) {
-  if (std::exchange(early_, false) &&
-      proposal.supported != proposal.verdict.isolated) {
-    NameAtOnce(proposal);
-  }
-}
-
-// The first fault replaces findings of the floor.
-void Episode::NameFirst(Proposal& proposal) {
-  if ((proposal.verdict.isolated & ~floor_names_) == 0) {
-    NameAtOnce(proposal);
-  }
 }
 
 // A different set must persist before it replaces the isolated one. Samples

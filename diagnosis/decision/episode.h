@@ -194,8 +194,6 @@ class Episode {
   void HoldName(Proposal& proposal);
   void Block(Proposal& proposal);
   bool LooksNormal(const Verdict& verdict) const;
-  void NameAtOnce(Proposal& proposal);
-  void ReplaceEarly(Proposal& proposal);
   void NameFirst(Proposal& proposal);
   void Contend(Proposal& proposal);
   void Withdraw(Verdict& verdict);

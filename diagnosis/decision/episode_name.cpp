@@ -258,7 +258,7 @@ bool EpisodeName::InheritedStands(const Inputs& inputs) const {
 // A second fault has to be found anew, and until then both faults together
 // may look like either of them, at another strength, like a third one or none.
 bool EpisodeName::TakesTwoForOne(FaultSet faults) const {
-  if (!Acts(Rule::kTwoForOne) || !inherited_ || !inherited_->second.open) {
+  if (!inherited_ || !inherited_->second.open) {
     return false;
   }
   return faults == 0 || (faults & ~inherited_->faults) != 0;

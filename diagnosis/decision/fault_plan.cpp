@@ -157,11 +157,6 @@ FaultPlan::FaultPlan(std::shared_ptr<const ObserverPlan> observers)
   }
   for (std::size_t c = 0; c < models().channels.size(); ++c) {
     channel_times_.push_back(ChannelTime(models(), c));
-    const TsModel& model = models().observers.front().channels[c].model;
-    takes_position_.push_back(
-        std::ranges::any_of(model.regressors, [&](const Regressor& regressor) {
-          return regressor.signal == Signal::kX && model.output != Signal::kX;
-        }));
   }
   for (const int fault : models().faults) {
     for (const bool negative : {false, true}) {

@@ -75,10 +75,6 @@ class FaultPlan {
   }
   /// The set says how a fault that acts fits (FitBounds).
   bool judges_fit() const { return judges_fit_; }
-  /// The channel predicts the flow from X: where the rod stands is its input.
-  bool takes_position(std::size_t channel) const {
-    return takes_position_[channel];
-  }
   /// λ
   double memory() const { return memory_; }
 
@@ -86,7 +82,6 @@ class FaultPlan {
   std::shared_ptr<const ObserverPlan> observers_;
   std::vector<std::size_t> fault_indices_;
   std::vector<double> channel_times_;
-  std::vector<bool> takes_position_;
   double memory_;
   bool judges_fit_{false};
   std::vector<StrengthPath> paths_;

@@ -352,23 +352,6 @@ void StrengthTracker::JudgeAccount(const ObserverBank& bank,
   }
 }
 
-// The flow at a position is judged by whichever of the two neighbours knows the
-// position: a rod at its stop is where the stronger fault never let it be, and
-// what that one says of it is no part of an effect to interpolate.
-double StrengthTracker::Between(std::size_t channel, const Segment& segment,
-                                const PathPlace& place, double residual) const {
-  if (!Acts(Rule::kBetween) || place.segment == 0 ||
-      !plan_->takes_position(channel)) {
-    return residual;
-  }
-  const double low = residual + segment.slope * place.from_low;
-  const double high =
-      low - segment.slope * (path_->nodes[place.segment + 1].strength -
-                             path_->nodes[place.segment].strength);
-  return std::min({residual, low, high},
-                  [](double a, double b) { return std::abs(a) < std::abs(b); });
-}
-
 void StrengthTracker::PushFit(const ObserverBank& bank,
                               const ObserverEvidence& trained, bool shown) {
   const int t_k = plan_->models().decision.isolation_samples;
@@ -384,15 +367,14 @@ void StrengthTracker::PushFit(const ObserverBank& bank,
   std::array<double, kMaxChannels> u{};
   for (std::size_t c = 0; c < channels_; ++c) {
     if (bank.active(static_cast<int>(c))) {
-      const Segment segment = SegmentOf(bank, c, place.segment);
-      Prediction p = At(bank, c, segment, place);
+      const Prediction p =
+          At(bank, c, SegmentOf(bank, c, place.segment), place);
       const double sd = path_->points[place.nearest * channels_ + c].sd;
       const double normal = bank.residual(0, static_cast<int>(c));
       // An error of interpolation excuses a part of an effect, not one that is
       // not there: nearer to normal operation, there is none.
       const bool apart =
           Acts(Rule::kApart) && std::abs(normal) < std::abs(p.residual);
-      p.residual = apart ? Between(c, segment, place, p.residual) : p.residual;
       const double effect =
           apart || std::isnan(normal) ? 0.0 : normal - p.residual;
       const double onset =

@@ -113,8 +113,6 @@ class StrengthTracker {
                     std::size_t segment) const;
   Prediction At(const ObserverBank& bank, std::size_t channel,
                 const Segment& segment, const PathPlace& place) const;
-  double Between(std::size_t channel, const Segment& segment,
-                 const PathPlace& place, double residual) const;
   double Gain(const ObserverBank& bank, std::size_t channel, double residual,
               double variance) const;
   double Sum(const double* parts) const;
