@@ -227,13 +227,9 @@ std::optional<EpisodeName::Choice> EpisodeName::OfLook(const Inputs& inputs) {
 }
 
 EpisodeName::Choice EpisodeName::OfObservers(const Inputs& inputs) const {
-  const FaultSet faults = inputs.remembered;
+  const FaultSet faults = inputs.engine.isolated;
   if (faults == 0) {
-    // Where the engine has a name, its memory holds too many for one.
-    return {0,
-            inputs.engine.isolated == 0 ? inputs.engine.unknown
-                                        : Unknown::kTooEarly,
-            NameSource::kNone, Layer::kObservers};
+    return {0, inputs.engine.unknown, NameSource::kNone, Layer::kObservers};
   }
   const bool floor = (faults & ~findings_) == 0;
   return {faults, Unknown::kNone,

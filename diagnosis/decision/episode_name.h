@@ -22,7 +22,7 @@ enum class Rule : std::uint8_t;
 enum class NameSource : std::uint8_t {
   kNone,       ///< It has no name.
   kFloor,      ///< Limits alone found it.
-  kObservers,  ///< The observers, or what they named before.
+  kObservers,  ///< The observers.
   kLook,       ///< A simulation of the valve.
   kRestart,    ///< An earlier session; it still stands.
 };
@@ -58,7 +58,7 @@ struct EpisodeNow {
 ///    session has an answer, or for ten minutes; then, like any other, until
 ///    the observers name a fault, for which the floor is not enough; with a
 ///    second fault on top, both until the first one is named by itself;
-/// 3. the observers, with their memory, and the floor until they have a name.
+/// 3. the observers, and the floor until they have a name.
 ///
 /// The engine is an input and never changed: its transitions that name a fault
 /// are replaced by those of the name. A name that gets more severe than it was
@@ -75,7 +75,6 @@ class EpisodeName {
 
   struct Inputs {
     const Verdict& engine;
-    FaultSet remembered{0};  ///< engine.isolated with the observers' memory.
     std::optional<Look> look{};
     bool can_look{false};          ///< Looks are taken at this valve.
     std::optional<Look> on_top{};  ///< At engine.second.

@@ -32,19 +32,17 @@ const Verdict& EpisodeNames::Step(const Sample& sample, const Verdict& engine,
     }
   }
   open_ = engine.detected;
-  EpisodeName::Inputs inputs{
-      engine, engine.isolated, {}, simulation_ != nullptr, {}};
+  EpisodeName::Inputs inputs{engine, {}, simulation_ != nullptr, {}};
   const bool in_order = !OutOfOrder(engine.intake);
   if (looks_) {
     StepLooks(sample, engine);
     if (open_ && !held && in_order) {
       inputs.look = TakeAnswer(engine);
-      inputs.remembered = looks_->Observed(*models_, engine.isolated);
       inputs.on_top =
           SecondThatCounts(engine, *models_, looks_->SecondAnswer());
     }
   }
-  overruled_ = inputs.look || inputs.remembered != engine.isolated;
+  overruled_ = inputs.look.has_value();
   name_.Step(inputs);
   if (!open_) {
     ForgetEpisode();

@@ -55,8 +55,7 @@ class EpisodeNames {
   /// What the open episode is called as of the last Step().
   const EpisodeNow& now() const { return name_.now(); }
 
-  /// A look, or the memory of the observers, spoke in the place of the engine
-  /// at the last Step().
+  /// A look spoke in the place of the engine at the last Step().
   bool overruled() const { return overruled_; }
 
   /// The look whose answer counts since the last Step(), but for the id of its

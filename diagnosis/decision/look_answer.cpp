@@ -7,7 +7,6 @@
 #include <limits>
 #include <utility>
 
-#include "diagnosis/decision/rules.h"
 #include "diagnosis/model/fault_catalogue.h"
 #include "diagnosis/model/taught.h"
 
@@ -41,18 +40,6 @@ bool IsAlike(Alike alike, const SecondLook& look, const Explanation& e,
       break;
   }
   return false;
-}
-
-// True if the best fault would have to exceed its full strength and still
-// leaves more unexplained than a healthy valve does: the window shows something
-// else. A stop and a lack of force are complete at that strength.
-bool IsExhausted(const SecondLook& look) {
-  constexpr double kLargest = 0.99;
-  const Explanation& best = look.ranked.front();
-  return Acts(Rule::kExhausted) && !look.complete &&
-         look.misfit > kGoodMisfit && IsFault(best.fault) &&
-         std::abs(best.strength) > kLargest &&
-         FaultFactsOf(best.fault).onset == Onset::kGradual;
 }
 
 void AddIndistinguishable(const SecondLook& look, double nothing,
@@ -142,11 +129,11 @@ LookAnswer AnswerOf(const SecondLook& look, bool early) {
   const double most = healthy ? kMaxHealthyMisfit : kMaxMisfit;
   // The misfit comes first: where even the best explanation does not follow the
   // record, neither health nor a fault can be concluded from it.
-  answer.outcome =
-      look.misfit > most || IsExhausted(look)  ? LookOutcome::kNoneFits
-      : healthy                                ? LookOutcome::kNothing
-      : answer.faults.size() > kMaxNamedFaults ? LookOutcome::kUnclear
-                                               : LookOutcome::kNamed;
+  answer.outcome = look.misfit > most ? LookOutcome::kNoneFits
+                   : healthy          ? LookOutcome::kNothing
+                   : answer.faults.size() > kMaxNamedFaults
+                       ? LookOutcome::kUnclear
+                       : LookOutcome::kNamed;
   return answer;
 }
 

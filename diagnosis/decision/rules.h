@@ -52,11 +52,9 @@ enum class Rule : std::uint8_t {
   kFloorNames,
   kForgetFindings,
   kCleared,
-  kExhausted,
   kSecondStands,
   kLook,
   kInherited,
-  kMemory,
   kObservers,
 };
 
@@ -70,7 +68,6 @@ enum class Stage : std::uint8_t {
   kJudge,     ///< Once they have settled.
   kFloor,     ///< Before the observers have settled, too.
   kEnd,       ///< Once they have settled.
-  kAnswer,    ///< AnswerOf(): what a look answers.
   kSource,    ///< EpisodeName::Choose(): the first that speaks is the name.
 };
 
@@ -219,10 +216,6 @@ inline constexpr auto kRules = std::to_array<RuleRow>({
     {Rule::kCleared, Stage::kEnd, "", "ends the episode", "all above",
      "t_c: campaign; mean .3 of a threshold: hand",
      "ClearingWindowTest.ClearsAfterTcQuietSamples"},
-    {Rule::kExhausted, Stage::kAnswer, "exhausted",
-     "a look whose best fault is as large as there is names nothing", "-",
-     ".99, misfit 2: hand",
-     "RulesTest.ALookWhoseFaultIsAsLargeAsThereIsFitsNothing"},
     {Rule::kSecondStands, Stage::kSource, "",
      "the name stays while something is on top of it", "all below", "-",
      "EpisodeNameTest.ASecondFaultIsAnnouncedAndNoLookAtBothRenames"},
@@ -232,11 +225,6 @@ inline constexpr auto kRules = std::to_array<RuleRow>({
      "says what the session before said; two faults are not renamed as a third",
      "look, observers", "ten minutes: five looks",
      "EpisodeNameTest.AnInheritedNameStandsUntilTheObserversNameAFault"},
-    {Rule::kMemory, Stage::kSource, "memory",
-     "after ten minutes the observers' name is what they named in the second "
-     "half of the episode",
-     "observers", "ten minutes, half: hand",
-     "RulesTest.WhatTheObserversNamedForLongIsRemembered"},
     {Rule::kObservers, Stage::kSource, "", "says what the observers say", "-",
      "-", "EpisodeNameTest.TheFloorNamesItUntilTheObserversDo"},
 });

@@ -1,10 +1,8 @@
 #include "diagnosis/decision/valve_looks.h"
 
-#include <bit>
 #include <utility>
 
 #include "diagnosis/decision/look_answer.h"
-#include "diagnosis/decision/rules.h"
 
 namespace fdi {
 
@@ -40,9 +38,6 @@ std::optional<LookTask> ValveLooks::Step(const Sample& sample,
       task.detection_stamp_ns = detection_ns_;
       EnterInBook(task, *found);
     }
-  }
-  if (open_) {
-    memory_.Step(detection_ns_, stamp_ns_, verdict.isolated);
   }
   // Not earlier: it may destroy what `found` points to.
   suspicion_.Advance(stamp_ns_);
@@ -88,15 +83,6 @@ const LookAnswer* ValveLooks::Answer() const {
 const LookAnswer* ValveLooks::SecondAnswer() const {
   return open_ && second_ns_ != 0 ? second_book_.At(second_ns_, stamp_ns_)
                                   : nullptr;
-}
-
-FaultSet ValveLooks::Observed(const ModelSet& models, FaultSet isolated) const {
-  const FaultSet known = ~FindingsOf(models);
-  const FaultSet faults = memory_.faults() & known;
-  if (!Acts(Rule::kMemory) || !open_ || faults == (isolated & known)) {
-    return isolated;
-  }
-  return std::popcount(faults) > static_cast<int>(kMaxNamedFaults) ? 0 : faults;
 }
 
 }  // namespace fdi

@@ -7,7 +7,6 @@
 
 #include "diagnosis/decision/episode_looks.h"
 #include "diagnosis/decision/look_book.h"
-#include "diagnosis/decision/observers_memory.h"
 #include "diagnosis/model/model_set.h"
 #include "diagnosis/model/trained_signals.h"
 #include "diagnosis/model/verdict.h"
@@ -36,11 +35,6 @@ class ValveLooks {
   /// The same for what is on top of the fault of that episode.
   const LookAnswer* SecondAnswer() const;
 
-  /// The faults that the observers name at the last sample, where the engine
-  /// isolates `isolated`: see ObserversMemory. Empty if that is more than
-  /// kMaxNamedFaults.
-  FaultSet Observed(const ModelSet& models, FaultSet isolated) const;
-
   /// See EpisodeLooks::GrowthTask(). Its answer is not for Enter().
   std::optional<LookTask> GrowthTask(std::vector<Explanation> known) const {
     return looks_.GrowthTask(std::move(known));
@@ -59,7 +53,6 @@ class ValveLooks {
   LookBook book_;
   LookBook second_book_;  // About what is on top.
   Suspicion suspicion_;
-  ObserversMemory memory_;
   std::int64_t stamp_ns_{0};
   std::int64_t detection_ns_{0};
   std::int64_t second_ns_{0};  // Detection of what is on top; 0: nothing is.

@@ -61,11 +61,7 @@ class EpisodeNameTest : public testing::Test {
     v.state = !v.detected     ? State::kNormal
               : isolated != 0 ? State::kIsolated
                               : State::kDetected;
-    EpisodeName::Inputs inputs{v, isolated, look_, can_look_, on_top_};
-    if (remembered_) {
-      inputs.remembered = *remembered_;
-    }
-    name_.Step(inputs);
+    name_.Step({v, look_, can_look_, on_top_});
     Note();
     return name_.verdict();
   }
@@ -108,7 +104,6 @@ class EpisodeNameTest : public testing::Test {
   Verdict engine_;
   std::optional<EpisodeName::Look> look_;
   std::optional<EpisodeName::Look> on_top_;
-  std::optional<FaultSet> remembered_;
   bool can_look_{false};
   std::vector<Kind> kinds_;
   std::vector<FaultSet> names_;
@@ -162,17 +157,6 @@ TEST_F(EpisodeNameTest, ALookThatNothingFitsSaysUnknown) {
   EXPECT_EQ(verdict.unknown, Unknown::kOutsideKnown);
   EXPECT_EQ(last_.kind, Kind::kReisolated);
   EXPECT_EQ(last_.faults, 0U);
-}
-
-TEST_F(EpisodeNameTest, TheMemoryOfTheObserversIsTheirName) {
-  Step(0, {Kind::kDetected});
-  Step(kFault7, {Kind::kIsolated});
-  remembered_ = kFault1 | kFault7;
-  EXPECT_EQ(Step(kFault7).isolated, kFault1 | kFault7);
-  remembered_ = 0;  // More than can be a name.
-  const Verdict& verdict = Step(kFault7);
-  EXPECT_EQ(verdict.isolated, 0U);
-  EXPECT_EQ(verdict.unknown, Unknown::kTooEarly);
 }
 
 TEST_F(EpisodeNameTest, AnInheritedNameStandsUntilTheObserversNameAFault) {

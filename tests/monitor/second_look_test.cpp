@@ -365,29 +365,6 @@ TEST_F(SecondLookTest, TheObserversNameStandsIfTheValveLooksHealthy) {
   EXPECT_EQ(outlet_.events.size(), 2U);
 }
 
-// Before a look has answered.
-TEST_F(SecondLookTest, WhatObserversNameAfterTenMinutesJoinsWhatTheyNamed) {
-  constexpr std::uint64_t kOther = kAtOnce + 700;
-  constexpr std::uint64_t kAlone = kAtOnce + 2 * 699 + 1;  // f7 was in half 1.
-  rows_ = simulator::Recording(kAlone + 20, 2, {});
-  Feed(0, kOther);
-  for (std::uint64_t k = kOther; k <= kAlone; ++k) {
-    Observe(k);
-    if (k == kOther) {
-      engine_.isolated = kF19;
-      Transit(TransitionKind::kReisolated);
-    }
-    EXPECT_EQ(Step(k).isolated, k < kAlone ? kF7 | kF19 : kF19) << k - kAtOnce;
-  }
-  ASSERT_EQ(outlet_.events.size(), 4U);
-  for (const std::size_t i : {2U, 3U}) {
-    const Transition& transition = outlet_.events[i].transition;
-    EXPECT_EQ(transition.kind, TransitionKind::kReisolated);
-    EXPECT_EQ(transition.layer, Layer::kObservers);
-    EXPECT_EQ(transition.faults, i == 2 ? kF7 | kF19 : kF19);
-  }
-}
-
 TEST_F(SecondLookTest, AResumedEpisodeKeepsItsNameUntilALookAnswers) {
   OpenEpisode open;
   open.valve_id = "V1";

@@ -597,23 +597,6 @@ TEST(LookAnswerTest, IsUnknownWhereNotEvenNoFaultFits) {
   EXPECT_EQ(outcome(6.0), LookOutcome::kNoneFits);
 }
 
-// With fewer signals the errors of a healthy valve are wider, and the largest
-// f12 that there is comes close to a friction that no simulation has.
-TEST(LookAnswerTest, IsUnknownWhereAFaultWouldHaveToBeLargerThanThereIs) {
-  const auto outcome = [](int fault, double strength, double misfit,
-                          bool complete) {
-    SecondLook look = Looked({{fault, 0.0}, {0, 900.0}}, misfit);
-    look.ranked.front().strength = strength;
-    look.complete = complete;
-    return AnswerOf(look).outcome;
-  };
-  EXPECT_EQ(outcome(12, -1.0, 3.0, false), LookOutcome::kNoneFits);
-  EXPECT_EQ(outcome(12, -0.9, 3.0, false), LookOutcome::kNamed);
-  EXPECT_EQ(outcome(12, -1.0, 1.5, false), LookOutcome::kNamed);
-  EXPECT_EQ(outcome(12, -1.0, 3.0, true), LookOutcome::kNamed);
-  EXPECT_EQ(outcome(16, 1.0, 3.0, false), LookOutcome::kNamed);
-}
-
 TEST(LookAnswerTest, IsAShortlistBeyondFourFaults) {
   EXPECT_EQ(
       AnswerOf(Looked({{1, 0}, {2, 1}, {3, 1}, {10, 2}, {16, 2}})).outcome,
@@ -977,49 +960,6 @@ TEST(LookAnswerTest, ALateOneNamesWhatAShiftWouldExplainToo) {
       Looked({{0, 0.0}, {1, 1.0}, {2, 1.0}, {3, 1.0}, {4, 1.0}, {11, 1.0}}));
   answer.late = true;
   EXPECT_EQ(NamesOf(answer, true), std::nullopt);
-}
-
-TEST(ObserversMemoryTest, HoldsTheSecondHalfOfAnEpisodeFromTenMinutesOn) {
-  ObserversMemory memory;
-  constexpr std::int64_t kDetection = 1000;
-  int age = 0;
-  const auto until = [&](int end, FaultSet faults) {
-    for (; age < end; ++age) {
-      memory.Step(kDetection * kSecond, (kDetection + age) * kSecond, faults);
-    }
-    return memory.faults();
-  };
-  until(400, 0b001);
-  EXPECT_EQ(until(601, 0b010), 0b010U);
-  EXPECT_EQ(until(602, 0b010), 0b011U);
-  EXPECT_EQ(until(799, 0b010), 0b011U);
-  EXPECT_EQ(until(800, 0b010), 0b010U);
-  EXPECT_EQ(until(2000, 0b100), 0b100U);
-  EXPECT_EQ(until(2001, 0b001), 0b101U);
-  memory.Step(4000 * kSecond, 4500 * kSecond, 0b010);
-  EXPECT_EQ(memory.faults(), 0b010U);
-}
-
-// Set back by an hour after 700 s: nothing in the memory changes but for the
-// stamps.
-TEST(ObserversMemoryTest, AClockThatIsSetBackChangesNothing) {
-  ObserversMemory memory;
-  constexpr std::int64_t kDetection = 10'000;
-  const auto step = [&](int age, FaultSet faults) {
-    const std::int64_t back = age < 700 ? 0 : 3600;
-    memory.Step(kDetection * kSecond, (kDetection + age - back) * kSecond,
-                faults);
-    return memory.faults();
-  };
-  for (int age = 0; age < 650; ++age) {
-    step(age, 0b001);
-  }
-  for (int age = 650; age < 1290; ++age) {
-    EXPECT_EQ(step(age, 0b010), 0b011U) << age;
-  }
-  for (int age = 1310; age < 1400; ++age) {
-    EXPECT_EQ(step(age, 0b010), 0b010U) << age;
-  }
 }
 
 TEST(LookBookTest, CountsAfterItsDelayAndDoesNotHearAWorseFit) {
