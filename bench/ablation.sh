@@ -2,11 +2,12 @@
 # Measures each rule of diagnosis/decision/rules.h: scores every set of runs
 # below with each rule left out, and writes docs/results/ablation.md. Results in
 # DIR are kept, so that a stopped run continues; remove a DIR of another version.
-# Needs FDI_REFERENCE_DATA. One process at a time, some three hours of CPU for
-# all, half of which are the ramps. The observers only, but for the columns that
+# Needs FDI_REFERENCE_DATA. One process at a time, about half an hour of CPU for
+# all rules without looks, ramps and slow days; those columns take minutes a
+# rule, so name RULES for them. The observers only, but for the columns that
 # end with -looks.
 #
-#     [RULES="drift memory"] bench/ablation.sh build/release/bin DIR [COLUMN...]
+#     [RULES="drift lasting"] bench/ablation.sh build/release/bin DIR [COLUMN...]
 #
 # RULES: these only, beside the program as it is.
 set -euo pipefail
