@@ -16,6 +16,7 @@
 #include "base/log.h"
 #include "base/median.h"
 #include "base/usual_period.h"
+#include "diagnosis/model/held_readings.h"
 #include "import/csv.h"
 #include "import/layout.h"
 
@@ -134,6 +135,7 @@ class TableReader {
   void CheckPair(Signal signal);
   void CheckMotion();
   void NoteSplitRange();
+  void MarkRepeats();
   void Cut();
   [[noreturn]] void RefuseAt(std::int64_t line,
                              const std::string& reason) const {
@@ -199,6 +201,7 @@ CsvTable TableReader::Read() {
   } else if (!IsSteady()) {
     PutOnGrid();
   }
+  MarkRepeats();
   Cut();
   for (const std::string& note : table_.notes) {
     if (options().log) {
@@ -835,6 +838,22 @@ void TableReader::NoteSplitRange() {
         " times as far as CV: one of two valves on a split range? raw = " +
         (upper ? "[50, 100]" : "[0, 50]") +
         " under [signal.CV] of --map says so");
+  }
+}
+
+void TableReader::MarkRepeats() {
+  ReadEvery every = MarkHeld(
+      period_s_, rows_.size(),
+      [&](std::size_t k) -> Sample& { return rows_[k].labelled.sample; });
+  for (std::size_t i = 0; i < kSignalCount; ++i) {
+    const auto signal = static_cast<Signal>(i);
+    const int* samples = EveryOf(every, signal);
+    if (samples != nullptr && *samples > 0) {
+      table_.notes.push_back(std::string(SignalName(signal)) +
+                             " is new every " +
+                             NumberText(period_s_ * *samples) +
+                             " s and held between: only new readings count");
+    }
   }
 }
 

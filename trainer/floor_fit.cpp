@@ -44,6 +44,11 @@ struct Answer {
   }
 };
 
+// A repeat of a position, which Floor does not test.
+bool IsHeld(const Sample& sample) {
+  return (sample.uncertain() & (MaskOf(Signal::kCv) | MaskOf(Signal::kX))) != 0;
+}
+
 double Command(const Stretch& stretch, std::size_t k, int delay) {
   const std::size_t at = k - std::min(k, static_cast<std::size_t>(delay));
   return std::clamp(stretch.samples[at][Signal::kCv], 0.0, 100.0);
@@ -65,7 +70,7 @@ double SquaredError(const std::vector<Stretch>& stretches,
          ++k) {
       const double command = Command(stretch, k, answer.delay);
       x = NextRodPosition(answer.Towards(command, x), x, command);
-      if (k >= kSettling) {
+      if (k >= kSettling && !IsHeld(stretch.samples[k])) {
         const double error =
             std::min(std::abs(stretch.samples[k][Signal::kX] - x), kMaxError);
         sum += error * error;
@@ -141,12 +146,17 @@ void FitDeviation(const std::vector<Stretch>& stretches, FloorLimits& floor) {
     rod.Restart(stretch.samples.front()[Signal::kX]);
     double lowest = rod.slow();
     double highest = rod.slow();
+    double last = stretch.samples.front()[Signal::kX];
     std::vector<double> above;
     std::vector<double> below;
     for (std::size_t k = 0; k < stretch.samples.size(); ++k) {
       const double x = stretch.samples[k][Signal::kX];
       rod.Step(stretch.samples[k][Signal::kCv]);
-      if (k < kSettling || x != stretch.samples[k - 1][Signal::kX]) {
+      if (IsHeld(stretch.samples[k])) {
+        continue;
+      }
+      if (const bool moved = std::exchange(last, x) != x;
+          moved || k < kSettling) {
         lowest = highest = rod.slow();
       }
       if (k < kSettling) {
@@ -261,6 +271,9 @@ void FitFlow(const std::vector<Stretch>& stretches, FloorLimits& floor) {
     for (const Sample& sample : stretch.samples) {
       rod.Step(sample[Signal::kCv]);
       const bool has_x = sample.Has(Signal::kX);
+      if (IsHeld(sample) || (sample.uncertain() & MaskOf(Signal::kF)) != 0) {
+        continue;
+      }
       const double x = has_x ? sample[Signal::kX] : rod.most_open();
       const double least_open = has_x ? x : rod.least_open();
       const double least =

@@ -9,6 +9,7 @@
 
 #include "base/error.h"
 #include "diagnosis/model/fault_catalogue.h"
+#include "diagnosis/model/held_readings.h"
 #include "trainer/floor_fit.h"
 
 namespace fdi::trainer {
@@ -132,6 +133,9 @@ int StuckLimit(const Condition& normal, Signal signal) {
         if (!sample.Has(signal)) {
           return 0;
         }
+        if ((sample.uncertain() & MaskOf(signal)) != 0) {
+          continue;  // As StuckReadings does.
+        }
         length = length > 0 && sample[signal] == last ? length + 1 : 1;
         last = sample[signal];
         longest = std::max(longest, length);
@@ -204,6 +208,14 @@ ValidityRegion TrainedRegion(const std::vector<Condition>& conditions) {
 
 namespace {
 
+ReadEvery EveryOf(const std::vector<TrainingRun>& runs) {
+  TrainingRun longest = *std::ranges::max_element(
+      runs, {}, [](const TrainingRun& run) { return run.samples.size(); });
+  return MarkHeld(
+      longest.period_s, longest.samples.size(),
+      [&](std::size_t k) -> Sample& { return longest.samples[k].sample; });
+}
+
 std::string ObserverName(int fault, double strength) {
   if (fault == 0) {
     return "normal";
@@ -227,6 +239,7 @@ ModelSet DescribeModelSet(const std::vector<TrainingRun>& runs,
   models.flow_unit = runs.front().flow_unit;
   models.validity = TrainedRegion(conditions);
   models.stuck = FitStuckLimits(conditions.front());
+  models.every = EveryOf(runs);
   models.floor =
       FitFloor(conditions.front(), models.sample_period_s, options.flow_shape);
   models.decision = options.decision;

@@ -8,11 +8,14 @@ Decision::Decision(EngineParts parts,
     : models_(parts.plan->shared_models()),
       simulation_(std::move(simulation)),
       severities_(std::move(severities)),
+      held_readings_(models_->sample_period_s, models_->every),
       engine_(std::move(parts)) {
   ForgetNames();
 }
 
-const Verdict& Decision::Step(const Sample& sample) {
+const Verdict& Decision::Step(const Sample& measured) {
+  Sample sample = measured;
+  held_readings_.Mark(sample);
   engine_.Suspect(names_->suspects());
   engine_.TakeName(names_->beside());
   named_ = &names_->Step(sample, engine_.Step(sample), held_);
@@ -33,6 +36,7 @@ std::optional<Transition> Decision::Adopt(
     closed = names_->End(*closed);  // With the set that named it.
   }
   models_ = std::move(models);
+  held_readings_ = HeldReadings(models_->sample_period_s, models_->every);
   simulation_ = std::move(simulation);
   ForgetNames();
   return closed;

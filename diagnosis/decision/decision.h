@@ -9,6 +9,7 @@
 
 #include "diagnosis/decision/episode_names.h"
 #include "diagnosis/decision/valve_engine.h"
+#include "diagnosis/model/held_readings.h"
 
 namespace fdi {
 
@@ -18,6 +19,7 @@ namespace fdi {
 /// floor or a look have found. The monitor and `fdi-trainer evaluate` run this
 /// very class. Of a sample, in this order:
 ///
+/// 0. repeats of a transmitter that is polled are marked (HeldReadings);
 /// 1. the engine judges it, with the name and the suspicion of the sample
 ///    before it (ValveEngine);
 /// 2. the looks that are due at it are noted (ValveLooks);
@@ -44,7 +46,7 @@ class Decision {
 
   /// Takes the next sample in order of arrival. @returns the verdict with the
   /// name that counts; stands until the next call.
-  const Verdict& Step(const Sample& sample);
+  const Verdict& Step(const Sample& measured);
 
   /// The looks that became due since the last call.
   std::vector<LookTask> TakeDue() { return names_->TakeDue(); }
@@ -96,6 +98,7 @@ class Decision {
   std::shared_ptr<const ModelSet> models_;
   std::shared_ptr<const LookSimulation> simulation_;
   std::shared_ptr<const SeverityCatalogue> severities_;
+  HeldReadings held_readings_;
   ValveEngine engine_;
   std::unique_ptr<EpisodeNames> names_;
   const Verdict* named_{nullptr};  // Null: an end came after the last sample.

@@ -118,6 +118,9 @@ void ValidateRegion(const ModelSet& models) {
   }
   Check(std::min({models.stuck.t1, models.stuck.p1, models.stuck.p2}) >= 0,
         models, "limits on repeated readings must not be negative");
+  Check(std::min({models.every.p1, models.every.p2, models.every.t1,
+                  models.every.x, models.every.f}) >= 0,
+        models, "samples between two readings must not be negative");
   Check(region.cv_step > 0.0, models, "the step of CV must be positive");
   Check(region.flow_cutoff >= 0.0, models,
         "the flow cut-off must not be negative");

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "diagnosis/model/held_readings.h"
 #include "diagnosis/model/membership.h"
 #include "diagnosis/model/sample.h"
 #include "diagnosis/model/ts_model.h"
@@ -192,6 +193,7 @@ struct ModelSet {
   FlowUnit flow_unit{FlowUnit::kM3PerHour};
   ValidityRegion validity;
   StuckLimits stuck;
+  ReadEvery every;  ///< Transmitters that are polled.
   /// Limits that always apply; none without CV, or without both X and F.
   std::optional<FloorLimits> floor;
   DecisionParameters decision;

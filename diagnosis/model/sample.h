@@ -101,8 +101,9 @@ struct Sample {
 
   double operator[](Signal signal) const { return values[Index(signal)]; }
   bool Has(Signal signal) const { return (present & MaskOf(signal)) != 0; }
-  /// The signals whose values are estimates, such as interpolated readings:
-  /// quality UNCERTAIN.
+  /// The signals of quality UNCERTAIN: estimates, such as interpolated
+  /// readings, and repeats of an older reading. Observers take them into their
+  /// past, and nothing else counts them.
   SignalMask uncertain() const {
     SignalMask mask = 0;
     if (quality == decltype(quality){}) {

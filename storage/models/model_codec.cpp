@@ -28,8 +28,8 @@ namespace fdi::storage {
 namespace {
 
 constexpr std::uint32_t kMagic = 0x4D494446;  // "FDIM"
-// The formats 3 to 1026 were those of sets that were never released.
-constexpr std::uint32_t kFormat = 1027;
+// The formats 3 to 1027 were those of sets that were never released.
+constexpr std::uint32_t kFormat = 1028;
 constexpr std::uint32_t kMaxPhysics = 256;
 constexpr std::size_t kFrame =
     2 * sizeof(std::uint32_t) + sizeof(std::uint64_t) + sizeof(std::uint32_t);
@@ -68,6 +68,12 @@ template <typename A, Of<StuckLimits> T>
 void Fields(A& a, T& limits) {
   auto& [t1, p1, p2] = limits;
   a(t1, p1, p2);
+}
+
+template <typename A, Of<ReadEvery> T>
+void Fields(A& a, T& every) {
+  auto& [p1, p2, t1, x, f] = every;
+  a(p1, p2, t1, x, f);
 }
 
 template <typename A, Of<FloorLimits::Rod> T>
@@ -185,12 +191,12 @@ template <typename A, Of<ModelSet> T>
 void Fields(A& a, T& models) {
   // version and content_hash are assigned by the store.
   auto& [name, version, content_hash, created_ns, software, preset,
-         sample_period_s, flow_unit, validity, stuck, floor, decision, channels,
-         observers, faults, groups, undetectable, training_runs,
+         sample_period_s, flow_unit, validity, stuck, every, floor, decision,
+         channels, observers, faults, groups, undetectable, training_runs,
          threshold_hours, false_alarms_per_hour, physics, position_as_command] =
       models;
   a(name, created_ns, software, preset, sample_period_s, flow_unit, validity,
-    stuck, floor, decision, Limited{channels, kMaxChannels},
+    stuck, every, floor, decision, Limited{channels, kMaxChannels},
     Limited{observers, kMaxObservers}, Limited{faults, kMaxFaults},
     Limited{groups, kMaxFaults}, Limited{undetectable, kMaxFaults},
     Limited{training_runs, kMaxTrainingRuns}, threshold_hours,

@@ -1416,6 +1416,26 @@ TEST(KindsTest, ATableByExceptionIsHeld) {
   EXPECT_EQ(found.resample, "1s:hold:10min");
 }
 
+// A position that is polled every fifth second stands in the rows between.
+TEST(KindsTest, APolledPositionIsNewAtItsPollsAlone) {
+  std::string text = "time,FC1.OP [%],ZT1.PV [%],FT1 [t/h]\n";
+  for (std::size_t k = 0; k < kRows; ++k) {
+    text += Iso(k) + "," + Fixed(kValve.cv[k]) + "," +
+            Fixed(kValve.x[k - k % 5]) + "," + Fixed(kValve.f[k]) + "\n";
+  }
+  ColumnMap map = Utc();
+  map.columns = {{"FC1.OP [%]", Signal::kCv, 1.0, 0.0, Sense::kOpening, "%"},
+                 {"ZT1.PV [%]", Signal::kX, 1.0, 0.0, Sense::kOpening, "%"}};
+  const CsvTable table = ReadCsv(text, {.source = "plant.csv", .map = map});
+  EXPECT_THAT(table.notes,
+              Contains(HasSubstr("X is new every 5 s and held between")));
+  ASSERT_EQ(table.runs.size(), 1U);
+  for (std::size_t k = 0; k < kRows; ++k) {
+    const Sample& sample = table.runs[0].samples[k].sample;
+    EXPECT_EQ(sample.uncertain(), k % 5 == 0 ? 0 : MaskOf(Signal::kX)) << k;
+  }
+}
+
 // Three tags at a sample a second, a third of a second apart.
 TEST(KindsTest, StampsOfSeveralTagsMakeNoPeriod) {
   const std::string text =

@@ -25,6 +25,7 @@ inline ModelSet RandomModelSet(const std::string& name, int observers = 3,
   models.undetectable = {7};
   models.training_runs = {"0123456789ab", "ba9876543210@0:1500"};
   models.threshold_hours = number();
+  models.every = {.t1 = 5, .x = 30};
   for (int o = 0; o < observers; ++o) {
     Observer observer;
     observer.name = o == 0 ? "normal" : "f" + std::to_string(o) + " 0.50";

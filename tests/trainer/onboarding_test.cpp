@@ -628,6 +628,21 @@ TEST(RecordVerdictTest, ThinSaysWhatIsStillNeeded) {
   EXPECT_EQ(
       JudgeRecord(record(840, 20.0), 840.0 / 3600.0).sentence.substr(0, 59),
       "thin: 14 minutes of healthy data, 11 more are needed. Until");
+  std::vector<TrainingRun> held = record(3600, 20.0);
+  for (std::size_t k = 0; k < 3600; ++k) {
+    Sample& sample = held[0].samples[k].sample;
+    sample.Set(Signal::kX, 50.0);
+    sample.quality[Index(Signal::kX)] =
+        k % 30 == 0 ? SignalQuality::kGood : SignalQuality::kUncertain;
+  }
+  EXPECT_EQ(JudgeRecord(held, 1.0).sentence.substr(0, 47),
+            "thin: 1.00 h, of which only X 0.03 h rest on re");
+  for (LabelledSample& labelled : held[0].samples) {
+    labelled.sample.Set(Signal::kF, 5.0);
+  }
+  EXPECT_EQ(JudgeRecord(held, 1.0).sentence.substr(0, 77),
+            "usable: 1.00 h of healthy data, of which X 0.03 h, F 1.00 h rest "
+            "on readings,");
   const RecordVerdict still = JudgeRecord(record(3600, 2.0), 1.0);
   EXPECT_EQ(still.word, "thin");
   EXPECT_NE(still.sentence.find("stays within 2.0 %, one more operating point"),

@@ -5,6 +5,7 @@
 #include <map>
 
 #include "base/csv_cells.h"
+#include "diagnosis/model/held_readings.h"
 
 namespace fdi::trainer {
 namespace {
@@ -96,6 +97,8 @@ TrainingRun ToTrainingRun(const storage::StoredRun& run, bool assume_normal) {
     labelled.sample.present = signals;
     result.samples.push_back(std::move(labelled));
   }
+  MarkHeld(result.period_s, result.samples.size(),
+           [&](std::size_t k) -> Sample& { return result.samples[k].sample; });
   return result;
 }
 

@@ -14,6 +14,7 @@ namespace {
 constexpr double kLeastMinutes = 25.0;
 constexpr double kLeastSpan = 5.0;    // Of the command [%].
 constexpr double kLeastJudged = 0.5;  // Of a part of the record.
+constexpr double kMostlyRead = 0.9;   // Below it, the readings are told.
 
 std::string Fixed(double value, int decimals) {
   char text[32];
@@ -34,6 +35,43 @@ double CommandSpan(const std::vector<TrainingRun>& runs) {
   return commands.empty()
              ? 0.0
              : SortedQuantile(commands, 0.99) - SortedQuantile(commands, 0.01);
+}
+
+// The hours that rest on readings of X and of F; what else a record has is held
+// or filled in.
+struct ReadHours {
+  double most{0.0};
+  std::string text;  // "X 0.08 h, F 2.50 h"; empty: hardly anything is filled.
+};
+
+ReadHours ReadHoursOf(const std::vector<TrainingRun>& runs) {
+  ReadHours read;
+  bool filled = false;
+  for (const Signal signal : {Signal::kX, Signal::kF}) {
+    double all = 0.0;
+    double hours = 0.0;
+    for (const TrainingRun& run : runs) {
+      for (const LabelledSample& labelled : run.samples) {
+        const Sample& sample = labelled.sample;
+        const bool there = sample.Has(signal);
+        all += there ? run.period_s / 3600.0 : 0.0;
+        hours += there && sample.quality[Index(signal)] == SignalQuality::kGood
+                     ? run.period_s / 3600.0
+                     : 0.0;
+      }
+    }
+    if (all > 0.0) {
+      filled = filled || hours < kMostlyRead * all;
+      read.most = std::max(read.most, hours);
+      read.text += (read.text.empty() ? "" : ", ") +
+                   std::string(SignalName(signal)) + ' ' + Fixed(hours, 2) +
+                   " h";
+    }
+  }
+  if (!filled) {
+    read.text.clear();
+  }
+  return read;
 }
 
 // What the record lacks as far as it shows in parts that were left out.
@@ -70,7 +108,14 @@ RecordVerdict JudgeRecord(const std::vector<TrainingRun>& runs, double hours,
                           const CoverageTable* coverage) {
   const double minutes = 60.0 * hours;
   const double span = CommandSpan(runs);
+  const ReadHours read = ReadHoursOf(runs);
   std::vector<std::string> lacks;
+  if (!read.text.empty() && 60.0 * read.most < kLeastMinutes) {
+    lacks.push_back(Fixed(hours, 2) + " h, of which only " + read.text +
+                    " rest on readings and the others are held or filled in: " +
+                    Fixed(kLeastMinutes / 60.0, 2) +
+                    " h of readings are needed");
+  }
   if (minutes < kLeastMinutes) {
     lacks.push_back(Fixed(minutes, 0) + " minutes of healthy data, " +
                     Fixed(std::ceil(kLeastMinutes - minutes), 0) +
@@ -92,8 +137,12 @@ RecordVerdict JudgeRecord(const std::vector<TrainingRun>& runs, double hours,
                         "works in another way than here" +
                         detected};
   }
-  return {"usable", "usable: " + Fixed(hours, 2) + " h of healthy data over " +
-                        Fixed(span, 0) + " % of the command" + detected};
+  const std::string rests =
+      read.text.empty() ? std::string()
+                        : ", of which " + read.text + " rest on readings,";
+  return {"usable", "usable: " + Fixed(hours, 2) + " h of healthy data" +
+                        rests + " over " + Fixed(span, 0) +
+                        " % of the command" + detected};
 }
 
 }  // namespace fdi::trainer

@@ -1,0 +1,95 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "diagnosis/model/sample.h"
+
+namespace fdi {
+
+/// Samples from one new reading of a transmitter to the next, where it is read
+/// less often than samples are taken: a position that is polled by HART every
+/// 30 s and stands in the rows between. 0: each sample has a new reading.
+struct ReadEvery {
+  int p1{0};
+  int p2{0};
+  int t1{0};
+  int x{0};
+  int f{0};
+
+  bool operator==(const ReadEvery&) const = default;
+};
+
+/// The member of `signal`; null for those that are no transmitters. A command
+/// that stands is the command.
+int* EveryOf(ReadEvery& every, Signal signal);
+
+/// Tells new readings from repeats. A transmitter that is polled changes at
+/// multiples of one number of samples alone, whatever it measures. Its repeats
+/// become UNCERTAIN: they stay in the past of the observers and are no evidence
+/// of anything. After the time of a poll an unchanged value is a new reading.
+/// O(1) a sample.
+class HeldReadings {
+ public:
+  /// @param known what is known of the transmitters, before any reading.
+  explicit HeldReadings(double period_s, const ReadEvery& known = {});
+
+  void Mark(Sample& sample);
+
+  const ReadEvery& every() const { return every_; }
+
+ private:
+  /// Fifteen of them at multiples by chance: below 1e-3 for every second
+  /// sample, where an error only drops each second repeat, and below 1e-9 from
+  /// ten samples on.
+  static constexpr std::size_t kChanges = 16;
+
+  struct Watch {
+    bool begun{false};
+    double value{0.0};
+    std::int64_t changed_ns{0};
+    std::int64_t new_ns{0};
+    std::array<double, kChanges> steps{};  // between changes [samples]
+    std::size_t changes{0};
+  };
+
+  void TakeChange(double step, Watch& watch, int& every) const;
+
+  double period_ns_;
+  ReadEvery every_;
+  std::array<Watch, kSignalCount> watches_{};
+};
+
+/// Marks a whole record from its first sample on. `at(k)` is sample k. @returns
+/// which signals were held at its end and known to be for a quarter of it.
+template <typename At>
+ReadEvery MarkHeld(double period_s, std::size_t samples, At at) {
+  HeldReadings search(period_s);
+  std::array<std::size_t, kSignalCount> held{};
+  const auto count = [&](ReadEvery every) {
+    for (std::size_t i = 0; i < kSignalCount; ++i) {
+      const int* found = EveryOf(every, static_cast<Signal>(i));
+      held[i] += found != nullptr && *found > 0 ? 1U : 0U;
+    }
+  };
+  for (std::size_t k = 0; k < samples; ++k) {
+    Sample copy = at(k);
+    search.Mark(copy);
+    count(search.every());
+  }
+  ReadEvery every = search.every();
+  bool any = false;
+  for (std::size_t i = 0; i < kSignalCount; ++i) {
+    if (int* found = EveryOf(every, static_cast<Signal>(i))) {
+      *found = 4 * held[i] > samples ? *found : 0;
+      any = any || *found > 0;
+    }
+  }
+  HeldReadings marks(period_s, every);
+  for (std::size_t k = 0; any && k < samples; ++k) {
+    marks.Mark(at(k));
+  }
+  return every;
+}
+
+}  // namespace fdi
