@@ -312,11 +312,19 @@ ValveParameters WithUnknowns(ValveParameters parameters,
   return parameters;
 }
 
-// A valve without a position transmitter has its command in the place of X.
+constexpr std::ptrdiff_t kMinTrimRows = 30;
+
+// Whether enough rows have both readings. Otherwise what stands in the place of
+// X has to do: the command of a valve without a position transmitter, and the
+// line between two readings where tags are stored at different times.
 bool HasPosition(const std::vector<HealthyRecord>& records) {
-  return std::ranges::any_of(records, [](const HealthyRecord& record) {
-    return std::ranges::any_of(record.rows, &RecordRow::x_measured);
-  });
+  std::ptrdiff_t both = 0;
+  for (const HealthyRecord& record : records) {
+    both += std::ranges::count_if(record.rows, [](const RecordRow& row) {
+      return row.x_measured && row.flow_measured;
+    });
+  }
+  return both >= kMinTrimRows;
 }
 
 bool IsUsable(const RecordRow& row, bool has_position) {
@@ -332,7 +340,6 @@ double ShuttingOff(const Trim& trim) {
 
 double SizeOf(const std::vector<HealthyRecord>& records,
               const ValveParameters& valve) {
-  constexpr std::size_t kMinRows = 30;
   const bool has_position = HasPosition(records);
   std::vector<double> ratios;
   for (const HealthyRecord& record : records) {
@@ -348,7 +355,7 @@ double SizeOf(const std::vector<HealthyRecord>& records,
       }
     }
   }
-  if (ratios.size() < kMinRows) {
+  if (std::ssize(ratios) < kMinTrimRows) {
     return 1.0;
   }
   const auto middle =
@@ -413,8 +420,7 @@ Trim RegressTrim(const std::vector<HealthyRecord>& records,
       }
     }
   }
-  constexpr int kMinRows = 30;
-  if (sums.rows < kMinRows) {
+  if (sums.rows < kMinTrimRows) {
     return trim;
   }
   const double x_mean = sums.x / sums.w;

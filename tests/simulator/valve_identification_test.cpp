@@ -147,6 +147,18 @@ TEST(ValveIdentificationTest, FindsTheDelayOfTheCommand) {
   EXPECT_EQ(FitValve({record}, truth).command_delay, -1);
 }
 
+// Tags that a historian stores when they change have hardly a row in common.
+TEST(ValveIdentificationTest, ReadingsAtDifferentTimesTellTheSize) {
+  ValveParameters truth = ParameterSet("lublin-actuator-3-refit");
+  HealthyRecord record = Recording(truth, 800, 3);
+  for (std::size_t k = 0; k < record.rows.size(); ++k) {
+    record.rows[k].x_measured = k % 8 == 0;
+    record.rows[k].flow_measured = k % 8 == 4;
+  }
+  truth.trim.kv_m3_h *= 6.0;
+  EXPECT_NEAR(SizeOf({record}, truth), 1.0 / 6.0, 0.01);
+}
+
 TEST(ValveIdentificationTest, FindsTheAirRelayAndDoesNotNeedFlow) {
   ValveParameters truth = ParameterSet("lublin-actuator-3");
   truth.positioner.orifice_coefficient *= 1.2;
