@@ -204,7 +204,11 @@ void Floor::PushFlow(const Sample& sample) {
   const double dp = DpOf(sample);
   const double margin = limits_->flow_margin * limits_->flow_high;
   const bool shut = IsShut(x, sample[Signal::kCv]);
-  Count(kShutFlow, shut && flow > margin, flow / limits_->flow_high,
+  // The trim still passes a share of its rangeability, which ends at the seat.
+  const double seat = std::clamp((100.0 - x) / (100.0 - kShut), 0.0, 1.0);
+  const double leak =
+      margin + limits_->flow_factor * seat * FlowAt(*limits_, kShut, dp);
+  Count(kShutFlow, shut && flow > leak, (flow - leak) / limits_->flow_high,
         limits_->flow_samples, sample.stamp_ns);
   const double most = limits_->flow_factor *
                           FlowAt(*limits_, x - 0.5 * limits_->deviation, dp) +

@@ -57,7 +57,8 @@ bool IsShut(double x, double cv);
 /// inside and outside the trained region, from the first sample on.
 ///
 ///     travel_deviation  X is outside the range that the rod may have
-///     shut_flow         F > m F_high although CV and X are shut
+///     shut_flow         F > c F(X_shut, P1 − P2) (100 − X)/(100 − X_shut) +
+///                       m F_high although CV and X are beyond X_shut
 ///     excess_flow       F > c F(X − deviation/2, P1 − P2) + m F_high
 ///     x_stuck           X repeats, to the bit, while the rod should travel
 ///     f_stuck           F likewise, while F(X, P1 − P2) changes

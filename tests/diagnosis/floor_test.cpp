@@ -174,10 +174,22 @@ TEST(FloorTest, StreamThatBeginsWithTheFaultIsNoExcuse) {
 
 TEST(FloorTest, FlowThroughAShutValve) {
   const auto shut = [](double flow) {
-    return FirstFindings([flow](int) { return Valve{100.0, 99.5, flow}; });
+    return FirstFindings([flow](int) { return Valve{100.0, 100.0, flow}; });
   };
   EXPECT_EQ(shut(5.0), kNothing);
   EXPECT_EQ(Of(kShutFlow, shut(8.0)), 9);
+}
+
+// The first opening of an equal percentage trim passes its whole rangeability.
+TEST(FloorTest, AStartIsNoLeakOfTheSeat) {
+  const auto at = [](double x, double flow) {
+    return FirstFindings([=](int k) {
+      return Valve{99.0, x + 0.01 * (k % 2), flow + 0.1 * (k % 2)};
+    });
+  };
+  EXPECT_EQ(at(98.8, 8.0), kNothing);
+  EXPECT_EQ(Of(kShutFlow, at(98.8, 20.0)), 9);
+  EXPECT_EQ(Of(kShutFlow, at(100.0, 8.0)), 9);
 }
 
 TEST(FloorTest, FlowThatNoOpeningPasses) {
