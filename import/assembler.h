@@ -101,7 +101,9 @@ struct TagCounts {
 ///
 /// A reading that nothing newer follows is
 /// - by exception as good as it was while its source is alive, and missing from
-///   two periods or `lateness_ns` after its last word on;
+///   two periods or `lateness_ns` after its last word on. A source that never
+///   says that it lives, and speaks at odd times, is given its own rhythm
+///   (Silence()), a minute at most;
 /// - periodic: good for one and a half periods, then UNCERTAIN, as what a file
 ///   is filled with, and missing beyond `max_age_ns`.
 ///
@@ -151,6 +153,9 @@ class Assembler {
     std::uint32_t connection{0};
     bool ended{false};
     bool silent{false};
+    bool beats{false};      // It says that it lives.
+    double step_ns{0.0};    // Between its words, the mean,
+    double spread_ns{0.0};  // and the mean deviation from that.
     std::optional<std::int64_t> behind_since_ns;  // Steady.
     int behind{0};                                // Readings in a row.
   };
@@ -205,7 +210,7 @@ class Assembler {
                               Slot& slot);
   void Begin(Valve& valve) const;
   std::int64_t InstantFrom(std::int64_t stamp_ns) const;
-  std::int64_t Silence() const;
+  std::int64_t Silence(const Source& source) const;
   void Note(AssemblyNote::Kind kind, const std::string& name,
             std::int64_t by_ns) const;
 

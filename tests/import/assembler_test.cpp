@@ -191,6 +191,27 @@ TEST_F(AssemblerTest, NothingIsHeldOfASilentSource) {
             std::pair(NoteKind::kSourceBack, std::string("plc2")));
 }
 
+// It speaks when something changes, and never says that it lives.
+TEST_F(AssemblerTest, ASourceWithoutAHeartbeatHasItsOwnRhythm) {
+  Make({ValveNamed("V1")});
+  double s = 0.0;
+  for (int k = 0; k < 200; ++k) {
+    SayAll(s, "V1");
+    const double next = s + 1.0 + (k * 7 % 10);
+    while (s < next) {
+      Advance(s += 1.0);
+    }
+  }
+  const std::vector<double> missing = With("V1", Signal::kCv, false);
+  EXPECT_TRUE(missing.empty() || missing.back() < 100.0) << missing.back();
+  const double last = s;
+  SayAll(last, "V1");
+  while (s < last + 100.0) {
+    Advance(s += 1.0);
+  }
+  EXPECT_NEAR(With("V1", Signal::kCv).back(), last + 35.0, 15.0);
+}
+
 TEST_F(AssemblerTest, ALostConnectionVoidsWhatItSaid) {
   Make({ValveNamed("V1")});
   for (int s = 1; s <= 5; ++s) {
