@@ -183,7 +183,7 @@ std::shared_ptr<const AlarmBook::ByValveMap> AlarmBook::ByValve() const {
 }
 
 bool AlarmBook::OnEvent(const FaultEvent& event) {
-  const Alarm alarm = AlarmOf(event);
+  const Alarm alarm = storage::AlarmOf(event);
   const std::string& id = alarm.episode.episode_id;
   const MutexLock lock(mutex_);
   if (rows_.contains(id)) {

@@ -368,33 +368,4 @@ Json AlarmsJson(const std::vector<storage::Alarm>& alarms,
   return list;
 }
 
-storage::Alarm AlarmOf(const FaultEvent& event) {
-  storage::Alarm alarm;
-  storage::Episode& e = alarm.episode;
-  const Transition& transition = event.transition;
-  e.id = event.episode_id;
-  e.episode_id = storage::EpisodeIdText(event.episode_id);
-  e.valve_id = event.valve_id;
-  e.detected_ns = transition.detection_stamp_ns;
-  e.peak_factor = transition.factor;
-  e.strength = transition.strength;
-  e.priority = PriorityOf(transition.severity);
-  e.model_set = event.model_set + "@" + std::to_string(event.model_version);
-  if (const std::string faults = IsolatedFaults(event); !faults.empty()) {
-    e.fault = faults;
-    e.layer = LayerName(transition.layer);
-    e.isolated_ns = transition.stamp_ns;
-  } else if (CertaintyOf(event) == Certainty::kNotKnown) {
-    e.unknown_kind = UnknownName(Unknown::kOutsideKnown);
-  }
-  if (transition.kind == TransitionKind::kCleared) {
-    e.cleared_ns = transition.stamp_ns;
-  } else if (transition.kind == TransitionKind::kClosed) {
-    e.ended_ns = transition.stamp_ns;
-    e.end_reason = EndReasonName(transition.reason);
-  }
-  alarm.state = storage::AlarmStateOf(e);
-  return alarm;
-}
-
 }  // namespace fdi::console

@@ -76,8 +76,4 @@ Json AlarmsJson(const std::vector<storage::Alarm>& alarms,
                 const findings::RankFacts& facts);
 Json ShelfJson(const storage::Shelf& shelf);
 
-/// The alarm that `event` belongs to, made from the event alone because it is
-/// not, or not yet, in the history.
-storage::Alarm AlarmOf(const FaultEvent& event);
-
 }  // namespace fdi::console

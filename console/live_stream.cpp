@@ -233,9 +233,9 @@ void LiveStream::SendUnstored() {
     unstored.swap(unstored_);
   }
   for (const FaultEvent& event : unstored) {
-    Broadcast(
-        StreamEvent("alarm", JsonText(AlarmJson(AlarmOf(event), parts_->texts,
-                                                *parts_->alarms.Facts()))));
+    Broadcast(StreamEvent(
+        "alarm", JsonText(AlarmJson(storage::AlarmOf(event), parts_->texts,
+                                    *parts_->alarms.Facts()))));
   }
 }
 

@@ -72,6 +72,17 @@ void PlantFeed::Add(const idl::DecisionMessage& message,
           facts ? kSilentPeriods * facts->period_s : 0.0)));
 }
 
+void PlantFeed::Add(const idl::ValveStateMessage& state,
+                    const idl::Reception& reception, Clock::time_point now) {
+  {
+    const MutexLock lock(mutex_);
+    MarkAlive(reception, now);
+  }
+  if (!valves_.contains(state.valve_id)) {
+    board_.Expect(state.valve_id, state.as_of_ns);
+  }
+}
+
 void PlantFeed::Add(const idl::MonitorStatusMessage& status,
                     const idl::Reception& reception, Clock::time_point now) {
   const MutexLock lock(mutex_);

@@ -32,6 +32,9 @@ class PlantFeed {
   std::shared_ptr<const ModelFacts> Add(const idl::ModelSetInfoMessage& info);
   void Add(const idl::DecisionMessage& message, const idl::Reception& reception,
            Clock::time_point now);
+  /// A valve that does not send is listed, too.
+  void Add(const idl::ValveStateMessage& state, const idl::Reception& reception,
+           Clock::time_point now);
   void Add(const idl::MonitorStatusMessage& status,
            const idl::Reception& reception, Clock::time_point now);
 

@@ -4,6 +4,7 @@
 #include <cctype>
 #include <cmath>
 #include <cstdio>
+#include <optional>
 #include <utility>
 
 #include "base/text.h"
@@ -105,19 +106,8 @@ std::string ValveOfLevel(std::string_view level) {
 
 void ValveStates::Add(const Json& record, Clock::time_point now) {
   table_.Add(record, now);
-  const Json& topic = record["topic"];
-  if (topic == "DecisionVector") {
-    vectors_[record["valve_id"]] = {{"stamp_utc", record["stamp_utc"]},
-                                    {"model_hash", record["model_hash"]}};
-  } else if (topic == "FaultEvent") {
-    events_[record["valve_id"]] = record;
-    if (new_events_.size() < kMaxEvents) {
-      new_events_.push_back(record);
-    }
-  } else if (topic == "ModelSetInfo") {
-    model_sets_[record["model_hash"]] =
-        record["model_set"].get<std::string>() + "@" +
-        std::to_string(record["version"].get<int>());
+  if (record["topic"] == "FaultEvent" && new_events_.size() < kMaxEvents) {
+    new_events_.push_back(record);
   }
 }
 
@@ -141,10 +131,8 @@ std::vector<Outgoing> ValveStates::Due(std::int64_t now_ns,
   for (const Json& row : document["valves"]) {
     const auto valve_id = row["valve_id"].get<std::string>();
     known.insert(valve_id);
-    const auto vector = vectors_.find(valve_id);
     Tell(prefix_ + TopicLevel(valve_id) + "/state", StateOf(row, monitored),
-         vector == vectors_.end() ? Json() : vector->second["stamp_utc"], now,
-         due);
+         row["as_of_utc"], now, due);
   }
   for (const std::string& valve_id : expected_) {
     if (!known.contains(valve_id)) {
@@ -170,7 +158,9 @@ Json ValveStates::StateOf(const Json& row, bool monitored) const {
   // An alarm without a name yet is one unlike any known fault as far as anybody
   // knows.
   const report::FaultWords words =
-      texts_.Words(fault.empty() ? "unknown" : fault, strength);
+      texts_.Words(fault.empty() ? "unknown" : fault, strength,
+                   alarm ? std::optional(row["priority"].get<std::int64_t>())
+                         : std::nullopt);
   std::string health = "NORMAL";
   Json reason;
   if (!monitored) {
@@ -191,16 +181,6 @@ Json ValveStates::StateOf(const Json& row, bool monitored) const {
   const auto when = [&](bool shown, Json value) {
     return shown ? std::move(value) : Json();
   };
-  const auto event = events_.find(valve_id);
-  const auto vector = vectors_.find(valve_id);
-  Json model_set;
-  if (alarm && event != events_.end()) {
-    model_set = event->second["model_set"];
-  } else if (vector != vectors_.end()) {
-    const auto known =
-        model_sets_.find(vector->second["model_hash"].get<std::string>());
-    model_set = known == model_sets_.end() ? Json() : Json(known->second);
-  }
   return {{"valve_id", valve_id},
           {"health", health},
           {"reason", reason},
@@ -217,7 +197,7 @@ Json ValveStates::StateOf(const Json& row, bool monitored) const {
           {"priority", when(alarm, PriorityOf(words.severity))},
           {"since_utc", row["since_utc"]},
           {"check", when(alarm && !fault.empty(), words.check)},
-          {"model_set", std::move(model_set)}};
+          {"model_set", row["model_set"]}};
 }
 
 void ValveStates::Tell(const std::string& topic, Json state, const Json& as_of,

@@ -72,9 +72,6 @@ class ValveStates {
   report::FaultTexts texts_;
   monitor::WatchTable table_;
   std::string prefix_;
-  std::map<std::string, report::Json> vectors_;  // The last one of each valve.
-  std::map<std::string, report::Json> events_;
-  std::map<std::string, std::string> model_sets_;  // By hash.
   std::vector<report::Json> new_events_;
   std::set<std::string> expected_;
   std::map<std::string, Published> published_;  // By topic.

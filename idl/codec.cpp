@@ -10,6 +10,7 @@
 #include "base/field_list.h"
 #include "base/printable.h"
 #include "diagnosis/model/fault_catalogue.h"
+#include "diagnosis/model/severity.h"
 
 // Maps records to messages of fdi_v1.idl and fdi_v2.idl and back:
 //
@@ -224,10 +225,10 @@ concept Is = std::same_as<std::remove_const_t<Given>, T>;
 
 template <typename Message>
 void KeyFields(auto& t, Message& m, auto& w) {
-  if constexpr (requires { m.monitor; }) {
-    t.Id("monitor", m.monitor, w.monitor());
-  } else if constexpr (requires { m.valve_id; }) {
+  if constexpr (requires { m.valve_id; }) {
     t.Id("valve_id", m.valve_id, w.valve_id());
+  } else if constexpr (requires { m.monitor; }) {
+    t.Id("monitor", m.monitor, w.monitor());
   } else {
     t.Id("model_set", m.model_set, w.model_set());
     FDI_FIELD(model_hash)
@@ -320,6 +321,26 @@ void Fields(auto& t, Is<FaultEvent> auto& m, auto& w) {
   t.List("candidates", m.candidates, w.candidates(), kMaxFaults);
 }
 
+// Readers look the names of faults up in a catalogue.
+bool AreFaults(const std::string& names) {
+  bool known = true;
+  for (std::size_t from = 0; known && from < names.size();) {
+    const std::size_t end = std::min(names.find('|', from), names.size());
+    const std::string name = names.substr(from, end - from);
+    known = name == "unknown" || ParseFinding(name);
+    from = end + 1;
+  }
+  return known;
+}
+
+void Fields(auto& t, Is<ValveStateMessage> auto& m, auto& w) {
+  FDI_FOR_EACH(FDI_FIELD, monitor, as_of_ns, quality, state, partly,
+               unconfirmed_ns, episode_id, fault, look_alikes, certainty, layer,
+               strength, since_ns, model_set)
+  t.Ranged("priority", m.priority, w.priority(), 0, kSeverityCount);
+  t.Require("fault", AreFaults(m.fault) && AreFaults(m.look_alikes));
+}
+
 void Fields(auto& t, Is<ChannelSpec> auto& m, auto& w) {
   t("channels.name", m.name, w.name());
   t("channels.output", m.output, w.output());
@@ -397,6 +418,7 @@ template struct Codec<ValveSampleMessage, 2>;
 template struct Codec<DecisionMessage>;
 template struct Codec<DecisionBatchMessage>;
 template struct Codec<FaultEvent>;
+template struct Codec<ValveStateMessage>;
 template struct Codec<ModelSetInfoMessage>;
 template struct Codec<MonitorStatusMessage>;
 template struct Codec<MonitorShare>;

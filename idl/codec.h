@@ -42,6 +42,7 @@ FDI_TOPIC(ValveSampleMessage, ValveSample, 2)
 FDI_TOPIC(DecisionMessage, DecisionVector, 1)
 FDI_TOPIC(DecisionBatchMessage, DecisionBatch, 1)
 FDI_TOPIC(FaultEvent, FaultEvent, 1)
+FDI_TOPIC(ValveStateMessage, ValveState, 1)
 FDI_TOPIC(ModelSetInfoMessage, ModelSetInfo, 1)
 FDI_TOPIC(MonitorStatusMessage, MonitorStatus, 1)
 FDI_TOPIC(MonitorShare, MonitorShare, 1)
@@ -66,10 +67,10 @@ struct Codec : TopicOf<Message, kVersion> {
 /// References to the key members of `message`.
 template <typename Message>
 auto KeyOf(Message& message) {
-  if constexpr (requires { message.monitor; }) {
-    return std::tie(message.monitor);
-  } else if constexpr (requires { message.valve_id; }) {
+  if constexpr (requires { message.valve_id; }) {
     return std::tie(message.valve_id);
+  } else if constexpr (requires { message.monitor; }) {
+    return std::tie(message.monitor);
   } else {
     return std::tie(message.model_set, message.model_hash);
   }

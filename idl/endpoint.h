@@ -54,7 +54,7 @@ struct PublisherStatus {
 /// does not permit it, they go out on version 1 without PV, which is logged
 /// once. Readers count once.
 ///
-/// Message is one of the seven of wire.h; no others are instantiated.
+/// Message is one of the eight of wire.h; no others are instantiated.
 template <typename Message>
 class Publisher {
  public:
@@ -197,6 +197,7 @@ extern template class Publisher<ValveSampleMessage>;
 extern template class Publisher<DecisionMessage>;
 extern template class Publisher<DecisionBatchMessage>;
 extern template class Publisher<FaultEvent>;
+extern template class Publisher<ValveStateMessage>;
 extern template class Publisher<ModelSetInfoMessage>;
 extern template class Publisher<MonitorStatusMessage>;
 extern template class Publisher<MonitorShare>;
@@ -204,6 +205,7 @@ extern template class Subscriber<ValveSampleMessage>;
 extern template class Subscriber<DecisionMessage>;
 extern template class Subscriber<DecisionBatchMessage>;
 extern template class Subscriber<FaultEvent>;
+extern template class Subscriber<ValveStateMessage>;
 extern template class Subscriber<ModelSetInfoMessage>;
 extern template class Subscriber<MonitorStatusMessage>;
 extern template class Subscriber<MonitorShare>;

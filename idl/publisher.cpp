@@ -492,6 +492,7 @@ template class Publisher<ValveSampleMessage>;
 template class Publisher<DecisionMessage>;
 template class Publisher<DecisionBatchMessage>;
 template class Publisher<FaultEvent>;
+template class Publisher<ValveStateMessage>;
 template class Publisher<ModelSetInfoMessage>;
 template class Publisher<MonitorStatusMessage>;
 template class Publisher<MonitorShare>;

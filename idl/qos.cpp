@@ -231,6 +231,15 @@ EndpointQos QosFor<FaultEvent>(Profile /*profile*/, int valves) {
   return qos;
 }
 
+// Only the newest state of a valve counts, for whoever comes whenever.
+template <>
+EndpointQos QosFor<ValveStateMessage>(Profile /*profile*/, int valves) {
+  EndpointQos qos = Common("fdi_valve_state");
+  TransientLocal(qos);
+  SetKeepLast(qos, valves, 1, 1);
+  return qos;
+}
+
 template <>
 EndpointQos QosFor<ModelSetInfoMessage>(Profile /*profile*/, int /*valves*/) {
   EndpointQos qos = Common("fdi_model_set_info");
@@ -269,6 +278,7 @@ const std::set<std::string>& EndpointNames() {
                                            "fdi_decision_vector",
                                            "fdi_decision_batch",
                                            "fdi_fault_event",
+                                           "fdi_valve_state",
                                            "fdi_model_set_info",
                                            "fdi_monitor_status",
                                            "fdi_monitor_share"};

@@ -33,6 +33,8 @@ EndpointQos QosFor<DecisionBatchMessage>(Profile profile, int valves);
 template <>
 EndpointQos QosFor<FaultEvent>(Profile profile, int valves);
 template <>
+EndpointQos QosFor<ValveStateMessage>(Profile profile, int valves);
+template <>
 EndpointQos QosFor<ModelSetInfoMessage>(Profile profile, int valves);
 template <>
 EndpointQos QosFor<MonitorStatusMessage>(Profile profile, int valves);

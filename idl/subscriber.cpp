@@ -563,6 +563,7 @@ template class Subscriber<ValveSampleMessage>;
 template class Subscriber<DecisionMessage>;
 template class Subscriber<DecisionBatchMessage>;
 template class Subscriber<FaultEvent>;
+template class Subscriber<ValveStateMessage>;
 template class Subscriber<ModelSetInfoMessage>;
 template class Subscriber<MonitorStatusMessage>;
 template class Subscriber<MonitorShare>;

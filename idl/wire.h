@@ -106,6 +106,30 @@ struct MonitorStatusMessage {
   std::vector<std::pair<std::string, std::uint64_t>> counters;
 };
 
+/// Topic fdi/v1/ValveState, key valve_id: what is known of a valve now.
+struct ValveStateMessage {
+  std::string valve_id;
+  std::string monitor;       ///< Who says so; MonitorStatusMessage::monitor.
+  std::int64_t as_of_ns{0};  ///< Stamp of the newest sample; 0: none was seen.
+  Quality quality{Quality::kStale};
+  State state{State::kNormal};
+  bool partly{false};  ///< Some channel abstains.
+  /// Since when nothing confirms the state; 0: it is confirmed.
+  std::int64_t unconfirmed_ns{0};
+  std::string model_set;  ///< NAME@VERSION that judges it; empty: none.
+  /// The alarm that stands; 0: none, and what follows is empty.
+  std::uint64_t episode_id{0};
+  std::string fault;        ///< "f3|f6", "unknown"; empty: no name yet.
+  std::string look_alikes;  ///< "f18|f1"
+  std::string certainty;    ///< CertaintyName()
+  std::string layer;        ///< LayerName() of what named it.
+  int priority{0};          ///< PriorityOf() its severity.
+  double strength{0.0};     ///< Signed [-]; 0 before a name.
+  std::int64_t since_ns{0};
+
+  bool operator==(const ValveStateMessage&) const = default;
+};
+
 /// @throws DataError unless `id` has 1..64 bytes, all of printable UTF-8.
 void ValidateId(std::string_view id);
 

@@ -386,6 +386,8 @@ void Pipeline::OnStreamEnded(std::string_view valve_id, std::uint64_t writer) {
   if (valve == nullptr || !valve->monitor.EndStream(writer, journal_)) {
     return;
   }
+  // Its engine has no episode any more: the last verdict would say NORMAL.
+  decisions_.Remove(valve->monitor.id());
   Tell([&](ValveListener& each) {
     each.OnSilence(valve->monitor.id(), Silence::kEnded);
   });
@@ -567,8 +569,8 @@ void Pipeline::PublishLast() {
   for (const std::unique_ptr<Valve>& valve : valves_) {
     const ValveMonitor& monitor = valve->monitor;
     // A zero stamp: a model set was adopted after the last sample.
-    if (monitor.seen() && CountsAsTime(monitor.verdict()) &&
-        monitor.verdict().stamp_ns != 0) {
+    if (monitor.seen() && !monitor.closed() &&
+        CountsAsTime(monitor.verdict()) && monitor.verdict().stamp_ns != 0) {
       Guarded(counters_, log_, "last_decision", [&] {
         decisions_.PublishLast(monitor.id(), monitor.models(),
                                monitor.verdict());

@@ -159,6 +159,8 @@ struct ValveOutcome {
   SignalMask missing{0};
   double period_s{0.0};   ///< The time that the sample stands for.
   bool contested{false};  ///< See ValveMonitor::Contested().
+  bool found_normal{
+      false};  ///< With this sample, as EpisodeOutlet::OnNormal().
 };
 
 /// Why a valve sends nothing.

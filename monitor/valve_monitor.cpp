@@ -141,7 +141,12 @@ ValveOutcome ValveMonitor::Step(const Sample& sample, std::uint64_t writer,
   tracker_.Take(decision_->TakeStrengths(), outlet);
   ConfirmNormal(verdict, outlet);
   const auto missing = static_cast<SignalMask>(required_ & ~sample.present);
-  return {verdict, models_.get(), swapped, missing, period_s()};
+  return {.verdict = verdict,
+          .models = models_.get(),
+          .model_swapped = swapped,
+          .missing = missing,
+          .period_s = period_s(),
+          .found_normal = std::exchange(found_normal_, false)};
 }
 
 // A superseded publisher that goes on sending must neither end the stream of
@@ -163,6 +168,7 @@ void ValveMonitor::Hear(Intake intake, std::uint64_t writer,
   stale_counted_ = received;
   stale_ = false;
   ended_ = false;
+  closed_ = false;
 }
 
 bool ValveMonitor::Contested(TimePoint now) const {
@@ -195,7 +201,11 @@ ValveOutcome ValveMonitor::StepLoop(const Sample& sample, bool superseded,
     tracker_.Advance(sample, verdict, *models_, outlet);
   }
   TellOfLoop(sample, outlet);
-  return {verdict, models_.get(), swapped, 0, period_s()};
+  return {.verdict = verdict,
+          .models = models_.get(),
+          .model_swapped = swapped,
+          .period_s = period_s(),
+          .found_normal = std::exchange(found_normal_, false)};
 }
 
 // The loop of a valve with a model set is followed while the observers find
@@ -228,6 +238,7 @@ void ValveMonitor::TellOfLoop(const Sample& sample, EpisodeOutlet& outlet) {
   }
   if (watch.found_normal() && tracker_.recovering() == nullptr) {
     normal_by_audit_ = false;
+    found_normal_ = true;
     outlet.OnNormal(id_, verdict.stamp_ns);
   }
 }
@@ -257,6 +268,7 @@ void ValveMonitor::ConfirmNormal(const Verdict& verdict,
              verdict.quality == Quality::kLive &&
              normal_samples_ < models_->decision.clearing_samples &&
              ++normal_samples_ == models_->decision.clearing_samples) {
+    found_normal_ = true;
     outlet.OnNormal(id_, verdict.stamp_ns);
   }
 }
@@ -384,6 +396,7 @@ void ValveMonitor::ExpireRecovery(std::int64_t now_ns, EpisodeOutlet& outlet) {
 }
 
 void ValveMonitor::Close(EndReason reason, EpisodeOutlet& outlet) {
+  closed_ = true;
   normal_samples_ = 0;
   CloseAudit(reason, outlet);
   if (const auto closed = decision_ ? decision_->End(reason) : std::nullopt) {

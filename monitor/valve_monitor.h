@@ -114,6 +114,9 @@ class ValveMonitor {
   }
   bool stale() const { return stale_; }
   bool ended() const { return ended_; }
+  /// Its episode, if it had one, was closed for want of samples, and no sample
+  /// has come since: verdict() is that of no sample.
+  bool closed() const { return closed_; }
   /// Two publishers share the id: of the one that the newest source superseded
   /// samples still come. Only those of the newest are judged.
   bool Contested(TimePoint now) const;
@@ -165,6 +168,7 @@ class ValveMonitor {
   // Normal samples since nothing was open here, up to what a valve needs to be
   // normal again.
   int normal_samples_{0};
+  bool found_normal_{false};     // By the sample at hand.
   bool normal_by_audit_{false};  // Its last episode is not confirmed yet.
   // Without a model set: the period of the samples, and the last interval.
   std::int64_t unassigned_period_ns_{1'000'000'000};
@@ -176,6 +180,7 @@ class ValveMonitor {
   bool seen_{false};
   bool stale_{false};
   bool ended_{false};
+  bool closed_{false};
   std::uint64_t writer_{0};
   TimePoint received_;
   TimePoint stale_counted_;  // Silence is counted up to here.

@@ -23,7 +23,8 @@ BusView::BusView(const BusOptions& options, const report::Context& context,
                    std::move(log), options.program),
       models_(participant_),
       events_(participant_),
-      status_(participant_) {
+      status_(participant_),
+      states_(participant_) {
   if (options.vectors == Vectors::kLive) {
     decisions_.emplace(participant_);
   } else if (options.vectors == Vectors::kAll) {
@@ -36,6 +37,7 @@ std::uint64_t BusView::lost() const {
     return status.lost + status.undecodable + status.rejected_instances;
   };
   return lost(events_.status()) + lost(status_.status()) +
+         lost(states_.status()) +
          (decisions_ ? lost(decisions_->status()) : 0) +
          (batches_ ? lost(batches_->status()) : 0);
 }

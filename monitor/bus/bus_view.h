@@ -36,12 +36,12 @@ class BusView {
           LogSink log);
 
   /// Calls `on_message` with each received message and its Reception, model
-  /// sets first because they explain the decision vectors, and `on_ended` with
-  /// the id of each valve whose monitor disposed of it. Blocks briefly if
-  /// nothing has arrived. @throws PassingError as
+  /// sets first because they explain the decision vectors, and `on_gone` with
+  /// the id of each valve that gave up its place at its monitor. Blocks briefly
+  /// if nothing has arrived. @throws PassingError as
   /// idl::Participant::RequireInterfaces()
-  template <typename OnMessage, typename OnEnded>
-  void Take(OnMessage on_message, OnEnded on_ended) {
+  template <typename OnMessage, typename OnGone>
+  void Take(OnMessage on_message, OnGone on_gone) {
     constexpr std::chrono::milliseconds kNow{0};
     constexpr std::chrono::milliseconds kMoment{50};
     const auto matching = [&](const auto& message, const auto& reception) {
@@ -53,11 +53,11 @@ class BusView {
     models_.Take({on_message, {}}, kNow);
     events_.Take({matching, {}}, decisions_ || batches_ ? kNow : kMoment);
     status_.Take({on_message, {}}, kNow);
+    states_.Take({matching, [&](const auto& message,
+                                const auto&) { on_gone(message.valve_id); }},
+                 kNow);
     if (decisions_) {
-      decisions_->Take(
-          {matching, [&](const auto& message,
-                         const auto&) { on_ended(message.valve_id); }},
-          kMoment, 1000);
+      decisions_->Take({matching, {}}, kMoment, 1000);
     }
     if (batches_) {
       batches_->Take(idl::ForEachVector(matching), kMoment, 10);
@@ -75,6 +75,7 @@ class BusView {
   idl::Subscriber<idl::ModelSetInfoMessage> models_;
   idl::Subscriber<FaultEvent> events_;
   idl::Subscriber<idl::MonitorStatusMessage> status_;
+  idl::Subscriber<idl::ValveStateMessage> states_;
   std::optional<idl::Subscriber<idl::DecisionMessage>> decisions_;
   std::optional<idl::Subscriber<idl::DecisionBatchMessage>> batches_;
 };

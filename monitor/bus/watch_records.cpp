@@ -1,11 +1,14 @@
 #include "monitor/bus/watch_records.h"
 
 #include <algorithm>
+#include <optional>
+#include <sstream>
 
 #include "base/text.h"
 #include "base/time_text.h"
 #include "diagnosis/decision/certainty.h"
 #include "diagnosis/model/fault_catalogue.h"
+#include "diagnosis/model/severity.h"
 #include "diagnosis/model/shown_state.h"
 #include "report/text_table.h"
 #include "storage/history/episode.h"
@@ -202,6 +205,54 @@ void WatchRecords::Add(const idl::MonitorStatusMessage& message,
           {"health", health},
           {"text", message.text},
           {"counters", std::move(counters)}},
+         line});
+}
+
+void WatchRecords::Add(const idl::ValveStateMessage& message,
+                       Clock::time_point /*now*/) {
+  const auto text = [](const std::string& value) {
+    return value.empty() ? Json() : Json(value);
+  };
+  const auto utc = [](std::int64_t stamp_ns) {
+    return stamp_ns == 0 ? Json() : Json(Utc(stamp_ns));
+  };
+  const bool named = !message.fault.empty() && message.fault != "unknown";
+  const std::optional<Severity> severity = SeverityOf(message.priority);
+  const std::string state(
+      ShownState(message.state, message.quality, message.partly));
+  Json look_alikes = Json::array();
+  std::istringstream others(message.look_alikes);
+  for (std::string other; std::getline(others, other, '|');) {
+    look_alikes.push_back(other);
+  }
+  std::string line =
+      Start(message.as_of_ns, message.valve_id) + " STATE " +
+      (message.unconfirmed_ns == 0
+           ? state
+           : "not confirmed since " + FormatTime(message.unconfirmed_ns, utc_));
+  if (message.episode_id != 0) {
+    line += " " + message.certainty + " " + message.fault +
+            (named ? " strength=" + FormatNumber(message.strength, 2) : "") +
+            " episode=" + Hex(message.episode_id);
+  }
+  sink_({{{"topic", "ValveState"},
+          {"valve_id", message.valve_id},
+          {"monitor", message.monitor},
+          {"as_of_utc", utc(message.as_of_ns)},
+          {"quality", QualityName(message.quality)},
+          {"state", message.unconfirmed_ns == 0 ? state : "NOT_CONFIRMED"},
+          {"unconfirmed_utc", utc(message.unconfirmed_ns)},
+          {"episode_id",
+           message.episode_id == 0 ? Json() : Json(Hex(message.episode_id))},
+          {"fault", text(message.fault)},
+          {"look_alikes", std::move(look_alikes)},
+          {"certainty", text(message.certainty)},
+          {"layer", text(message.layer)},
+          {"severity", severity ? Json(SeverityName(*severity)) : Json()},
+          {"priority", severity ? Json(message.priority) : Json()},
+          {"strength", named ? Json(message.strength) : Json()},
+          {"since_utc", utc(message.since_ns)},
+          {"model_set", text(message.model_set)}},
          line});
 }
 

@@ -37,6 +37,7 @@ class WatchRecords {
   void Add(const idl::DecisionMessage& message, Clock::time_point now);
   void Add(const FaultEvent& message, Clock::time_point now);
   void Add(const idl::MonitorStatusMessage& message, Clock::time_point now);
+  void Add(const idl::ValveStateMessage& message, Clock::time_point now);
   void Add(const idl::ModelSetInfoMessage& message, Clock::time_point now);
 
   /// Emits the waiting vectors that are due.

@@ -1,7 +1,6 @@
 #include "monitor/bus/watch_table.h"
 
 #include <algorithm>
-#include <limits>
 #include <sstream>
 #include <tuple>
 #include <utility>
@@ -21,26 +20,8 @@ using report::Tone;
 
 // A monitor sends its status each second, and counts as dead after 5 s.
 constexpr std::chrono::seconds kMonitorSilence{5};
-// A valve counts as silent after three periods, as in the monitor. Vectors of a
-// fast one may be late by the load of the machines.
-constexpr double kSilentPeriods = 3.0;
-constexpr double kLeastSilenceS = 10.0;
-
 std::int64_t NsOf(const Json& record, const char* key) {
   return ParseTime(record[key].get<std::string>(), true);
-}
-
-// Reasons for which an alarm ends without anybody knowing whether the fault is
-// gone: its data ended, or the monitor did.
-bool EndedWithItsData(const Json& event) {
-  const Json& reason = event["reason"];
-  return event["transition"] == "CLOSED" &&
-         (reason == "stream_ended" || reason == "stale_timeout" ||
-          reason == "unknown");
-}
-
-bool IsOpen(const Json& event) {
-  return !event.is_null() && event["transition"] != "CLOSED";
 }
 
 // Smaller is worse: named alarm, other alarm, not known, not judged, normal.
@@ -79,103 +60,30 @@ void WatchTable::Add(const Json& record, Clock::time_point now) {
     monitors_[record["monitor"]] = {
         record["health"].get<std::string>() + (text.empty() ? "" : ": " + text),
         now};
-  } else if (topic == "ModelSetInfo") {
-    periods_s_[record["model_hash"]] = record["sample_period_s"];
-  } else if (topic == "FaultEvent") {
-    Valve& valve = valves_[record["valve_id"]];
-    valve.event = record;
-    if (EndedWithItsData(record)) {
-      valve.goes_on = false;
-      valve.ended_ns = NsOf(record, "stamp_utc");
-    }
-  } else if (topic == "DecisionVector") {
-    Valve& valve = valves_[record["valve_id"]];
-    const std::int64_t stamp_ns = NsOf(record, "stamp_utc");
-    // Another source may have other times, as a replay has.
-    valve.goes_on =
-        !valve.vector.is_null() &&
-        (valve.goes_on || stamp_ns > std::max(valve.stamp_ns, valve.ended_ns) ||
-         record["source_id"] != valve.vector["source_id"]);
-    valve.stamp_ns = stamp_ns;
-    valve.vector = record;
-    valve.at = now;
+  } else if (topic == "ValveState") {
+    states_[record["valve_id"]] = record;
   }
 }
 
-void WatchTable::Remove(const std::string& valve_id) {
-  const auto found = valves_.find(valve_id);
-  if (found == valves_.end()) {
-    return;
-  }
-  if (InAlarm(found->second)) {
-    found->second.vector = Json();
-    found->second.goes_on = false;
-  } else {
-    valves_.erase(found);
-  }
+bool WatchTable::IsHeard(const Json& monitor, Clock::time_point now) const {
+  const auto found = monitors_.find(monitor.get<std::string>());
+  return found != monitors_.end() && now - found->second.at <= kMonitorSilence;
 }
 
-// An alarm that ended with its data lasts until the valve goes on.
-bool WatchTable::InAlarm(const Valve& valve) {
-  return IsOpen(valve.event) ||
-         (!valve.event.is_null() && EndedWithItsData(valve.event) &&
-          !valve.goes_on);
-}
-
-bool WatchTable::IsConfirmed(const Valve& valve, Clock::time_point now) const {
-  if (!valve.goes_on) {
-    return false;
-  }
-  const auto period = periods_s_.find(valve.vector["model_hash"]);
-  const double patience_s =
-      period == periods_s_.end()
-          ? kLeastSilenceS
-          : std::max(kLeastSilenceS, kSilentPeriods * period->second);
-  return now - valve.at <= std::chrono::duration<double>(patience_s);
-}
-
-// Events know the name of an episode, the layers that a vector does not have,
-// and episodes of the audit beside a model set that finds nothing. A vector may
-// be ahead of its event.
-Json WatchTable::RowOf(const std::string& valve_id, const Valve& valve,
-                       Clock::time_point now) const {
-  const bool known = !valve.vector.is_null();
-  Json row{{"valve_id", valve_id},
-           {"state", known ? valve.vector["state"] : Json("NOT_CONFIRMED")},
-           {"quality", known ? valve.vector["quality"] : Json()},
-           {"fault", Json()},
-           {"name", Json()},
-           {"certainty", known ? valve.vector["certainty"] : Json()},
-           {"look_alikes", known ? valve.vector["look_alikes"] : Json::array()},
-           {"strength", Json()},
-           {"since_utc", Json()},
-           {"unconfirmed_utc", Json()}};
-  if (InAlarm(valve)) {
-    const bool named = valve.event["fault"] != "unknown";
-    if (row["state"] != "DETECTED" && row["state"] != "ISOLATED") {
-      row["state"] = named ? "ISOLATED" : "DETECTED";
-    }
-    row["certainty"] = valve.event["certainty"];
-    row["look_alikes"] = valve.event["look_alikes"];
-    row["strength"] = valve.event["strength"];
-    row["since_utc"] = valve.event["detected_utc"];
-    if (named || row["certainty"] == "not known") {
-      row["fault"] = valve.event["fault"];
-    }
-  } else if (known && !valve.vector["isolated"].empty()) {
-    row["fault"] =
-        JoinText(valve.vector["isolated"], "|",
-                 [](const Json& fault) { return fault.get<std::string>(); });
-  }
-  if (row["fault"].is_string()) {
-    const double strength =
-        row["strength"].is_null() ? 0.0 : row["strength"].get<double>();
-    row["name"] = texts_.Words(row["fault"].get<std::string>(), strength).name;
-  }
-  if (!IsConfirmed(valve, now)) {
+Json WatchTable::RowOf(const Json& state, Clock::time_point now) const {
+  Json row = state;
+  row.erase("topic");
+  row["name"] = row["fault"].is_null()
+                    ? Json()
+                    : Json(texts_
+                               .Words(row["fault"].get<std::string>(),
+                                      row["strength"].is_null()
+                                          ? 0.0
+                                          : row["strength"].get<double>())
+                               .name);
+  if (row["unconfirmed_utc"].is_null() && !IsHeard(row["monitor"], now)) {
     row["state"] = "NOT_CONFIRMED";
-    row["unconfirmed_utc"] =
-        known ? valve.vector["stamp_utc"] : valve.event["stamp_utc"];
+    row["unconfirmed_utc"] = row["as_of_utc"];
   }
   return row;
 }
@@ -193,11 +101,9 @@ std::string WatchTable::Health(Clock::time_point now) const {
 report::Report WatchTable::Valves(std::int64_t now_ns,
                                   Clock::time_point now) const {
   std::vector<std::pair<std::tuple<int, std::string>, Json>> rows;
-  for (const auto& [valve_id, valve] : valves_) {
-    if (!valve.vector.is_null() || InAlarm(valve)) {
-      Json row = RowOf(valve_id, valve, now);
-      rows.emplace_back(std::tuple(Rank(row), valve_id), std::move(row));
-    }
+  for (const auto& [valve_id, state] : states_) {
+    Json row = RowOf(state, now);
+    rows.emplace_back(std::tuple(Rank(row), valve_id), std::move(row));
   }
   std::ranges::sort(rows, {}, [](const auto& row) { return row.first; });
   const std::string health = Health(now);

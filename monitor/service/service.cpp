@@ -146,6 +146,8 @@ Service::Service(const ServiceOptions& options, const report::Context& context)
                  options.lossless_decisions ? MonitorName() : std::string(),
                  publication_stop_.get_token()),
       events_(participant_, context.log),
+      states_(participant_, MonitorName(),
+              report::LoadFaultTexts(context.options)),
       status_topic_(participant_),
       samples_(
           intake_participant_,
@@ -183,6 +185,7 @@ Service::~Service() = default;
 
 // Who follows the valves, in this order.
 void Service::AttachListeners() {
+  pipeline_.Attach(states_);
   pipeline_.Attach(std::make_unique<HealthBooks>(counters_));
   pipeline_.Attach(std::make_unique<ClockWatch>(NowNs, context_.log));
   for (const auto& part : options_.parts) {
@@ -203,6 +206,9 @@ void Service::ListAfterCommit() {
                         part->OnCommitted(event, stored);
                       });
   }
+  after_commit_.Add("states", [this](const FaultEvent& event, bool /*stored*/) {
+    states_.OnEvent(event);
+  });
   after_commit_.Add(events_);
   if (hook_) {
     after_commit_.Add(
@@ -278,6 +284,7 @@ void Service::Start() {
   }
   StartParts();
   ResendEvents();
+  RecoverAlarms();
   if (recorder_) {
     recorder_->Start();
   }
@@ -295,6 +302,18 @@ void Service::ResendEvents() {
     counters_.Add(sent ? Counter::kEventsResent : Counter::kEventsUnsent);
     if (sent) {
       pipeline_.MarkPublished(event);
+    }
+  }
+}
+
+// The state of a valve whose alarm an earlier session left active, whether it
+// sends or not.
+void Service::RecoverAlarms() {
+  storage::HistoryReader reader(data_.history());
+  for (const storage::Alarm& alarm :
+       reader.AlarmList(NowNs(), options_.pipeline.max_valves)) {
+    if (alarm.state != storage::AlarmState::kReturnedUnacked) {
+      states_.Recover(alarm.episode);
     }
   }
 }

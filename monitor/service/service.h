@@ -14,6 +14,7 @@
 #include "idl/endpoint.h"
 #include "monitor/after_commit.h"
 #include "monitor/bus/bus_sinks.h"
+#include "monitor/bus/bus_valve_states.h"
 #include "monitor/bus/share_watch.h"
 #include "monitor/heartbeat.h"
 #include "monitor/http/http_server.h"
@@ -88,6 +89,7 @@ class Service {
 
   void Start();
   void ResendEvents();
+  void RecoverAlarms();
   void StartParts();
   void TellAssignedValves();
   void ServeProbes();
@@ -131,6 +133,7 @@ class Service {
   std::stop_source publication_stop_;  // Ends waits for slow subscribers.
   BusDecisionSink decisions_;
   BusEventSink events_;
+  BusValveStates states_;
   idl::Publisher<idl::MonitorStatusMessage> status_topic_;
   idl::Subscriber<idl::ValveSampleMessage> samples_;
   Counters counters_;

@@ -37,6 +37,7 @@ struct WatchOptions {
 struct WatchCounts {
   std::uint64_t decisions{0};
   std::uint64_t events{0};
+  std::uint64_t states{0};
   std::uint64_t status{0};
   std::uint64_t models{0};
   std::set<std::string> valves;
@@ -46,6 +47,7 @@ struct WatchCounts {
     valves.insert(message.valve_id);
   }
   void Add(const FaultEvent& /*message*/) { ++events; }
+  void Add(const idl::ValveStateMessage& /*message*/) { ++states; }
   void Add(const idl::MonitorStatusMessage& /*message*/) { ++status; }
   void Add(const idl::ModelSetInfoMessage& /*message*/) { ++models; }
 };
@@ -59,10 +61,13 @@ bool Passed(Clock::time_point since, double seconds) {
 }
 
 void PrintCounts(const WatchCounts& counts, std::uint64_t lost, bool json) {
-  const report::Json object{
-      {"decision_vectors", counts.decisions}, {"fault_events", counts.events},
-      {"valves", counts.valves.size()},       {"monitor_status", counts.status},
-      {"model_sets", counts.models},          {"lost", lost}};
+  const report::Json object{{"decision_vectors", counts.decisions},
+                            {"fault_events", counts.events},
+                            {"valves", counts.valves.size()},
+                            {"valve_states", counts.states},
+                            {"monitor_status", counts.status},
+                            {"model_sets", counts.models},
+                            {"lost", lost}};
   if (json) {
     std::cout << report::JsonText(object, 2) << '\n';
     return;
@@ -120,7 +125,7 @@ bool IsInPlace(const WatchOptions& options, bool json) {
 
 int RunWatch(const WatchOptions& given, const report::Context& context) {
   WatchOptions options = given;
-  if (options.events_only) {
+  if (options.events_only || (options.table && options.expect == 0)) {
     options.bus.vectors = Vectors::kNone;
   } else if (options.lossless) {
     options.bus.vectors = Vectors::kAll;
@@ -189,7 +194,8 @@ int RunWatch(const WatchOptions& given, const report::Context& context) {
 void AddWatchVerb(report::Program& program) {
   auto [watch, options] = AddVerb(
       program, "watch",
-      "Print what monitors publish: decision vectors, fault events", RunWatch);
+      "Print what monitors publish: decision vectors, fault events, states",
+      RunWatch);
   CLI::Option* const totals =
       watch.add_flag("--totals", options.totals,
                      "Print only how many messages came, at the end");

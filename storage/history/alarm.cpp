@@ -6,6 +6,7 @@
 
 #include "base/stamps.h"
 #include "base/time_units.h"
+#include "diagnosis/decision/certainty.h"
 #include "storage/database/record.h"
 #include "storage/history/sql.h"
 
@@ -190,6 +191,46 @@ AlarmState AlarmStateOf(const Episode& episode, bool shelved) {
                           episode.end_reason == "unknown");
   return AlarmStateOf(active, episode.acked_by.has_value() || no_return,
                       shelved);
+}
+
+bool LeavesUnconfirmed(EndReason reason) {
+  return reason == EndReason::kStreamEnded ||
+         reason == EndReason::kStaleTimeout || reason == EndReason::kUnknown;
+}
+
+Alarm AlarmOf(const FaultEvent& event) {
+  Alarm alarm;
+  Episode& e = alarm.episode;
+  const Transition& transition = event.transition;
+  e.id = event.episode_id;
+  e.episode_id = EpisodeIdText(event.episode_id);
+  e.valve_id = event.valve_id;
+  e.detected_ns = transition.detection_stamp_ns;
+  e.peak_factor = transition.factor;
+  e.strength = transition.strength;
+  e.priority = PriorityOf(transition.severity);
+  e.model_set = event.model_set + "@" + std::to_string(event.model_version);
+  if (event.models) {
+    e.known = KnownFaults(event.models->faults, event.models->observers);
+  }
+  if (const std::string faults = IsolatedFaults(event); !faults.empty()) {
+    e.fault = faults;
+    e.layer = LayerName(transition.layer);
+    e.isolated_ns = transition.stamp_ns;
+  } else if (fdi::CertaintyOf(event) == Certainty::kNotKnown) {
+    e.unknown_kind = UnknownName(Unknown::kOutsideKnown);
+  }
+  if (transition.kind == TransitionKind::kCleared) {
+    e.cleared_ns = transition.stamp_ns;
+  } else if (transition.kind == TransitionKind::kClosed) {
+    e.ended_ns = transition.stamp_ns;
+    e.end_reason = EndReasonName(transition.reason);
+    if (LeavesUnconfirmed(transition.reason)) {
+      e.unconfirmed_ns = transition.stamp_ns;
+    }
+  }
+  alarm.state = AlarmStateOf(e);
+  return alarm;
 }
 
 std::vector<Alarm> AsAlarms(std::vector<Episode> episodes,

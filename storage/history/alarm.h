@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "diagnosis/model/severity.h"
+#include "diagnosis/records/fault_event.h"
 #include "diagnosis/records/fields.h"
 #include "storage/database/database.h"
 #include "storage/history/episode.h"
@@ -78,6 +79,14 @@ struct Alarm {
   /// The shelf in force now; of several, the one that lasts longest.
   std::optional<Shelf> shelf;
 };
+
+/// Whether an episode that ends so is not known to be over: only its data
+/// ended.
+bool LeavesUnconfirmed(EndReason reason);
+
+/// The alarm that `event` belongs to, made from the event alone because it is
+/// not, or not yet, in the history.
+Alarm AlarmOf(const FaultEvent& event);
 
 /// `episodes` in their order, with the matching `shelves` that are in force.
 std::vector<Alarm> AsAlarms(std::vector<Episode> episodes,

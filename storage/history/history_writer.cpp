@@ -38,12 +38,6 @@ double Finite(double value) {
   return std::isfinite(value) ? value : 0.0;
 }
 
-// Whether nothing says that the fault is gone: only the data ended.
-bool LeavesUnconfirmed(EndReason reason) {
-  return reason == EndReason::kStreamEnded ||
-         reason == EndReason::kStaleTimeout || reason == EndReason::kUnknown;
-}
-
 std::optional<Severity> ReadSeverity(const Statement& row, int column) {
   return row.IsNull(column) ? std::nullopt : SeverityOf(row.Int64(column));
 }

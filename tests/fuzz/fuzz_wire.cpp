@@ -30,7 +30,7 @@ extern "C" int LLVMFuzzerTestOneInput(const unsigned char* data,
   if (size < 5) {
     return 0;
   }
-  switch (data[0] % 8) {
+  switch (data[0] % 9) {
     case 0:
       Receive<fdi::idl::ValveSampleMessage>(data + 1, size - 1);
       break;
@@ -51,6 +51,9 @@ extern "C" int LLVMFuzzerTestOneInput(const unsigned char* data,
       break;
     case 6:
       Receive<fdi::MonitorShare>(data + 1, size - 1);
+      break;
+    case 7:
+      Receive<fdi::idl::ValveStateMessage>(data + 1, size - 1);
       break;
     default:
       Receive<fdi::idl::ValveSampleMessage, 2>(data + 1, size - 1);

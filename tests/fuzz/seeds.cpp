@@ -122,7 +122,7 @@ void WriteMessages() {
   WriteMessage(0, fdi::idl::ValveSampleMessage{"V1", PlantSample(7)});
   fdi::Sample with_pv = PlantSample(7);
   with_pv.Set(fdi::Signal::kPv, 3.2);
-  WriteMessage<2>(7, fdi::idl::ValveSampleMessage{"V1", with_pv});
+  WriteMessage<2>(8, fdi::idl::ValveSampleMessage{"V1", with_pv});
   fdi::idl::DecisionMessage decision;
   decision.valve_id = "V1";
   decision.channel_count = static_cast<int>(models.channels.size());
@@ -142,6 +142,11 @@ void WriteMessages() {
   WriteMessage(5,
                fdi::idl::DecisionBatchMessage{"host:1", {decision, decision}});
   WriteMessage(6, fdi::MonitorShare{"host:1", "FV-*", "hall-1"});
+  fdi::idl::ValveStateMessage state;
+  state.valve_id = "V1";
+  state.fault = "f3|f6";
+  state.certainty = "one of";
+  WriteMessage(7, state);
 }
 
 void WriteDatagrams() {

@@ -23,50 +23,36 @@ constexpr std::int64_t kSecond = 1'000'000'000;
 
 class ValveStatesTest : public ::testing::Test {
  protected:
-  ValveStatesTest() {
-    idl::ModelSetInfoMessage info;
-    info.model_set = "demo";
-    info.version = 2;
-    info.model_hash = 7;
-    info.faults = {1, 7, 19};
-    records_.Add(info, now_);
+  void Hear(std::int64_t second, Quality quality = Quality::kLive) {
+    idl::ValveStateMessage state;
+    state.valve_id = "FV/1";
+    state.monitor = "host:1";
+    state.model_set = "demo@2";
+    state.quality = quality;
+    state.as_of_ns = second * kSecond;
+    Hear(state);
   }
-  void Hear(std::int64_t second, State state = State::kNormal,
-            Quality quality = Quality::kLive) {
-    idl::DecisionMessage message;
-    message.valve_id = "FV/1";
-    message.model_hash = 7;
-    message.fault_count = 3;
-    message.verdict.quality = quality;
-    message.verdict.confidence = 1.0;
-    message.verdict.state = state;
-    message.verdict.stamp_ns = second * kSecond;
+  void Hear(const idl::ValveStateMessage& state) {
     now_ += seconds(1);
     HearMonitor();
-    records_.Add(message, now_);
+    records_.Add(state, now_);
   }
   void HearMonitor() {
     idl::MonitorStatusMessage status;
     status.monitor = "host:1";
     records_.Add(status, now_);
   }
-  void HearFault(TransitionKind kind, std::int64_t second,
-                 EndReason reason = EndReason::kNone) {
+  void HearFault(std::int64_t second) {
     FaultEvent event;
     event.valve_id = "FV/1";
     event.episode_id = 1;
-    event.model_set = "demo";
-    event.model_version = 2;
-    event.transition.kind = kind;
-    event.transition.reason = reason;
+    event.transition.kind = TransitionKind::kIsolated;
     event.transition.stamp_ns = second * kSecond;
-    event.transition.detection_stamp_ns = 40 * kSecond;
-    event.transition.strength = 0.25;
     event.candidates = {{19, 0.9, 0.25, true}};
     records_.Add(event, now_);
   }
   std::vector<Outgoing> Due() { return states_.Due(0, now_); }
-  Json State() {
+  Json StateTold() {
     states_.Forget();
     for (const Outgoing& message : Due()) {
       if (message.topic == "fdi/north/FV%2F1/state") {
@@ -88,7 +74,7 @@ class ValveStatesTest : public ::testing::Test {
 TEST_F(ValveStatesTest, NormalWhileAMonitorJudgesIt) {
   Hear(1);
   Hear(2);
-  const Json state = State();
+  const Json state = StateTold();
   EXPECT_EQ(state["health"], "NORMAL");
   EXPECT_TRUE(state["reason"].is_null());
   EXPECT_EQ(state["model_set"], "demo@2");
@@ -96,45 +82,52 @@ TEST_F(ValveStatesTest, NormalWhileAMonitorJudgesIt) {
 }
 
 TEST_F(ValveStatesTest, WithoutDataItIsNotNormal) {
-  Hear(1);
-  Hear(2);
-  for (int i = 0; i < 20; ++i) {
-    now_ += seconds(1);
-    HearMonitor();
-  }
-  EXPECT_EQ(State()["health"], "CHECK_FUNCTION");
-  EXPECT_THAT(State()["reason"], HasSubstr("no data since 1970-01-01"));
+  idl::ValveStateMessage silent;
+  silent.valve_id = "FV/1";
+  silent.monitor = "host:1";
+  silent.as_of_ns = silent.unconfirmed_ns = 2 * kSecond;
+  Hear(silent);
+  EXPECT_EQ(StateTold()["health"], "CHECK_FUNCTION");
+  EXPECT_THAT(StateTold()["reason"], HasSubstr("no data since 1970-01-01"));
   now_ += seconds(20);
-  EXPECT_EQ(State()["reason"], "no monitor is heard");
+  EXPECT_EQ(StateTold()["reason"], "no monitor is heard");
 }
 
 TEST_F(ValveStatesTest, WhatIsNotJudgedIsNotNormal) {
-  Hear(1);
-  Hear(2, State::kNormal, Quality::kBadInput);
-  EXPECT_EQ(State()["health"], "CHECK_FUNCTION");
-  EXPECT_EQ(State()["reason"], "readings are missing or impossible");
-  Hear(3, State::kNormal, Quality::kUnassigned);
-  EXPECT_THAT(State()["reason"], HasSubstr("no models"));
+  Hear(2, Quality::kBadInput);
+  EXPECT_EQ(StateTold()["health"], "CHECK_FUNCTION");
+  EXPECT_EQ(StateTold()["reason"], "readings are missing or impossible");
+  Hear(3, Quality::kUnassigned);
+  EXPECT_THAT(StateTold()["reason"], HasSubstr("no models"));
 }
 
 TEST_F(ValveStatesTest, AFaultHasItsClassAndWords) {
-  Hear(39);
-  Hear(40, State::kDetected);
-  HearFault(TransitionKind::kDetected, 40);
-  HearFault(TransitionKind::kIsolated, 43);
-  Hear(43, State::kDetected);
-  const Json state = State();
+  idl::ValveStateMessage ill;
+  ill.valve_id = "FV/1";
+  ill.monitor = "host:1";
+  ill.quality = Quality::kLive;
+  ill.state = State::kIsolated;
+  ill.as_of_ns = 43 * kSecond;
+  ill.episode_id = 1;
+  ill.fault = "f19";
+  ill.certainty = "sure";
+  ill.priority = 1;
+  ill.strength = 0.25;
+  ill.since_ns = 40 * kSecond;
+  Hear(ill);
+  const Json state = StateTold();
   EXPECT_EQ(state["fault"], "f19");
   EXPECT_EQ(state["health"], "FAILURE");
   EXPECT_EQ(state["name"], "Flow transmitter wrong");
   EXPECT_EQ(state["strength_pct"], 25.0);
   EXPECT_EQ(state["since_utc"], "1970-01-01T00:00:40Z");
   EXPECT_TRUE(state["check"].is_string());
-  EXPECT_TRUE(state["severity"].is_string());
+  EXPECT_EQ(state["severity"], "critical");
+  EXPECT_EQ(state["priority"], 1);
 }
 
 TEST_F(ValveStatesTest, AnEventGoesOutOnceWithAnId) {
-  HearFault(TransitionKind::kIsolated, 43);
+  HearFault(43);
   int events = 0;
   for (const Outgoing& message : Due()) {
     if (message.topic == "fdi/north/FV%2F1/event") {
@@ -163,7 +156,7 @@ TEST_F(ValveStatesTest, OnlyWhatChangesGoesOutAndAllOnceAMinute) {
 
 TEST_F(ValveStatesTest, AValveThatNobodyTellsOfAnyMore) {
   states_.Expect("FV/1");
-  const Json state = State();
+  const Json state = StateTold();
   EXPECT_EQ(state["health"], "CHECK_FUNCTION");
   EXPECT_THAT(state["reason"], HasSubstr("no monitor tells of it"));
 }
@@ -185,7 +178,7 @@ TEST_F(ValveStatesTest, ThePageExplainsEachKey) {
     }
   }
   std::set<std::string> told;
-  const Json state = State();
+  const Json state = StateTold();
   for (const auto& [key, value] : state.items()) {
     told.insert(key);
   }

@@ -327,6 +327,34 @@ TEST(CodecTest, MonitorShareArrivesWhole) {
   EXPECT_EQ(got.partitions, "hall-1,yard");
 }
 
+TEST(CodecTest, AValveStateArrivesWhole) {
+  ValveStateMessage sent;
+  sent.valve_id = "FV-1";
+  sent.monitor = "host:1";
+  sent.as_of_ns = 7;
+  sent.quality = Quality::kLive;
+  sent.state = State::kIsolated;
+  sent.partly = true;
+  sent.unconfirmed_ns = 6;
+  sent.model_set = "demo@2";
+  sent.episode_id = 0xc0ffee;
+  sent.fault = "f3|f6";
+  sent.look_alikes = "f18";
+  sent.certainty = "one of";
+  sent.layer = "physics";
+  sent.priority = 2;
+  sent.strength = -0.25;
+  sent.since_ns = 5;
+
+  EXPECT_EQ(RoundTrip(sent), sent);
+  for (const char* fault : {"", "unknown", "f19"}) {
+    sent.fault = fault;
+    EXPECT_EQ(RoundTrip(sent), sent);
+  }
+  sent.fault = "f99";
+  EXPECT_THROW(RoundTrip(sent), DataError);
+}
+
 TEST(CodecTest, ATooLongIdIsRefusedNotCut) {
   ValveSampleMessage message = SomeSample();
   message.valve_id += 'v';

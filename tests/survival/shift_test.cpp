@@ -1,6 +1,6 @@
-// A shift of twenty valves in fast time: list, page, SQL, PostgreSQL, hook and
-// metrics say the same of every alarm at ten moments; so do the work list, the
-// view of one episode and the dashboard.
+// A shift of twenty valves in fast time: list, page, bus, SQL, PostgreSQL, hook
+// and metrics say the same of every alarm at ten moments; so do the work list,
+// the view of one episode and the dashboard.
 #include <array>
 #include <chrono>
 #include <cmath>
@@ -18,8 +18,10 @@
 #include <httplib.h>
 #include <nlohmann/json.hpp>
 
+#include "diagnosis/model/severity.h"
 #include "plant/plant_database.h"
 #include "storage/database/data_directory.h"
+#include "storage/history/episode.h"
 #include "storage/history/history_database.h"
 #include "tests/storage/private_postgres.h"
 #include "tests/system/monitor_fixture.h"
@@ -367,6 +369,32 @@ class ShiftTest : public MonitorFixture {
     }
     return alarms;
   }
+  // What somebody hears who comes to the bus now. Its strengths are those of
+  // the last event.
+  Alarms FromBus() const {
+    idl::Participant here(participant_->options());
+    idl::Subscriber<idl::ValveStateMessage> states(here);
+    EXPECT_TRUE(states.WaitForWriters(1, kMonitorPatience));
+    std::map<std::string, idl::ValveStateMessage> heard;
+    while (states.Take({[&](const idl::ValveStateMessage& state, const auto&) {
+                          heard[state.valve_id] = state;
+                        },
+                        {}},
+                       std::chrono::milliseconds(500)) > 0) {
+    }
+    Alarms alarms;
+    for (const auto& [valve, state] : heard) {
+      if (state.episode_id != 0) {
+        alarms[storage::EpisodeIdText(state.episode_id)] = {
+            {"valve_id", valve},
+            {"fault", state.fault.empty() ? json() : json(state.fault)},
+            {"severity", SeverityName(*SeverityOf(state.priority))},
+            {"priority", state.priority},
+            {"unconfirmed", state.unconfirmed_ns != 0}};
+      }
+    }
+    return alarms;
+  }
   std::string Metric(const std::string& name, const char* priority) const {
     const auto page = httplib::Client("127.0.0.1", metrics_).Get("/metrics");
     std::smatch value;
@@ -404,6 +432,7 @@ class ShiftTest : public MonitorFixture {
                        Differences("history show", list, shown) +
                        WorkListDifferences(list) +
                        Differences("SQL", list, FromSql()) +
+                       Differences("bus", active, FromBus()) +
                        Differences("hook", announced, hook);
     if (server_ != nullptr) {
       text += Differences("PostgreSQL", list, FromPostgres());

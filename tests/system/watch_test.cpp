@@ -76,6 +76,60 @@ TEST_F(WatchSystemTest, AnAlarmWhoseStreamHasEndedIsNotNormal) {
   EXPECT_EQ(table["valves"][0]["fault"], "f7");
 }
 
+// No vector is left that would say NORMAL, and the state is not.
+TEST_F(WatchSystemTest, WhoComesLateHearsNoVectorOfAStreamThatHasEnded) {
+  samples_->Dispose({"V1", {}});
+  ASSERT_TRUE(AwaitEvent(TransitionKind::kClosed));
+  idl::Participant here(participant_->options());
+  idl::Subscriber<idl::ValveStateMessage> states(here);
+  idl::Subscriber<idl::DecisionMessage> vectors(here);
+  ASSERT_TRUE(vectors.WaitForWriters(1, kMonitorPatience));
+
+  std::vector<idl::ValveStateMessage> told;
+  ASSERT_TRUE(Await([&] {
+    states.Take(
+        {[&](const auto& state, const auto&) { told.push_back(state); }, {}},
+        std::chrono::milliseconds(10));
+    return !told.empty() && told.back().unconfirmed_ns != 0;
+  }));
+  EXPECT_EQ(told.back().fault, "f7");
+  EXPECT_GT(told.back().priority, 0);
+  int heard = 0;
+  vectors.Take({[&](const auto&, const auto&) { ++heard; }, {}},
+               std::chrono::seconds(1));
+  EXPECT_EQ(heard, 0);
+}
+
+// Its history is what the monitor knows after a crash.
+TEST_F(WatchSystemTest, AnAlarmOfBeforeARestartStandsUntilTheValveIsNormal) {
+  samples_->Dispose({"V1", {}});
+  ASSERT_TRUE(AwaitEvent(TransitionKind::kClosed));
+  monitor_->Signal(SIGKILL);
+  monitor_->AwaitExit();
+  monitor_ = StartMonitor();
+
+  auto table = LastTable();
+  ASSERT_EQ(table["valves"].size(), 1U);
+  EXPECT_EQ(table["valves"][0]["state"], "NOT_CONFIRMED");
+  EXPECT_EQ(table["valves"][0]["fault"], "f7");
+  EXPECT_EQ(table["valves"][0]["certainty"], "sure");
+
+  Publish(100, 200);
+  ASSERT_TRUE(AwaitVectors(160));
+  idl::Participant here(participant_->options());
+  idl::Subscriber<idl::ValveStateMessage> states(here);
+  EXPECT_TRUE(Await([&] {
+    bool normal = false;
+    states.Take({[&](const idl::ValveStateMessage& state, const auto&) {
+                   normal =
+                       state.episode_id == 0 && state.quality == Quality::kLive;
+                 },
+                 {}},
+                std::chrono::milliseconds(10));
+    return normal;
+  }));
+}
+
 TEST_F(WatchSystemTest, TheTableComesAgainUntilCtrlC) {
   std::vector<std::string> command = Watch();
   command.emplace_back("--table");
