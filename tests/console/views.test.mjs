@@ -325,6 +325,41 @@ test('what is judged in part only is said, with the reason', async () => {
   await close(page);
 });
 
+test('the page of a valve that nobody judges now does not call it normal',
+    async () => {
+      const hourMs = 3600000;
+      const since = {stamp_ms: kNowMs - hourMs};
+      const refused = {reason: 'range', signals: ['P1'], flow_unit: 'm3/h'};
+      monitor.reset([tile('ended', 'NOT_JUDGED', [], {...since, quality: 'ENDED'}),
+        tile('bar', 'NOT_JUDGED', [], {quality: 'BAD_INPUT', refused}),
+        tile('well', 'NORMAL')]);
+      for (const id of ['ended', 'bar', 'well']) {
+        monitor.answers[`valves/${id}/trend`] = {...trend({state: 'NORMAL',
+          d0: 1, d: [0, 0]}), words: 'as the normal model expects'};
+      }
+      const page = await openShared(browser, address, '#/valve/ended');
+      for (const width of [1400, 390]) {
+        await page.setViewportSize({width, height: 800});
+        for (const [id, words] of [['ended', /not confirmed since/],
+          ['bar', /not judged: bad input: P1 implausible/]]) {
+          await page.goto(`${address}/#/valve/${id}`);
+          await page.locator('.words', {hasText: words}).waitFor();
+          const live = page.locator('.live');
+          await live.getByText('Last residuals').waitFor();
+          assert.doesNotMatch(await live.innerText(),
+              /expects|\byes\b|within/i);
+        }
+        await page.goto(`${address}/#/valve/well`);
+        await page.locator('.words', {hasText: 'normal model expects'}).waitFor();
+        await page.getByText('Residuals now').waitFor();
+      }
+      // It falls silent while it is shown.
+      await monitor.push('tiles', {tiles: [tile('well', 'NOT_JUDGED', [],
+          {...since, quality: 'STALE'})]});
+      await page.locator('.words', {hasText: 'not confirmed since'}).waitFor();
+      await close(page);
+    });
+
 test('what ended before it had a name is not unlike any known fault',
     async () => {
       monitor.reset([], [alarm('0000000000000001', 'V', 'unknown',

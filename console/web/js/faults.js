@@ -173,6 +173,14 @@ export function qualityText(tile) {
       (why ? `: ${why}` : '');
 }
 
+/** Why nothing is known of a valve at this moment; empty if it is judged. */
+export function notJudgedText(tile) {
+  if (!tile || tile.quality === 'LIVE') return '';
+  return ['STALE', 'ENDED', 'MONITOR_SILENT'].includes(tile.quality) ?
+    `not confirmed since ${timeText(tile.stamp_ms)}` :
+    `not judged: ${qualityText(tile)}`;
+}
+
 const kMarkWords = {
   ISOLATED: 'named', REISOLATED: 'named anew', CHANGED: 'priority rose', SECOND: 'second fault', ACK: 'acknowledged',
   LABEL: 'labelled',

@@ -5,6 +5,7 @@
 import {getOptional, path} from '../api.js';
 import {PanelStack} from '../charts/panel.js';
 import {h} from '../dom.js';
+import {namurText} from '../faults.js';
 import {numberText, unitText} from '../format.js';
 import {dataTable} from './table.js';
 
@@ -87,8 +88,9 @@ export class HealthSection {
   #stack = new PanelStack();
   #gone = false;
 
-  constructor(valve) {
-    this.#load(valve);
+  /** @param away says why nobody judges the valve now, or nothing. */
+  constructor(valve, away) {
+    this.#load(valve, away);
   }
 
   destroy() {
@@ -96,7 +98,7 @@ export class HealthSection {
     this.#stack.destroy();
   }
 
-  async #load(valve) {
+  async #load(valve, away) {
     let health = null;
     try {
       health = await getOptional(path('valves', valve, 'health'));
@@ -106,7 +108,8 @@ export class HealthSection {
     if (health === null || health.t_ms.length === 0 || this.#gone) return;
     this.element.append(
         h('h2', {}, `Counts of the last ${health.step}`),
-        h('p', {}, `Status (NAMUR NE 107): ${health.status.at(-1)}`),
+        h('p', {}, 'Status (NAMUR NE 107): ' + (away() ?
+          `check function, ${away()}` : namurText(health.status.at(-1)))),
         dataTable('Counts', kCountColumns, countsOf(health)),
         h('h2', {}, 'Months'),
         dataTable('Trends to limits', kTrendColumns, health.trends));

@@ -5,7 +5,7 @@ import {Timeline} from '../charts/timeline.js';
 import {TrendData} from '../charts/trend_data.js';
 import {button, h, replace, setText} from '../dom.js';
 import {certaintyNode, factorTitle, faultName, faultOfTile, faultTitle, inAlarm,
-  isAlarm, members, moreText, openText, priorityNames, priorityOf, prioritySign,
+  isAlarm, members, moreText, notJudgedText, openText, priorityNames, priorityOf, prioritySign,
   qualityText, stateWord} from '../faults.js';
 import {durationText, numberText, percentText, strengthText,
   timeText, unitText} from '../format.js';
@@ -53,7 +53,8 @@ function stateLine(tile) {
   ];
 }
 
-function judged({residual, low, high}) {
+function judged({residual, low, high, away}) {
+  if (away) return 'not judged now';
   if (residual === null || residual === undefined) return 'abstains';
   return residual > high ? 'above' : residual < low ? 'below' : 'within';
 }
@@ -117,25 +118,27 @@ function explanations({faults, T}, state, d0, d, partly) {
     fits: row.d >= T ? 'yes' : 'not excluded', strong: row.d >= T}))];
 }
 
-/** Residuals against their thresholds, and what explains them. */
-function nowTables(data, partly) {
+/**
+ * Residuals against their thresholds, and what explains them.
+ * @param away Nobody judges the valve now: these are its last ones.
+ */
+function nowTables(data, partly, away) {
   const {channels, faults, windows} = data.meta;
   const last = (name) => data.columns[name].at(-1);
   // Behind a channel its windows that are beyond their limits: they raise the
   // alarms of slow and small faults.
   const residuals = channels.flatMap((channel, c) => [
-    {...channel, residual: last(`r${c}`)},
+    {...channel, away, residual: last(`r${c}`)},
     ...(windows ?? []).filter((window) => window.channel === channel.name)
         .map(({samples, of, value, low, high}) => ({...channel,
           over: `, ${of} over ${samples} samples`, residual: value, low,
           high}))]);
   return [
-    dataTable('Residuals now', kResidualColumns, residuals, {attributesOf:
-      (row) => ({class:
-        ['above', 'below'].includes(judged(row)) ? 'out' : ''})}),
+    dataTable(away ? 'Last residuals' : 'Residuals now', kResidualColumns,
+        residuals, {attributesOf: (row) => ({class:
+          ['above', 'below'].includes(judged(row)) ? 'out' : ''})}),
     dataTable('What explains the data now', kFitColumns,
-        explanations(data.meta, last('state') === 'NORMAL' &&
-            last('quality') !== 'LIVE' ? 'NOT_JUDGED' : last('state'), last('d0'),
+        explanations(data.meta, away ? 'NOT_JUDGED' : last('state'), last('d0'),
             faults.map((_, f) => last(`d${f + 1}`)), partly),
         {attributesOf: ({strong, quiet}) =>
           ({class: strong ? 'out' : quiet ? 'quiet' : ''})}),
@@ -164,7 +167,8 @@ class ValvePage extends View {
     super();
     this.id = id;
     this.title = id;
-    const health = new HealthSection(id);
+    const health = new HealthSection(id,
+        () => notJudgedText(store.tiles.get(id)));
     this.#timeline = new Timeline(this.#data, {
       live: true, nowMs: () => store.nowMs(), silentMs: () =>
         store.stream.connected ? 0 : Date.now() - store.stream.heardMs,
@@ -316,10 +320,14 @@ class ValvePage extends View {
   }
 
   #showNow() {
-    const partly = store.tiles.get(this.id)?.state === 'PARTLY_JUDGED';
-    setText(this.#words, unitText(this.#data.words) +
+    const tile = store.tiles.get(this.id);
+    const partly = tile?.state === 'PARTLY_JUDGED';
+    const away = notJudgedText(tile);
+    setText(this.#words, away || unitText(this.#data.words) +
       (partly && this.#data.words ? ', as far as it is judged' : ''));
-    if (this.#data.size > 0) replace(this.#now, nowTables(this.#data, partly));
+    if (this.#data.size > 0) {
+      replace(this.#now, nowTables(this.#data, partly, away !== ''));
+    }
   }
 
   #showState() {
@@ -328,8 +336,9 @@ class ValvePage extends View {
     setText(this.#scope, tile ? scopeText(tile, this.#about) : '');
     const row = tile?.episode ? store.alarms.get(tile.episode) : null;
     const key = JSON.stringify([row, tile?.faults, tile?.fault,
-      store.status?.write]);
+      tile?.quality, store.status?.write]);
     if (key === this.#shownState) return;
+    this.#showNow();
     this.#shownState = key;
     // Work can be planned on a healthy valve, too.
     replace(this.#actions, row ? actionButtons(row) :
