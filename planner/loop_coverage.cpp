@@ -163,4 +163,15 @@ std::vector<PlannedLoop> LoopsOf(const std::filesystem::path& models) {
   return loops;
 }
 
+std::vector<Repair> RepairsOf(const std::filesystem::path& models) {
+  std::vector<Repair> repairs;
+  if (std::filesystem::exists(models)) {
+    for (const auto& [valves, event] : storage::ModelStore(models).Repairs()) {
+      repairs.push_back({valves, event.at_ns, event.who,
+                         std::string(ValveEventKindName(event.kind))});
+    }
+  }
+  return repairs;
+}
+
 }  // namespace fdi::planner

@@ -50,11 +50,13 @@ Json RowJson(const WorkRow& row, std::size_t rank,
       {"grade_factor", findings::GradeFactor(f.grade)},
       {"certainty", f.certainty ? Json(CertaintyName(*f.certainty)) : Json()},
       {"confidence", SixDigits(f.confidence)},
+      {"layer", OrNull(f.layer)},
       {"score", SixDigits(f.score())},
       {"open", f.stands()},
       {"detected_utc", TimeOrNull(f.since_ns)},
       {"unconfirmed_utc", TimeOrNull(f.unconfirmed_ns)},
       {"ended_utc", TimeOrNull(f.ended_ns)},
+      {"done_utc", TimeOrNull(row.done_ns)},
       {"strength", f.strength ? SixDigits(*f.strength) : Json()},
       {"episodes", f.episodes},
       {"episode_id", OrNull(f.episode_id)},
@@ -128,6 +130,19 @@ Json SharedJson(const std::vector<storage::CommonCause>& causes,
                     {"faults", Json::array()},
                     {"since_utc", nullptr},
                     {"ended_utc", nullptr}});
+  }
+  return list;
+}
+
+Json DoneJson(const std::vector<DoneFinding>& done) {
+  Json list = Json::array();
+  for (const DoneFinding& each : done) {
+    list.push_back({{"valve_id", each.valve_id},
+                    {"fault", OrNull(each.fault)},
+                    {"name", each.name},
+                    {"done_utc", TimeOrNull(each.by.at_ns)},
+                    {"who", OrNull(each.by.who)},
+                    {"what", each.by.what}});
   }
   return list;
 }
@@ -227,7 +242,9 @@ Json WorkList(storage::History* history, const report::FaultTexts& texts,
     }
   }
   std::map<std::string, ValveLife> lives;
-  std::vector<WorkRow> rows = ReadRows(history, texts, query, facts, lives);
+  std::vector<DoneFinding> done;
+  std::vector<WorkRow> rows =
+      ReadRows(history, texts, query, facts, lives, done);
   MarkShared(causes, query.audits.periods, rows);
 
   const std::int64_t judged_since_ns =
@@ -253,6 +270,7 @@ Json WorkList(storage::History* history, const report::FaultTexts& texts,
                {"shared", SharedJson(causes, query.audits.periods)},
                {"unjudged", coverage.UnjudgedJson()},
                {"shelved", ShelvedJson(history, query.now_ns)},
+               {"done", DoneJson(done)},
                {"changes", nullptr},
                {"alarms", AlarmsJson(history, query, alarms)}};
   json["changes"] = ChangesJson(query.last, query.last_file, json);

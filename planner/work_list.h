@@ -26,6 +26,14 @@ struct PlannedLoop {
   std::string finding{};       ///< Why its record could not be used, if known.
 };
 
+/// Something was done about a finding.
+struct Repair {
+  std::string valves{};  ///< Id or glob.
+  std::int64_t at_ns{0};
+  std::string who{};
+  std::string what{};  ///< "recalibrated", "labelled f19"
+};
+
 /// The question that a list answers. The history has episodes, shelves, health
 /// and the time for which each valve was judged; the rest is known to the
 /// caller.
@@ -37,6 +45,7 @@ struct WorkQuery {
   std::string discipline{};  ///< Rows of this one only; empty: any.
   std::string software{};
   std::vector<PlannedLoop> loops{};
+  std::vector<Repair> repairs{};  ///< RepairsOf(models)
   /// Valves that a model set judges at this moment: the history has the time
   /// judged only up to the last minute.
   std::vector<std::string> judged_now{};
@@ -49,6 +58,8 @@ struct WorkQuery {
 /// plant's table, and valves with an entry of their own. Empty without the
 /// file.
 std::vector<PlannedLoop> LoopsOf(const std::filesystem::path& models);
+/// What `valves repaired` noted. Empty without the file.
+std::vector<Repair> RepairsOf(const std::filesystem::path& models);
 
 /// The one list of what is wrong, as text, CSV, JSON, page to print and view of
 /// the console show it:
@@ -57,6 +68,8 @@ std::vector<PlannedLoop> LoopsOf(const std::filesystem::path& models);
 /// - `shared`: common causes, and periods that several loops have;
 /// - `unjudged`: loops that were judged for less than half of the time;
 /// - `shelved`: what operators have put aside, which is no row;
+/// - `done`: what was repaired or labelled and has not come back, which is no
+///   row either;
 /// - `changes` since `last`; null without one;
 /// - `coverage`: what watches the loops;
 /// - `alarms`: figures of the alarms of the period.

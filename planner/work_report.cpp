@@ -120,6 +120,7 @@ void AddCsv(report::Report& report) {
                                    "severity_points",
                                    "certainty",
                                    "confidence",
+                                   "layer",
                                    "grade",
                                    "grade_factor",
                                    "score",
@@ -127,6 +128,7 @@ void AddCsv(report::Report& report) {
                                    "detected_utc",
                                    "unconfirmed_utc",
                                    "ended_utc",
+                                   "done_utc",
                                    "strength",
                                    "episodes",
                                    "episode_id",
@@ -183,9 +185,9 @@ std::vector<Column> RowColumns() {
       Wide(Text("finding", FindingText)),
       severity,
       Text("certainty", CertaintyText,
-           "1 if a label confirms it, else the largest decision factor, "
-           "lessened where labels called this answer wrong; of a limit, the "
-           "nearer the larger; of an audit 0.9 if sure, 0.5 if likely"),
+           "sure or confirmed by a label 1, likely 0.75, one of or not known "
+           "0.5, not yet 0.25, lessened where labels called this answer wrong; "
+           "of a limit, the nearer the larger"),
       Text("grade", GradeText,
            "how much the plant depends on the loop: grade 1 counts 2, grade 2 "
            "or none 1, grade 3 a half"),
@@ -303,6 +305,11 @@ report::Report WorkListReport(Json document, std::size_t top) {
     report.Line("and " + std::to_string(rows.size() - shown) +
                 " more (--rows 0)");
   }
+  if (const std::size_t done = report.document["done"].size(); done > 0) {
+    report.Line(std::to_string(done) +
+                (done == 1 ? " finding is" : " findings are") +
+                " done and watched for a return.");
+  }
   AddCsv(report);
   return report;
 }
@@ -337,6 +344,14 @@ report::Report WorkListPage(Json document) {
               {"judged", "judged_share", Format::kPercent},
               Wide({"mostly because", "reason"})},
              "Every loop was judged for at least half of the time.");
+  if (!json["done"].empty()) {
+    page.Heading("Done, and watched for their return");
+    page.Table("done", {{"valve", "valve_id"},
+                        {"finding", "name"},
+                        {"done", "done_utc", Format::kTime},
+                        {"by", "who"},
+                        Wide({"what", "what"})});
+  }
   if (!json["shelved"].empty()) {
     page.Heading("Shelved, and therefore not in the list");
     page.Table("shelved", {{"valve", "valve_id"},

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <limits>
+#include <ranges>
 #include <set>
 #include <string_view>
 
@@ -12,6 +14,8 @@
 #include "base/time_text.h"
 #include "base/time_units.h"
 #include "diagnosis/model/fault_catalogue.h"
+#include "diagnosis/records/valve_glob.h"
+#include "planner/channel_drift.h"
 #include "report/text_table.h"
 #include "storage/history/health.h"
 
@@ -22,9 +26,6 @@ using findings::Finding;
 using findings::RankFacts;
 using storage::Episode;
 
-// An audit has no decision factor: these are the confidence of its verdicts.
-constexpr double kSureAudit = 0.9;
-constexpr double kLikelyAudit = 0.5;
 // A limit that is met later is left out: half a year is what a stop is planned
 // ahead.
 constexpr double kHorizonDays = 180.0;
@@ -68,6 +69,10 @@ std::string EpisodeText(const Finding& finding, std::int64_t now_ns) {
   }
   if (finding.confirmed) {
     text += ", confirmed by a label";
+  }
+  if (const auto witness = findings::NamedByText(finding.layer.value_or(""));
+      !witness.empty()) {
+    text += ", " + std::string(witness);
   }
   return text;
 }
@@ -129,12 +134,41 @@ std::string FaultOf(const Episode& episode) {
   return ParseFault(label) ? label : episode.fault.value_or("unknown");
 }
 
-// The episodes of one valve with one fault; the newest one is shown.
+// The episodes of one valve with one fault, by detection; the newest one is
+// shown.
 struct SameFault {
-  const Episode* newest{nullptr};
-  int episodes{0};
-  bool confirmed{false};  // Any of them, by a label.
+  std::vector<const Episode*> episodes;
+  bool confirmed{false};         // Any of them, by a label.
+  std::optional<Repair> done{};  // The newest thing done about it.
 };
+
+bool IsOver(const Episode& episode) {
+  return (episode.cleared_ns || episode.ended_ns) && !episode.unconfirmed_ns;
+}
+
+// What is over is done by what was done later. An alarm whose data ended is
+// done by a repair after that.
+bool IsDone(const Episode& episode, const Repair& by) {
+  return IsOver(episode)
+             ? episode.detected_ns <= by.at_ns
+             : episode.unconfirmed_ns.value_or(
+                   std::numeric_limits<std::int64_t>::max()) <= by.at_ns;
+}
+
+// A label of an episode that stands says what it is, not that it is done.
+std::optional<Repair> LabelOf(const Episode& episode,
+                              storage::History& history) {
+  if (!episode.label || !IsOver(episode)) {
+    return std::nullopt;
+  }
+  for (const auto& entry : history.Events(episode.id) | std::views::reverse) {
+    if (entry.kind == "LABEL") {
+      return Repair{episode.valve_id, entry.stamp_ns, entry.who,
+                    "labelled " + *episode.label};
+    }
+  }
+  return std::nullopt;
+}
 
 // Makes the rows of all valves.
 class RowReader {
@@ -148,9 +182,12 @@ class RowReader {
                  std::map<std::string, ValveLife>& lives);
   void AddAudits();
   std::vector<WorkRow> Ranked() &&;
+  std::vector<DoneFinding> TakeDone() { return std::move(done_); }
 
  private:
-  void AddFault(const SameFault& same);
+  void FindDone(SameFault& same, storage::History& history) const;
+  void AddFault(SameFault& same);
+  bool JoinFault(const LoopAudits::Window& audit, const std::string& text);
   void AddFigures(const Finding& of, const std::vector<HealthHour>& hours);
   Finding Low(const Finding& of, const char* kind,
               const report::FigureText& text) const;
@@ -160,6 +197,7 @@ class RowReader {
   const WorkQuery& query_;
   const RankFacts& facts_;
   std::vector<WorkRow> rows_;
+  std::vector<DoneFinding> done_;
 };
 
 std::optional<int> RowReader::GradeOf(const std::string& valve) const {
@@ -168,10 +206,42 @@ std::optional<int> RowReader::GradeOf(const std::string& valve) const {
                                       : std::optional(grade->second);
 }
 
-void RowReader::AddFault(const SameFault& same) {
-  const Episode& episode = *same.newest;
+void RowReader::FindDone(SameFault& same, storage::History& history) const {
+  const auto add = [&same](const Repair& repair) {
+    if (!same.done || same.done->at_ns <= repair.at_ns) {
+      same.done = repair;
+    }
+  };
+  for (const Repair& repair : query_.repairs) {
+    // One that was noted for later is not done yet; one before the first of
+    // these was about something else.
+    if (repair.at_ns <= query_.now_ns &&
+        repair.at_ns >= same.episodes.front()->detected_ns &&
+        GlobMatches(repair.valves, same.episodes.front()->valve_id)) {
+      add(repair);
+    }
+  }
+  for (const Episode* const episode : same.episodes) {
+    if (const auto label = LabelOf(*episode, history)) {
+      add(*label);
+    }
+  }
+}
+
+void RowReader::AddFault(SameFault& same) {
+  const Episode& episode = *same.episodes.back();
   Finding finding = findings::FindingOf(episode, texts_, facts_);
-  finding.episodes = same.episodes;
+  if (same.done) {
+    if (IsDone(episode, *same.done)) {
+      done_.push_back(
+          {episode.valve_id, finding.fault, finding.words.name, *same.done});
+      return;
+    }
+    std::erase_if(same.episodes, [&same](const Episode* each) {
+      return IsDone(*each, *same.done);
+    });
+  }
+  finding.episodes = static_cast<int>(same.episodes.size());
   if (same.confirmed) {
     finding.confirmed = true;
     finding.confidence = 1.0;
@@ -188,7 +258,18 @@ void RowReader::AddFault(const SameFault& same) {
       labels->second.wrong > labels->second.right) {
     why += ", labels called this answer wrong before";
   }
-  rows_.push_back({std::move(finding), std::move(why)});
+  WorkRow row{std::move(finding), std::move(why)};
+  if (same.done) {
+    row.done_ns = same.done->at_ns;
+    const std::string done = " it was " + same.done->what;
+    row.why += episode.detected_ns > same.done->at_ns
+                   ? "; again, " +
+                         SpanText(episode.detected_ns - same.done->at_ns) +
+                         " after" + done
+                   : "; still, " + SpanText(query_.now_ns - same.done->at_ns) +
+                         " after" + done;
+  }
+  rows_.push_back(std::move(row));
 }
 
 void RowReader::AddEpisodes(storage::History& history) {
@@ -221,13 +302,16 @@ void RowReader::AddEpisodes(storage::History& history) {
       continue;
     }
     SameFault& same = faults[{episode.valve_id, FaultOf(episode)}];
-    same.newest = &episode;
-    ++same.episodes;
+    same.episodes.push_back(&episode);
     same.confirmed = same.confirmed || episode.label.has_value();
   }
-  for (const auto& [key, same] : faults) {
+  for (auto& [key, same] : faults) {
+    FindDone(same, history);
     AddFault(same);
   }
+  std::ranges::stable_sort(
+      done_, std::greater<>(),
+      [](const DoneFinding& each) { return each.by.at_ns; });
 }
 
 Finding RowReader::Low(const Finding& of, const char* kind,
@@ -362,6 +446,24 @@ report::FaultWords QuantisedWords() {
   return words;
 }
 
+// What audit and engine say of one valve at one time is one finding, also where
+// they contradict each other.
+bool RowReader::JoinFault(const LoopAudits::Window& audit,
+                          const std::string& text) {
+  for (WorkRow& row : rows_) {
+    const Finding& f = row.finding;
+    const std::int64_t end_ns = f.ended_ns.value_or(query_.now_ns);
+    if (f.kind == "episode" && f.valve_id == audit.loop &&
+        audit.start_ns <= end_ns && audit.end_ns >= *f.since_ns) {
+      if (row.why.find(text) == std::string::npos) {
+        row.why += "; the audit of its loop says: " + text;
+      }
+      return true;
+    }
+  }
+  return false;
+}
+
 // A loop may have been audited in several windows; its worst verdict counts.
 void RowReader::AddAudits() {
   std::map<std::string, WorkRow> by_loop;
@@ -378,13 +480,16 @@ void RowReader::AddAudits() {
         name.empty() ? QuantisedWords()
                      : texts_.Words(name, audit.band_pct.value_or(0.0) / 100.0);
     finding.certainty = audit.sure ? Certainty::kSure : Certainty::kLikely;
-    finding.confidence = audit.sure ? kSureAudit : kLikelyAudit;
+    finding.confidence = findings::CertaintyFactor(*finding.certainty);
     finding.grade = GradeOf(audit.loop);
     finding.since_ns = finding.last_ns = audit.start_ns;
     std::string why = finding.words.name + ": " + audit.reason;
     if (audit.band_pct) {
       why +=
           "; band of " + report::FormatNumber(*audit.band_pct, 1) + " % of OP";
+    }
+    if (JoinFault(audit, why)) {
+      continue;
     }
     const auto [place, is_new] =
         by_loop.try_emplace(audit.loop, WorkRow{finding, why});
@@ -429,7 +534,8 @@ void RequireDiscipline(const std::string& discipline) {
 std::vector<WorkRow> ReadRows(storage::History* history,
                               const report::FaultTexts& texts,
                               const WorkQuery& query, const RankFacts& facts,
-                              std::map<std::string, ValveLife>& lives) {
+                              std::map<std::string, ValveLife>& lives,
+                              std::vector<DoneFinding>& done) {
   if (!query.discipline.empty()) {
     RequireDiscipline(query.discipline);
   }
@@ -441,6 +547,7 @@ std::vector<WorkRow> ReadRows(storage::History* history,
     }
   }
   rows.AddAudits();
+  done = rows.TakeDone();
   return std::move(rows).Ranked();
 }
 

@@ -20,6 +20,16 @@ struct WorkRow {
   std::string why;  ///< One sentence.
   std::optional<LimitTrend> trend{};
   std::string shares{};  ///< "cause: air west", "period: 42 s"
+  /// It was done then, and has come back or stands still.
+  std::optional<std::int64_t> done_ns{};
+};
+
+/// A finding that is done, and has not come back.
+struct DoneFinding {
+  std::string valve_id;
+  std::optional<std::string> fault{};
+  std::string name;
+  Repair by;
 };
 
 /// The life of a valve since it was last replaced or repaired (its epoch).
@@ -33,15 +43,19 @@ struct ValveLife {
 /// The rows, ranked by findings::IsWorse(): the faults of a valve, each once
 /// with all its episodes; limits that a trend has reached or will reach within
 /// the horizon (high; confidence 1 - days / horizon); drifts and figures beyond
-/// their limit (low); verdicts of audits (confidence 0.9 if sure, else 0.5).
-/// Episodes that a label calls false, and those that are shelved, are left out.
+/// their limit (low); verdicts of audits, which join the fault of the same
+/// time. Episodes that a label calls false, and those that are shelved, are
+/// left out. So is what is over and was labelled, or was repaired since: it is
+/// `done` until it comes back.
 /// @param history null: there is none yet.
 /// @param[out] lives of the valves that have hours of health.
+/// @param[out] done the newest first.
 /// @throws ConfigError for an unknown discipline, naming the accepted ones.
 std::vector<WorkRow> ReadRows(storage::History* history,
                               const report::FaultTexts& texts,
                               const WorkQuery& query,
                               const findings::RankFacts& facts,
-                              std::map<std::string, ValveLife>& lives);
+                              std::map<std::string, ValveLife>& lives,
+                              std::vector<DoneFinding>& done);
 
 }  // namespace fdi::planner

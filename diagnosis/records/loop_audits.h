@@ -17,6 +17,7 @@ struct LoopAudits {
     std::string reason;
     std::optional<double> band_pct{};  ///< Of stiction [% of OP].
     std::int64_t start_ns{0};
+    std::int64_t end_ns{0};
   };
   struct Period {
     double period_s{0.0};

@@ -64,6 +64,7 @@ Json ReadList(ListCache& cache, const Api& api,
     work.software = api.sources.software;
     if (!api.sources.plant_history) {
       work.loops = LoopsOf(api.sources.models);
+      work.repairs = RepairsOf(api.sources.models);
     }
     for (const console::ValveState& valve : api.board.Valves(false)) {
       if (valve.models && valve.quality == Quality::kLive &&

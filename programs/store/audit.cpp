@@ -197,6 +197,7 @@ struct Judged {
   std::string loop;
   std::string source;
   std::optional<std::int64_t> start_ns;
+  std::int64_t end_ns{0};
   double from_s{0.0};
   char service{'\0'};
   loop::Window window;
@@ -317,6 +318,7 @@ void JudgeRecord(const LoopRecord& record, const AuditOptions& options,
         one.from_s = static_cast<double>(begin_ns - *first_ns) * 1e-9;
         if (record.dated) {
           one.start_ns = begin_ns;
+          one.end_ns = part.back().sample.stamp_ns;
         }
         one.window = std::move(*window);
         one.audit = loop::AuditWindow(one.window);
@@ -680,7 +682,7 @@ LoopAudits AuditStoredRuns(const DataDirectory& data, std::int64_t since_ns,
                               one.audit.verdict == Verdict::kStiction && band
                                   ? std::optional(band->width)
                                   : std::nullopt,
-                              one.start_ns.value_or(0)});
+                              one.start_ns.value_or(0), one.end_ns});
   }
   for (const Json& period : CommonPeriods(judged)) {
     audits.periods.push_back(

@@ -220,6 +220,7 @@ Report WorkList(const WorkListOptions& options, const Context& context) {
   }
   if (!of_plant) {
     query.loops = planner::LoopsOf(data.models());
+    query.repairs = planner::RepairsOf(data.models());
     query.audits = AuditStoredRuns(data, query.since_ns, options.audit_windows);
   }
   Json document = planner::WorkList(

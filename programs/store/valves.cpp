@@ -408,14 +408,29 @@ struct RepairedOptions {
   NoteOptions note;
 };
 
-// To the models, a replaced, repacked or recalibrated valve is a different one.
+// A replaced valve is a different one to models of its own. One that was
+// repacked or recalibrated is again what they were made for.
 Report Repaired(const RepairedOptions& options, const Context& context) {
   ValveEvent event;
   event.kind = ParseValveEventKind(options.kind);
   event.note = options.note.comment;
   event.at_ns = options.at.empty() ? NowNs() : ParseTime(options.at, true);
   event.who = options.note.who;
-  return Changed(WritableModels(context).AddValveEvent(options.pattern, event));
+  const auto entry =
+      WritableModels(context).AddValveEvent(options.pattern, event);
+  event.epoch = entry ? entry->epoch : 0;
+  Report report;
+  report.document = {{"valve", options.pattern},
+                     {"event", ValveEventJson(event)},
+                     {"entry", entry ? EntryJson(*entry) : Json()}};
+  report.Line(options.pattern + ": " + options.kind +
+              " is noted; what comes back after it is told as that");
+  if (entry && event.kind == ValveEventKind::kReplaced) {
+    report.Line("epoch " + std::to_string(entry->epoch) +
+                " begins: no fault is named until the valve is onboarded "
+                "again (fdi-trainer onboard)");
+  }
+  return report;
 }
 
 Report Remove(const std::string& pattern, const Context& context) {
@@ -549,11 +564,10 @@ void AddAdd(report::Program& program, CLI::App& group) {
 void AddRepaired(report::Program& program, CLI::App& group) {
   auto [verb, options] = AddVerb(
       program, group, "repaired",
-      "Note what was done to a valve; this begins its next epoch, in which no "
-      "fault is isolated until the valve is onboarded again",
+      "Note what was done to a valve: its findings leave the work list until "
+      "they come back. A replaced valve has to be onboarded again",
       Repaired);
-  verb.add_option("valve", options.pattern, "Id, or the glob of an entry")
-      ->required();
+  verb.add_option("valve", options.pattern, "Id or glob")->required();
   verb.add_option("what", options.kind, "replaced, repacked, recalibrated")
       ->required();
   verb.add_option("--at", options.at, "When, RFC 3339 in UTC (default: now)")

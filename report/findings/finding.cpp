@@ -1,6 +1,5 @@
 #include "report/findings/finding.h"
 
-#include <algorithm>
 #include <cmath>
 #include <tuple>
 
@@ -26,6 +25,28 @@ double TrustIn(const std::string& answer, const RankFacts& facts) {
 
 double SeverityPoints(Severity severity) {
   return std::ldexp(1.0, static_cast<int>(severity));
+}
+
+double CertaintyFactor(Certainty certainty) {
+  switch (certainty) {
+    case Certainty::kSure:
+      return 1.0;
+    case Certainty::kLikely:
+      return 0.75;
+    case Certainty::kOneOf:
+    case Certainty::kNotKnown:
+      return 0.5;
+    case Certainty::kNotYet:
+      break;
+  }
+  return 0.25;
+}
+
+std::string_view NamedByText(std::string_view layer) {
+  return layer == LayerName(Layer::kPhysics)
+             ? "named by simulation of the valve"
+         : layer == LayerName(Layer::kAudit) ? "named by the audit of the loop"
+                                             : "";
 }
 
 double GradeFactor(std::optional<int> grade) {
@@ -105,7 +126,7 @@ Finding FindingOf(const storage::Episode& episode,
   finding.confirmed = episode.label && *episode.label != "false";
   finding.confidence = finding.confirmed
                            ? 1.0
-                           : std::clamp(episode.peak_factor, 0.0, 1.0) *
+                           : CertaintyFactor(*finding.certainty) *
                                  TrustIn(episode.fault.value_or(""), facts);
   return finding;
 }

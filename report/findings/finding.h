@@ -5,6 +5,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "diagnosis/decision/certainty.h"
@@ -44,7 +45,7 @@ struct Finding {
   std::vector<std::string> look_alikes{};
   std::optional<double> strength{};  ///< Signed [-]; nothing before a name.
   std::optional<int> grade{};        ///< RankFacts::grades.
-  double confidence{1.0};            ///< 0..1 [-]
+  double confidence{1.0};            ///< What certainty weighs, 0..1 [-].
 
   std::optional<std::int64_t> since_ns{};  ///< When it was detected.
   std::optional<std::int64_t> ended_ns{};  ///< Nothing: it stands.
@@ -66,8 +67,14 @@ struct Finding {
 
 /// low 1, medium 2, high 4, critical 8.
 double SeverityPoints(Severity severity);
+/// How often what is done about a finding is right: sure 1, likely 0.75, one of
+/// or not known 0.5, not yet 0.25. Conventions, as the points of severity are.
+double CertaintyFactor(Certainty certainty);
+/// "named by simulation of the valve", "named by the audit of the loop"; empty
+/// for the observers, who name most faults.
+std::string_view NamedByText(std::string_view layer);
 /// 1 counts 2, 3 counts a half, and 2 or nothing 1: a plant that states no
-/// grades is ranked by severity and confidence.
+/// grades is ranked by severity and certainty.
 double GradeFactor(std::optional<int> grade);
 
 /// The rank of findings: what stands comes before what has ended, then the
@@ -83,7 +90,7 @@ RankFacts ReadRankFacts(storage::History& history,
                         std::int64_t now_ns);
 
 /// The present of an episode. Its confidence is 1 if a label says that there
-/// was a fault, else its peak factor times (right + 1) / (right + wrong + 1),
+/// was a fault, else CertaintyFactor() times (right + 1) / (right + wrong + 1),
 /// counted over the labels that its answer got: without labels an answer is
 /// trusted fully, and a single wrong one halves that.
 Finding FindingOf(const storage::Episode& episode,

@@ -123,9 +123,9 @@ std::string_view ValveEventKindName(ValveEventKind kind);  ///< "replaced", ...
 /// @throws ConfigError naming the accepted names.
 ValveEventKind ParseValveEventKind(std::string_view name);
 
-/// Maintenance of a valve; opens an epoch.
+/// Maintenance of a valve.
 struct ValveEvent {
-  std::uint32_t epoch{0};  ///< The epoch that it opened; set by the store.
+  std::uint32_t epoch{0};  ///< Of the valve from then on; set by the store.
   ValveEventKind kind{ValveEventKind::kReplaced};
   std::string note{};
   std::int64_t at_ns{0};  ///< UTC.
@@ -233,11 +233,15 @@ class ModelStore {
   /// Ordered by epoch, then time.
   std::vector<BaselineRecord> Baselines(std::string_view pattern);
 
-  /// Opens the next epoch, which makes an existing baseline provisional.
-  /// @returns the entry after the change. @throws NotFoundError if there is
-  ///   none.
-  ValveEntry AddValveEvent(std::string_view pattern, const ValveEvent& event);
+  /// Notes maintenance of a valve, with or without an entry. A replacement
+  /// opens the next epoch of an entry, which makes its baseline provisional;
+  /// after the others the valve is again what its models were made for.
+  /// @returns the entry after the change, if there is one.
+  std::optional<ValveEntry> AddValveEvent(std::string_view pattern,
+                                          const ValveEvent& event);
   std::vector<ValveEvent> ValveEvents(std::string_view pattern);
+  /// What was noted of all valves, with the id or glob, by time.
+  std::vector<std::pair<std::string, ValveEvent>> Repairs();
 
   /// Stores a valve type, replacing one of the same name. @throws ConfigError
   /// if the name is not valid for a model set.

@@ -88,6 +88,9 @@ VALUES (?, ?, ?, ?, ?, ?)
 -- name: valve_events
 SELECT epoch, kind, note, at_ns, who FROM valve_event WHERE valve = ?
 ORDER BY epoch, valve_event_id
+-- name: all_valve_events
+SELECT valve, epoch, kind, note, at_ns, who FROM valve_event
+ORDER BY at_ns, valve_event_id
 -- name: put_valve_type
 INSERT INTO valve_type (name, created_ns, bytes, summary) VALUES (?, ?, ?, ?)
 ON CONFLICT (name) DO UPDATE SET created_ns = excluded.created_ns,

@@ -411,20 +411,36 @@ std::vector<BaselineRecord> ModelStore::Baselines(std::string_view pattern) {
   return records;
 }
 
-ValveEntry ModelStore::AddValveEvent(std::string_view pattern,
-                                     const ValveEvent& event) {
+std::optional<ValveEntry> ModelStore::AddValveEvent(std::string_view pattern,
+                                                    const ValveEvent& event) {
   Transaction transaction(database_);
-  ValveEntry entry = RequireEntry(pattern);
-  // Without a baseline, the models are taken to be those of the epoch that
-  // ends.
-  entry.baseline_epoch = entry.baseline_epoch.value_or(entry.epoch);
-  ++entry.epoch;
-  StoreEntry(entry);
+  std::optional<ValveEntry> entry;
+  if (IsEntry(pattern)) {
+    entry = RequireEntry(pattern);
+  }
+  if (entry && event.kind == ValveEventKind::kReplaced) {
+    // Without a baseline, the models are taken to be those of the epoch that
+    // ends.
+    entry->baseline_epoch = entry->baseline_epoch.value_or(entry->epoch);
+    ++entry->epoch;
+    StoreEntry(*entry);
+  }
   ValveEvent stored = event;
-  stored.epoch = entry.epoch;
-  InsertEvent(database_, entry.pattern, stored);
+  stored.epoch = entry ? entry->epoch : 0;
+  InsertEvent(database_, pattern, stored);
   transaction.Commit();
   return entry;
+}
+
+std::vector<std::pair<std::string, ValveEvent>> ModelStore::Repairs() {
+  std::vector<std::pair<std::string, ValveEvent>> repairs;
+  Statement rows = database_.Prepare(sql::all_valve_events);
+  while (rows.Step()) {
+    auto& [valves, event] = repairs.emplace_back();
+    rows.Read(0, valves, event.epoch, event.kind, event.note, event.at_ns,
+              event.who);
+  }
+  return repairs;
 }
 
 std::vector<ValveEvent> ModelStore::ValveEvents(std::string_view pattern) {

@@ -134,6 +134,7 @@ TEST_F(WorkListTest, ARowHasItsFactorsAndWhoSawIt) {
 
 TEST_F(WorkListTest, WhatStandsIsAboveWhatHasEnded) {
   RecordEpisode(writer_, 0b100, "A");  // high
+  query_.loops = {{"A", 1}};
   AddHealth("C", 60);
   query_.since_ns = kDetected - 90 * kDay;
   const Json rows = Rows();
@@ -200,13 +201,120 @@ TEST_F(WorkListTest, WhatHasNoNameYetIsSaidSo) {
 }
 
 TEST_F(WorkListTest, ALabelSaysWhatItReallyWas) {
-  RecordEpisode(writer_, 0b100, "V1");
+  RecordOpen("V1", 0b100);
   Label("V1", "f13");
   const Json row = Rows().at(0);
   EXPECT_EQ(row["fault"], "f13");
   EXPECT_EQ(row["name"], Texts().Of(13).name);
   EXPECT_EQ(row["confirmed"], true);
   EXPECT_EQ(row["confidence"], 1.0);
+}
+
+TEST_F(WorkListTest, WhatIsLabelledAndOverIsDone) {
+  RecordEpisode(writer_, 0b100, "V1");
+  RecordOpen("V2", 0b100);
+  Label("V2", "f19");
+  Label("V1", "f19");
+  const Json list = List();
+  ASSERT_EQ(list["rows"].size(), 1u);
+  EXPECT_EQ(list["rows"][0]["valve_id"], "V2");  // It stands.
+  ASSERT_EQ(list["done"].size(), 1u);
+  EXPECT_EQ(list["done"][0]["valve_id"], "V1");
+  EXPECT_EQ(list["done"][0]["fault"], "f19");
+  EXPECT_EQ(list["done"][0]["who"], "anna");
+  EXPECT_EQ(list["done"][0]["what"], "labelled f19");
+  EXPECT_THAT(Html(), HasSubstr("Done, and watched for their return"));
+}
+
+TEST_F(WorkListTest, ARepairIsDoneUntilTheFaultComesBack) {
+  RecordEpisode(writer_, 0b100, "V1");
+  RecordOpen("V2", 0b100);
+  query_.repairs = {{"V*", kDetected + 200 * kSecond, "bo", "recalibrated"},
+                    {"X", kDetected + 300 * kSecond, "bo", "replaced"}};
+  Json list = List();
+  ASSERT_EQ(list["rows"].size(), 1u);
+  EXPECT_EQ(list["rows"][0]["valve_id"], "V2");
+  EXPECT_THAT(list["rows"][0]["why"].get<std::string>(),
+              HasSubstr("; still, 24 h after it was recalibrated"));
+  EXPECT_EQ(list["done"][0]["what"], "recalibrated");
+
+  FaultEvent again = Event(TransitionKind::kIsolated, 4 * 86'400, 0b100, 0.8,
+                           EndReason::kNone, "V1");
+  again.episode_id = 77;
+  again.transition.detection_stamp_ns = again.transition.stamp_ns;
+  writer_.Record(again, kDetected);
+  query_.now_ns = kDetected + 5 * kDay;
+  list = List();
+  ASSERT_EQ(list["rows"].size(), 2u);
+  const Json& row = list["rows"][0];
+  EXPECT_EQ(row["valve_id"], "V1");
+  EXPECT_EQ(row["episodes"], 1);
+  EXPECT_EQ(row["done_utc"], "2026-11-20T14:59:31Z");
+  EXPECT_THAT(row["why"].get<std::string>(),
+              HasSubstr("; again, 4 days after it was recalibrated"));
+  EXPECT_TRUE(list["done"].empty());
+}
+
+// A repair before the first episode was about something else.
+TEST_F(WorkListTest, AnAlarmWhoseDataEndedIsDoneByARepairAfterThat) {
+  RecordOpen("V4", 4);
+  writer_.Record(
+      Event(TransitionKind::kClosed, 60, 4, 0.8, EndReason::kStreamEnded, "V4"),
+      kDetected);
+  for (const auto& [second, rows] : {std::pair(-10, 1u), {50, 1u}, {70, 0u}}) {
+    query_.repairs = {{"V4", kDetected + second * kSecond, "bo", "repacked"}};
+    EXPECT_EQ(Rows().size(), rows) << second;
+  }
+}
+
+TEST_F(WorkListTest, ARowSaysWhatNamedItAndWeighsHowSureItIs) {
+  FaultEvent event =
+      Event(TransitionKind::kIsolated, 20, 0b100, 0.95, EndReason::kNone, "V1");
+  event.transition.layer = Layer::kPhysics;
+  writer_.Record(
+      Event(TransitionKind::kDetected, 0, 0, 0.3, EndReason::kNone, "V1"),
+      kDetected);
+  writer_.Record(event, kDetected);
+  writer_.Record(
+      Event(TransitionKind::kDetected, 0, 0, 0.3, EndReason::kNone, "V2"),
+      kDetected);
+  const Json rows = Rows();
+  EXPECT_EQ(rows[0]["layer"], "physics");
+  EXPECT_EQ(rows[0]["certainty"], "sure");
+  EXPECT_EQ(rows[0]["confidence"], 1.0);
+  EXPECT_THAT(rows[0]["why"].get<std::string>(),
+              HasSubstr("named by simulation of the valve"));
+  EXPECT_EQ(rows[1]["certainty"], "not yet");
+  EXPECT_EQ(rows[1]["confidence"], 0.25);
+}
+
+TEST_F(WorkListTest, WhatTheAuditSaysOfAnEpisodeIsNoSecondRow) {
+  RecordOpen("L1", 0b010);  // f7: the process, not the valve.
+  query_.audits.windows = {{"L1",
+                            "no_response",
+                            true,
+                            "X stands at 0 %",
+                            {},
+                            kDetected,
+                            kDetected + kDay},
+                           {"L1",
+                            "no_response",
+                            true,
+                            "X stood at 0 %",
+                            {},
+                            kDetected - 2 * kDay,
+                            kDetected - kDay}};
+  const Json rows = Rows();
+  ASSERT_EQ(rows.size(), 2u);
+  const auto of = [&rows](const char* kind) {
+    return *std::ranges::find_if(
+        rows, [kind](const Json& row) { return row["kind"] == kind; });
+  };
+  EXPECT_THAT(of("episode")["why"].get<std::string>(),
+              AllOf(HasSubstr("the audit of its loop says: "),
+                    HasSubstr("X stands at 0 %")));
+  EXPECT_THAT(of("audit")["why"].get<std::string>(),
+              HasSubstr("X stood at 0 %"));
 }
 
 TEST_F(WorkListTest, ATrendIsARowOfItsOwn) {
@@ -302,17 +410,17 @@ TEST_F(WorkListTest, LoopsOfOneCauseSayWhatTheyShare) {
 
 TEST_F(WorkListTest, AuditsAreRowsAndShareAPeriod) {
   query_.audits.windows = {
-      {"L1", "stiction", true, "two witnesses", 2.5, kDetected},
-      {"L2", "external", false, "a sine", {}, kDetected},
-      {"L3", "undetermined", false, "nothing", {}, kDetected},
-      {"L4", "tuning", false, "regular", {}, kDetected}};
+      {"L1", "stiction", true, "two witnesses", 2.5, kDetected, kDetected},
+      {"L2", "external", false, "a sine", {}, kDetected, kDetected},
+      {"L3", "undetermined", false, "nothing", {}, kDetected, kDetected},
+      {"L4", "tuning", false, "regular", {}, kDetected, kDetected}};
   query_.audits.periods = {{42.0, {"L1", "L2"}}};
   const Json list = List();
   ASSERT_EQ(list["rows"].size(), 3u);
   EXPECT_EQ(list["rows"][0]["valve_id"], "L1");
   EXPECT_EQ(list["rows"][0]["shares"], "period: 42 s");
   EXPECT_EQ(list["rows"][0]["fault"], "stiction");
-  EXPECT_DOUBLE_EQ(list["rows"][0]["score"].get<double>(), 2.0 * 0.9);
+  EXPECT_DOUBLE_EQ(list["rows"][0]["score"].get<double>(), 2.0);
   EXPECT_EQ(list["coverage"]["audit"], 4);
 }
 

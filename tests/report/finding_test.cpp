@@ -35,18 +35,32 @@ TEST(FindingTest, ScoreIsSeverityGradeAndConfidence) {
   storage::Episode episode = EpisodeOf("V", "f19", 0.5);  // high: 4
   EXPECT_DOUBLE_EQ(Of(episode).score(), 4.0);
   episode.peak_factor = 0.5;
-  EXPECT_DOUBLE_EQ(Of(episode).score(), 2.0);
+  EXPECT_DOUBLE_EQ(Of(episode).score(), 3.0);  // likely
   RankFacts facts;
   facts.labels["f19"].wrong = 1;
-  EXPECT_DOUBLE_EQ(Of(episode, facts).score(), 1.0);
+  EXPECT_DOUBLE_EQ(Of(episode, facts).score(), 1.5);
   facts.labels["f19"].right = 3;
-  EXPECT_DOUBLE_EQ(Of(episode, facts).score(), 2.0 * 4.0 / 5.0);
+  EXPECT_DOUBLE_EQ(Of(episode, facts).score(), 3.0 * 4.0 / 5.0);
   episode.label = "f19";
   EXPECT_DOUBLE_EQ(Of(episode, facts).score(), 4.0);
   facts.grades["V"] = 1;
   EXPECT_DOUBLE_EQ(Of(episode, facts).score(), 8.0);
   facts.grades["V"] = 3;
   EXPECT_DOUBLE_EQ(Of(episode, facts).score(), 2.0);
+}
+
+TEST(FindingTest, ALessCertainAnswerWeighsLess) {
+  double last = 2.0;
+  for (const Certainty certainty : {Certainty::kSure, Certainty::kLikely,
+                                    Certainty::kOneOf, Certainty::kNotYet}) {
+    EXPECT_LT(CertaintyFactor(certainty), last);
+    last = CertaintyFactor(certainty);
+  }
+  EXPECT_DOUBLE_EQ(CertaintyFactor(Certainty::kNotKnown),
+                   CertaintyFactor(Certainty::kOneOf));
+  // "One of" is less than sure although the factor is the same.
+  EXPECT_LT(Of(EpisodeOf("V", "f3|f6", 0.5)).confidence,
+            Of(EpisodeOf("V", "f19", 0.5)).confidence);
 }
 
 TEST(FindingTest, StandsUntilItIsSeenToBeGone) {

@@ -317,9 +317,14 @@ TEST_F(ModelsTest, AnEventMakesTheBaselineProvisionalUntilTheNextOnboarding) {
   EXPECT_EQ(store_.FindValve("V1")->baseline(), BaselineState::kValid);
 
   const auto generation = store_.Generation();
-  const ValveEntry after = store_.AddValveEvent(
-      "V1", {0, ValveEventKind::kRepacked, "new packing", 5, "me"});
-  EXPECT_EQ(after.epoch, 1U);
+  for (const ValveEventKind kind :
+       {ValveEventKind::kRepacked, ValveEventKind::kRecalibrated}) {
+    EXPECT_EQ(store_.AddValveEvent("V1", {0, kind, "", 4, "me"})->epoch, 0U);
+    EXPECT_EQ(store_.FindValve("V1")->baseline(), BaselineState::kValid);
+  }
+  const auto after = store_.AddValveEvent(
+      "V1", {0, ValveEventKind::kReplaced, "new trim", 5, "me"});
+  EXPECT_EQ(after->epoch, 1U);
   EXPECT_GT(store_.Generation(), generation);
   EXPECT_EQ(Assigned("V1"), "pump@1");
   EXPECT_EQ(store_.FindValve("V1")->baseline(), BaselineState::kProvisional);
@@ -339,10 +344,10 @@ TEST_F(ModelsTest, AnEventMakesTheBaselineProvisionalUntilTheNextOnboarding) {
   EXPECT_TRUE(std::isnan(baselines[0].channels[1].vaf));
   EXPECT_EQ(baselines[1].version, 2);
   const auto events = store_.ValveEvents("V1");
-  ASSERT_EQ(events.size(), 1U);
-  EXPECT_EQ(events[0].epoch, 1U);
-  EXPECT_EQ(events[0].kind, ValveEventKind::kRepacked);
-  EXPECT_EQ(events[0].note, "new packing");
+  ASSERT_EQ(events.size(), 3U);
+  EXPECT_EQ(events[2].epoch, 1U);
+  EXPECT_EQ(events[2].kind, ValveEventKind::kReplaced);
+  EXPECT_EQ(events[2].note, "new trim");
 }
 
 TEST_F(ModelsTest, ASetThatTheUserAssignsHasNoBaseline) {
@@ -356,7 +361,11 @@ TEST_F(ModelsTest, ASetThatTheUserAssignsHasNoBaseline) {
   EXPECT_EQ(store_.FindValve("V1")->baseline(), BaselineState::kProvisional);
   store_.AssignModelSet("V1", ParseModelReference("pump@2"));
   EXPECT_EQ(store_.FindValve("V1")->baseline(), BaselineState::kNone);
-  EXPECT_THROW(store_.AddValveEvent("V2", {}), NotFoundError);
+  EXPECT_FALSE(store_.AddValveEvent("V2", {.at_ns = 7}));
+  ASSERT_EQ(store_.Repairs().size(), 2U);
+  EXPECT_EQ(store_.Repairs()[1].first, "V2");
+  EXPECT_EQ(store_.Repairs()[1].second.at_ns, 7);
+  EXPECT_FALSE(store_.FindValve("V2"));
 }
 
 TEST_F(ModelsTest, ValveTypesKeepTheirBytes) {

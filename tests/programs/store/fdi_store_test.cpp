@@ -403,13 +403,17 @@ TEST_F(FdiStoreTest, BuiltInTypesNeedNoData) {
 
 TEST_F(FdiStoreTest, ValvesAreDescribedAndTheirEpochCounts) {
   EXPECT_EQ(Store("valves add 'LV-*' --flow-unit t/h --sense opening").code, 0);
-  EXPECT_EQ(Store("valves repaired 'LV-*' repacked --comment 'new packing' "
+  EXPECT_EQ(Store("valves repaired 'LV-*' replaced --comment 'DN80 now' "
                   "--at 2026-01-02T03:04:05Z --by me")
                 .code,
             0);
   EXPECT_EQ(Store("valves repaired 'LV-*'").code, 2);
   EXPECT_EQ(Store("valves repaired 'LV-*' painted").code, 2);
-  EXPECT_EQ(Store("valves repaired LV-1 replaced").code, 5);
+  // What its models were made for is restored: names stay.
+  EXPECT_EQ(Store("valves repaired 'LV-*' repacked").code, 0);
+  // A valve of the default set has no entry.
+  EXPECT_THAT(Store("valves repaired OTHER recalibrated").out,
+              HasSubstr("OTHER: recalibrated is noted"));
 
   const json valve = StoreJson("valves show LV-7");
 
@@ -419,8 +423,10 @@ TEST_F(FdiStoreTest, ValvesAreDescribedAndTheirEpochCounts) {
   EXPECT_EQ(valve["epoch"], 1);
   EXPECT_EQ(valve["baseline"], "provisional");
   EXPECT_TRUE(valve["diagnosed_with"].is_null());
-  ASSERT_EQ(valve["events"].size(), 1U);
-  EXPECT_EQ(valve["events"][0]["kind"], "repacked");
+  ASSERT_EQ(valve["events"].size(), 2U);
+  EXPECT_EQ(valve["events"][1]["kind"], "repacked");
+  EXPECT_EQ(valve["events"][1]["epoch"], 1);
+  EXPECT_EQ(valve["events"][0]["kind"], "replaced");
   EXPECT_EQ(valve["events"][0]["at_utc"], "2026-01-02T03:04:05Z");
 }
 
