@@ -360,6 +360,17 @@ test('the page of a valve that nobody judges now does not call it normal',
       await close(page);
     });
 
+test('names that could not be fetched are fetched again', async () => {
+  monitor.reset([tile('V', 'ISOLATED', ['f19'])]);
+  const {faults} = monitor.answers;
+  delete monitor.answers.faults;
+  const page = await openShared(browser, address, '#/valve/V');
+  await page.locator('.state-line', {hasText: 'f19'}).waitFor();
+  monitor.answers.faults = faults;
+  await page.locator('.state-line', {hasText: 'Flow transmitter wrong'}).waitFor();
+  await close(page);
+});
+
 test('what ended before it had a name is not unlike any known fault',
     async () => {
       monitor.reset([], [alarm('0000000000000001', 'V', 'unknown',

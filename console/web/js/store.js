@@ -8,6 +8,7 @@ import {get, getOptional} from './api.js';
 import {globTest, groupOfId} from './format.js';
 import {Stream} from './stream.js';
 
+const kCatalogueRetryMs = 5000;
 const kSparkLength = 60;
 const kStatusPeriodMs = 10000;
 
@@ -90,7 +91,8 @@ class Store extends EventTarget {
       this.faults = new Map(faults.map((fault) => [fault.fault, fault]));
       this.#emit('tiles', null);
     } catch {
-      // Fault numbers have to do until the next start.
+      // Keys have to do until the next attempt.
+      setTimeout(() => this.#loadCatalogue(), kCatalogueRetryMs);
     }
   }
 
@@ -173,7 +175,6 @@ class Store extends EventTarget {
     const gapFromMs = this.#lostMs;
     this.#lostMs = null;
     await Promise.all([this.#resync(), this.refreshStatus()]);
-    if (this.faults.size === 0) this.#loadCatalogue();
     this.#probeWorklist();
     this.#emit('resync', {gapFromMs, restarted});
   }
