@@ -48,30 +48,6 @@ bool IsKnown(const std::string& key) {
   return std::ranges::find(kKeys, key) != kKeys.end();
 }
 
-// Whether `text` is `pattern`, in which each * stands for anything. Goes back
-// to the last star only: O(length of pattern x length of text).
-bool MatchesStars(std::string_view pattern, std::string_view text) {
-  std::size_t p = 0;
-  std::size_t t = 0;
-  std::optional<std::size_t> star;
-  std::size_t resume = 0;
-  while (t < text.size()) {
-    if (p < pattern.size() && pattern[p] == '*') {
-      star = p++;
-      resume = t;
-    } else if (p < pattern.size() && pattern[p] == text[t]) {
-      ++p;
-      ++t;
-    } else if (star) {
-      p = *star + 1;
-      t = ++resume;
-    } else {
-      return false;
-    }
-  }
-  return pattern.find_first_not_of('*', p) == std::string_view::npos;
-}
-
 // The words of a list. Three separators are accepted, because in CSV one of
 // them may separate the cells; lists of TOML arrive with commas.
 std::vector<std::string> Words(const std::string& text) {

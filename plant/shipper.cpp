@@ -8,6 +8,7 @@
 
 #include "base/printable.h"
 #include "base/text.h"
+#include "base/time_text.h"
 #include "plant/sql.h"
 #include "storage/history/history_database.h"
 #include "storage/models/models.h"
@@ -349,7 +350,7 @@ bool Shipper::ShipBatch(Shipped& shipped) {
     EndLost();
     behind_ = false;
   }
-  cursor.shipped_ns = std::max(UtcNow(), shipped_there_ns + 1);
+  cursor.shipped_ns = std::max(NowNs(), shipped_there_ns + 1);
   plant_.Run(sql::set_shipped,
              {monitor_id_, std::to_string(cursor.shipped_ns)});
   transaction.Commit();
@@ -365,7 +366,7 @@ bool Shipper::ShipBatch(Shipped& shipped) {
 // backup, or only the note here is missing. What is open there and not here
 // nobody would ever end or acknowledge.
 void Shipper::EndLost() {
-  const std::string now = std::to_string(UtcNow());
+  const std::string now = std::to_string(NowNs());
   const PlantRows episodes = plant_.Run(sql::open_episodes, {monitor_id_});
   Statement episode =
       history_.Prepare("SELECT 1 FROM episode WHERE episode_id = ?");

@@ -37,6 +37,8 @@ constexpr std::string_view kUsers =
 constexpr std::string_view kCertificate =
     "nginx has the certificate (docs/console.md, The page beyond this host)";
 
+constexpr std::string_view kEpisodesAsCsv =
+    "fdi-store history list --csv writes the list";
 constexpr std::string_view kDecimal =
     "decimal = \",\" under [file] of --map (fdi-store runs sniff writes it)";
 constexpr std::string_view kDate =
@@ -76,7 +78,12 @@ constexpr auto kRemoved = std::to_array<Removed>({
     {"fdi-store", "history list", "--limit", "--rows N"},
     {"fdi-store", "history ack", "--all", "--valve '*'"},
     {"fdi-store", "history ack", "--limit", "--from TIME"},
-    {"fdi-store", "history export", "--limit", "--from TIME"},
+    {"fdi-store", "history export", "--limit", kEpisodesAsCsv},
+    {"fdi-store", "history export", "--valve", kEpisodesAsCsv},
+    {"fdi-store", "history export", "--fault", kEpisodesAsCsv},
+    {"fdi-store", "history export", "--state", kEpisodesAsCsv},
+    {"fdi-store", "history export", "--from", kEpisodesAsCsv},
+    {"fdi-store", "history export", "--to", kEpisodesAsCsv},
     {"fdi-store", "health", "show", "fdi-store health --valve ID"},
     {"fdi-store", "health", "trend",
      "fdi-store health --valve ID --limit NAME=VALUE"},
@@ -105,9 +112,14 @@ constexpr auto kRemoved = std::to_array<Removed>({
      "T63 and T86 of ordinary steps"},
     {"fdi-trainer", "", "coverage",
      "fdi-trainer onboard --dry-run --signals CV,X,... shows what could be "
-     "seen, with --gains what one more transmitter would add"},
+     "seen"},
     {"fdi-trainer", "*", "--threads", "--jobs N"},
     {"fdi-trainer", "onboard", "--rows", "--valve GLOB"},
+    {"fdi-trainer", "onboard", "--gains",
+     "--dry-run with --signals CV,X,F and with --signals CV,X,F,P1 show what "
+     "P1 would add"},
+    {"fdi-trainer", "train", "--print-campaign",
+     "fdi-store runs show ID has the scenario of each run"},
     {"fdi-trainer", "onboard", "--no-fit",
      "a type that was stored with --save-type is taken as it is"},
     {"fdi-trainer", "", "inject",

@@ -7,6 +7,7 @@
 #include <set>
 #include <utility>
 
+#include "base/text.h"
 #include "bench/study/evaluation_report.h"
 #include "diagnosis/model/fault_catalogue.h"
 #include "report/plot/figure.h"
@@ -476,8 +477,7 @@ void ReportPage::Print(std::ostream& out, const Detector& detector,
         std::string("summary/") + key,
         WithNames(ConfusionColumns(document["summary"][key], "truth"), texts_));
   };
-  page.Line("Model set " + set + ", hash " +
-            storage::HashHex(models_.content_hash) +
+  page.Line("Model set " + set + ", hash " + Hex16(models_.content_hash) +
             "\nFaults not told apart: " + GroupsText(models_) +
             "\nFaults that it cannot detect: " +
             FaultsText(models_.undetectable) + "\nScored by " + software +

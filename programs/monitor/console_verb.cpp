@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <chrono>
+#include <condition_variable>
 #include <memory>
 #include <optional>
 #include <stop_token>
@@ -9,7 +10,7 @@
 
 #include <CLI/CLI.hpp>
 
-#include "base/retry.h"
+#include "base/mutex.h"
 #include "base/time_text.h"
 #include "base/time_units.h"
 #include "console/console.h"
@@ -50,6 +51,14 @@ storage::PlantLimits Limits(const std::stop_token& stop) {
   limits.statement = std::chrono::seconds(10);
   limits.stop = stop;
   return limits;
+}
+
+// Waits for `pause`, or until `stop` if that comes first.
+void PauseUntil(const std::stop_token& stop, std::chrono::seconds pause) {
+  Mutex mutex;
+  std::condition_variable_any stopped;
+  MutexLock lock(mutex);
+  stopped.wait_for(lock, stop, pause, [] { return false; });
 }
 
 // Lists valves also if they are silent. Tried again until the plant's history

@@ -92,12 +92,9 @@ void DeliverAll(Feed& feed, const FeedSinks& sinks, Pacer pacer,
 }
 
 report::Json RowOf(const FedValve& valve) {
-  char source_id[17];
-  std::snprintf(source_id, sizeof source_id, "%016llx",
-                static_cast<unsigned long long>(valve.source_id));
   report::Json row;
   row["valve_id"] = valve.valve_id;
-  row["source_id"] = source_id;
+  row["source_id"] = Hex16(valve.source_id);
   row["samples"] = valve.samples;
   row["start_utc"] = valve.samples > 0
                          ? report::Json(FormatTime(valve.first_stamp_ns, true))

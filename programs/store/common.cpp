@@ -100,9 +100,9 @@ OperatorNote NoteOptions::Note() const {
   return {who, comment, report::Origin("fdi-store"), NowNs()};
 }
 
-void AddEpisode(CLI::App& verb, std::string& id, bool required) {
+void AddEpisode(CLI::App& verb, std::string& id) {
   verb.add_option("episode", id, "ID, a unique beginning of it, or last")
-      ->required(required);
+      ->required();
 }
 
 void AddOutput(CLI::App& verb, std::string& output) {
@@ -132,10 +132,6 @@ bool IsVafMeaningful(double vaf) {
 
 Json VafJson(double vaf) {
   return IsVafMeaningful(vaf) ? NumberJson(vaf) : Json();
-}
-
-std::string Hex(std::uint64_t value) {
-  return EpisodeIdText(value);
 }
 
 const std::vector<std::string>& EpisodeKeys() {

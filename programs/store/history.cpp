@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "base/csv_cells.h"
+#include "base/text.h"
 #include "programs/store/verbs.h"
 #include "report/fault_texts.h"
 #include "report/plot/episode_figure.h"
@@ -350,8 +351,8 @@ Report ShowEpisode(const ShowOptions& options, const Context& context) {
   Report report;
   report.document = ListedJson(alarm);
   report.document.update(
-      {{"source_id", Hex(e.source_id)},
-       {"model_hash", Hex(e.model_hash)},
+      {{"source_id", Hex16(e.source_id)},
+       {"model_hash", Hex16(e.model_hash)},
        {"lowest", e.lowest ? NumberJson(*e.lowest) : Json()},
        {"highest", e.highest ? NumberJson(*e.highest) : Json()},
        {"unknown_kind", TextJson(e.unknown_kind)},
@@ -446,23 +447,15 @@ void WriteTrace(const Episode& episode, const std::vector<TracePoint>& trace,
 struct EpisodeExportOptions {
   std::string id;
   std::string output;
-  EpisodeOptions filter;
 };
 
-int ExportEpisodes(const EpisodeExportOptions& options,
-                   const Context& context) {
-  if (options.id.empty()) {
-    const Report report = ListEpisodes({.filter = options.filter}, context);
-    report::WriteOutput(options.output,
-                        [&](std::ostream& out) { report.PrintCsv(out); });
-  } else {
-    HistoryReader reader(DataOf(context).history());
-    const Episode episode = reader.Show(options.id);
-    const auto trace = reader.Trace(episode.id);
-    report::WriteOutput(options.output, [&](std::ostream& out) {
-      WriteTrace(episode, trace, out);
-    });
-  }
+int ExportEpisode(const EpisodeExportOptions& options, const Context& context) {
+  HistoryReader reader(DataOf(context).history());
+  const Episode episode = reader.Show(options.id);
+  const auto trace = reader.Trace(episode.id);
+  report::WriteOutput(options.output, [&](std::ostream& out) {
+    WriteTrace(episode, trace, out);
+  });
   return report::kExitOk;
 }
 
@@ -527,12 +520,10 @@ void AddHistoryVerbs(report::Program& program) {
   AddAlarmVerbs(program, group);
 
   auto [exporting, exported] =
-      AddVerb(program, group, "export",
-              "Write as CSV the list of episodes, or the trace of one of them",
-              ExportEpisodes);
-  AddEpisode(exporting, exported.id, false);
+      AddVerb(program, group, "export", "Write the trace of an episode as CSV",
+              ExportEpisode);
+  AddEpisode(exporting, exported.id);
   AddOutput(exporting, exported.output);
-  exported.filter.AddTo(exporting);
 
   auto [plot, plotted] =
       AddVerb(program, group, "plot",

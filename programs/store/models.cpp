@@ -5,6 +5,7 @@
 #include <filesystem>
 
 #include "base/error.h"
+#include "base/text.h"
 #include "diagnosis/model/fault_catalogue.h"
 #include "programs/store/verbs.h"
 #include "report/models/lineage_text.h"
@@ -22,7 +23,7 @@ Json SummaryJson(const ModelSummary& set) {
   return {{"model_set", set.name},
           {"version", set.version},
           {"created_utc", TimeJson(set.created_ns)},
-          {"content_hash", Hex(set.content_hash)},
+          {"content_hash", Hex16(set.content_hash)},
           {"observer_count", set.observers},
           {"training_run_count", set.training_runs},
           {"active", set.active},

@@ -5,6 +5,7 @@
 
 #include "base/error.h"
 #include "base/printable.h"
+#include "base/text.h"
 #include "base/time_units.h"
 #include "diagnosis/model/fault_catalogue.h"
 #include "import/csv.h"
@@ -34,7 +35,7 @@ Json RunJson(const RunInfo& info) {
   }
   return {{"run_id", info.id},
           {"valve_id", run.valve_id},
-          {"source_id", Hex(run.source_id)},
+          {"source_id", Hex16(run.source_id)},
           {"origin", RunOriginName(run.origin)},
           {"state", RunStateName(info.state)},
           {"start_utc", TimeJson(run.start_ns)},

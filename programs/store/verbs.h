@@ -10,6 +10,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "base/text.h"
 #include "base/time_text.h"
 #include "diagnosis/records/loop_audits.h"
 #include "report/output_folder.h"
@@ -133,7 +134,7 @@ struct NoteOptions {
 };
 
 /// The positional argument of verbs about one episode.
-void AddEpisode(CLI::App& verb, std::string& id, bool required = true);
+void AddEpisode(CLI::App& verb, std::string& id);
 /// -o, --output with "-" for stdout.
 void AddOutput(CLI::App& verb, std::string& output);
 
@@ -144,8 +145,7 @@ Json NumberJson(const std::optional<double>& number);   ///< Null if not finite.
 /// False if the variance accounted for, 100 (1 - var(residual) / var(output))
 /// %, is meaningless because the output stood still in the validation data.
 bool IsVafMeaningful(double vaf);
-Json VafJson(double vaf);              ///< Null if it is meaningless.
-std::string Hex(std::uint64_t value);  ///< 16 digits
+Json VafJson(double vaf);  ///< Null if it is meaningless.
 
 /// An array with row_of(item) for each item.
 template <typename Items, typename RowOf>

@@ -5,6 +5,7 @@
 #include <sstream>
 
 #include "base/error.h"
+#include "base/text.h"
 #include "diagnosis/model/fault_catalogue.h"
 #include "storage/models/model_codec.h"
 #include "storage/models/models.h"
@@ -133,7 +134,7 @@ Json VafJson(double vaf) {
 report::Json ModelsJson(const ModelSet& models) {
   Json json = {{"model_set", models.name},
                {"version", models.version},
-               {"content_hash", storage::HashHex(models.content_hash)},
+               {"content_hash", Hex16(models.content_hash)},
                {"channels", Json::array()},
                {"observers", Json::array()},
                {"groups", Json::array()},

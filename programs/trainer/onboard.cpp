@@ -60,7 +60,6 @@ struct OnboardOptions {
   std::vector<std::string> files;
   importer::TableOptions table;
   std::string save_type;
-  bool gains{false};
   bool dry_run{false};
   PlantVerbOptions plant;
 };
@@ -71,8 +70,7 @@ Json CoverageJson(const CoverageTable& table) {
                {"parts", table.parts},
                {"alarmed", table.alarmed},
                {"judged", table.judged},
-               {"faults", Json::array()},
-               {"gains", Json::array()}};
+               {"faults", Json::array()}};
   for (const FaultCoverage& coverage : table.faults) {
     const double direction = coverage.negative ? -1.0 : 1.0;
     const auto strength = [direction](const std::optional<double>& smallest) {
@@ -85,11 +83,6 @@ Json CoverageJson(const CoverageTable& table) {
          {"detectable_from", strength(coverage.detectable)},
          {"isolable_from", strength(coverage.isolable)},
          {"look_alikes", FaultsJson(coverage.look_alikes)}});
-  }
-  for (const TransmitterGain& gain : table.gains) {
-    json["gains"].push_back({{"signal", SignalName(gain.signal)},
-                             {"detectable", FaultsJson(gain.detectable)},
-                             {"isolable", FaultsJson(gain.isolable)}});
   }
   return json;
 }
@@ -115,9 +108,6 @@ void AddCoverage(const CoverageTable& table, const std::string& path,
                 {"isolated from", "isolable_from"},
                 {"looks like", "look_alikes"}});
   report.Line("isolated: named in a set of at most two");
-  report.Table(path + "gains", {{"one more transmitter", "signal"},
-                                {"detects also", "detectable"},
-                                {"isolates also", "isolable"}});
 }
 
 Json OnboardingJson(const Onboarding& onboarding,
@@ -292,7 +282,7 @@ report::Report ReportOf(const Onboarding& onboarding,
   const int decimals = FlowDecimals(onboarding.type.parameters);
   AddChannels(decimals, report);
   report.Line("model set " + NameOf(models) + ", hash " +
-              storage::HashHex(models.content_hash) + ", " +
+              Hex16(models.content_hash) + ", " +
               std::to_string(models.observers.size()) + " observers");
   if (of_type) {
     report.Line("fault observers: " +
@@ -435,12 +425,6 @@ report::Report OnboardValve(const OnboardOptions& options,
   const auto start = std::chrono::steady_clock::now();
   Onboarding onboarding =
       OnboardOrSayWhyNot(runs, settings, Reporting(bar, signals));
-  if (options.gains && onboarding.coverage) {
-    onboarding.coverage->gains =
-        AssessType(onboarding.type, onboarding.coverage->signals, true,
-                   settings, Reporting(bar, signals))
-            .gains;
-  }
   bar.Finish();
   signals.EndWithin(std::chrono::milliseconds(0));
   onboarding.models =
@@ -485,7 +469,7 @@ report::Report Assess(const OnboardOptions& options,
   report::Progress bar("coverage");
   const CoverageTable table =
       AssessType(FindType(options.type, store ? &*store : nullptr).type,
-                 signals, options.gains, settings, Reporting(bar, stop));
+                 signals, settings, Reporting(bar, stop));
   bar.Finish();
   report::Report report;
   report.document = CoverageJson(table);
@@ -539,12 +523,8 @@ void AddOptions(CLI::App& verb, OnboardOptions& options) {
       ->type_name("R");
   verb.add_flag("!--no-coverage", options.onboarding.assess,
                 "Leave out the table of faults that can be detected");
-  verb.add_flag("--gains", options.gains,
-                "Compute what each missing transmitter would add; takes the "
-                "time of an onboarding for each");
-  report::ShowInHelpAll(verb,
-                        {"--resample", "--save-type", "--false-alarms-per-hour",
-                         "--no-coverage", "--gains"});
+  report::ShowInHelpAll(verb, {"--resample", "--save-type",
+                               "--false-alarms-per-hour", "--no-coverage"});
 }
 
 }  // namespace
@@ -571,19 +551,19 @@ void AddOnboardVerb(report::Program& program) {
   // The rows of a table state these, or leave nothing to choose: a type is
   // fitted once, and no row gets a table of faults.
   for (const char* option : {"--runs", "--type", "--signals", "--save-type",
-                             "--name", "--gains", "--no-coverage"}) {
+                             "--name", "--no-coverage"}) {
     verb.get_option("--plant")->excludes(verb.get_option(option));
   }
   program.AddExamples(
       {{"onboard",
         {{"A valve of the plant that has only ever been healthy",
           "fdi-trainer onboard --valve FV-101 --runs 1a2b,3c4d"},
-         {"From a CSV file, with what it would gain by more transmitters",
-          "fdi-trainer onboard --valve FV-101 --file fv101.csv --gains"},
+         {"From a CSV file",
+          "fdi-trainer onboard --valve FV-101 --file fv101.csv"},
          {"All loops of a plant: what the table matches, then the work",
           "fdi-trainer onboard --plant plant.toml --dry-run"},
          {"What could be seen of a valve with three transmitters",
-          "fdi-trainer onboard --dry-run --signals CV,X,F --gains"},
+          "fdi-trainer onboard --dry-run --signals CV,X,F"},
          {"The work; after an interruption the same command goes on",
           "fdi-trainer onboard --plant plant.toml"}}}});
 }

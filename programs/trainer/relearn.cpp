@@ -466,11 +466,11 @@ void Store(const RelearnOptions& options, const report::Context& context,
   const storage::Lineage lineage =
       store.LineageOf({models.name, models.version});
   report.document["version"] = models.version;
-  report.document["content_hash"] = storage::HashHex(models.content_hash);
+  report.document["content_hash"] = Hex16(models.content_hash);
   report.document["active"] = activate;
   report.document["lineage"] = report::LineageJson(lineage);
   report.Line("model set " + NameOf(models) + ", hash " +
-              storage::HashHex(models.content_hash) + ", built on " +
+              Hex16(models.content_hash) + ", built on " +
               report::ParentText(lineage));
   if (activate) {
     report.Line(NameOf(models) +

@@ -8,6 +8,7 @@
 
 #include "base/error.h"
 #include "base/log.h"
+#include "base/text.h"
 #include "base/time_text.h"
 #include "programs/trainer/model_report.h"
 #include "programs/trainer/verbs.h"
@@ -39,7 +40,6 @@ struct TrainOptions {
   std::optional<double> false_alarms_per_hour;
   int threads{0};
   bool activate{false};
-  bool print_campaign{false};
 };
 
 // Lays what the command line says over the settings of a campaign.
@@ -157,7 +157,7 @@ report::Report TrainAndStore(const std::vector<TrainingRun>& runs,
   report::Report report;
   report.document = ModelsJson(models);
   report.Line("model set " + NameOf(models) + ", hash " +
-              storage::HashHex(models.content_hash));
+              Hex16(models.content_hash));
   report.Line("");
   AddModelTables(models, report);
   return report;
@@ -166,14 +166,6 @@ report::Report TrainAndStore(const std::vector<TrainingRun>& runs,
 report::Report Train(const TrainOptions& options,
                      const report::Context& context) {
   const Campaign campaign = MakeCampaign(options);
-  if (options.print_campaign) {
-    report::Report report;
-    std::string text = CampaignText(campaign);
-    text.pop_back();  // The line ends by itself.
-    report.document["campaign"] = text;
-    report.Line(text);
-    return report;
-  }
   report::StopSignals signals;
   signals.EndWithin(kTrainPatience, kLastWords);
   const std::vector<TrainingRun> runs = LoadTrainingRuns(
@@ -212,9 +204,6 @@ void AddOptions(CLI::App& verb, TrainOptions& options) {
   verb.add_flag("--activate", options.activate,
                 "Make this version the active one; otherwise only the first "
                 "version of a name becomes active");
-  verb.add_flag("--print-campaign", options.print_campaign,
-                "Print the settings and runs as a campaign and exit")
-      ->configurable(false);
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 #include "report/models/lineage_text.h"
 
+#include "base/text.h"
 #include "base/time_text.h"
 #include "diagnosis/model/fault_catalogue.h"
 #include "report/text_table.h"
@@ -11,10 +12,9 @@ Json LineageJson(const storage::Lineage& lineage) {
   Json json;
   json["parent"] = Json();
   if (lineage.parent) {
-    json["parent"] = {
-        {"model_set", lineage.parent->name},
-        {"version", lineage.parent->version},
-        {"content_hash", storage::HashHex(lineage.parent->content_hash)}};
+    json["parent"] = {{"model_set", lineage.parent->name},
+                      {"version", lineage.parent->version},
+                      {"content_hash", Hex16(lineage.parent->content_hash)}};
   }
   const Json settings = Json::parse(lineage.settings, nullptr, false);
   json["settings"] = settings.is_discarded() ? Json() : settings;
@@ -40,7 +40,7 @@ std::string ParentText(const storage::Lineage& lineage) {
   }
   std::string text = lineage.parent->name + "@" +
                      std::to_string(lineage.parent->version) + ", hash " +
-                     storage::HashHex(lineage.parent->content_hash);
+                     Hex16(lineage.parent->content_hash);
   const Json settings = Json::parse(lineage.settings, nullptr, false);
   if (settings.contains("limits")) {
     text += ", with limits from " +

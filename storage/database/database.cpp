@@ -197,12 +197,6 @@ void RefuseName(std::string_view name) {
   throw DataError("the database holds an unknown name: " + std::string(name));
 }
 
-std::int64_t UtcNow() {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(
-             std::chrono::system_clock::now().time_since_epoch())
-      .count();
-}
-
 std::vector<std::string> SplitNames(std::string_view joined) {
   std::vector<std::string> names;
   while (!joined.empty()) {

@@ -40,9 +40,6 @@ struct EnumText {};
 /// @throws DataError: the file holds a name unknown to this program.
 [[noreturn]] void RefuseName(std::string_view name);
 
-/// Current UTC time [ns].
-std::int64_t UtcNow();
-
 /// Lists of names are stored in one column, joined by |: "a|b" is {"a", "b"},
 /// and "" is {}.
 std::vector<std::string> SplitNames(std::string_view joined);

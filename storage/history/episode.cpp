@@ -34,10 +34,7 @@ bool IsNamed(const Episode& episode) {
 }
 
 std::string EpisodeIdText(std::uint64_t episode_id) {
-  char text[17];
-  std::snprintf(text, sizeof text, "%016llx",
-                static_cast<unsigned long long>(episode_id));
-  return text;
+  return Hex16(episode_id);
 }
 
 std::optional<std::uint64_t> ParseEpisodeId(std::string_view text) {

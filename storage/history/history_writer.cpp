@@ -258,26 +258,19 @@ void StoreCoverage(Database& database, std::span<const CoverageDay> days) {
   }
 }
 
-void StoreAccumulators(Database& database, std::string_view table,
+void StoreAccumulators(Database& database,
                        std::span<const Accumulator> accumulators) {
   if (accumulators.empty()) {
     return;
   }
   Statement& row = database.Cached(InsertSql<Accumulator>(
-      table,
+      "accumulator",
       "ON CONFLICT (valve_id) DO UPDATE SET source_id = excluded.source_id, "
       "model_hash = excluded.model_hash, stamp_ns = excluded.stamp_ns, "
       "bytes = excluded.bytes"));
   for (const Accumulator& accumulator : accumulators) {
     BindRecord(row, accumulator).Run();
   }
-}
-
-std::vector<Accumulator> ReadAccumulators(Database& database,
-                                          const std::string& table) {
-  Statement rows = database.Prepare(
-      SelectSql<Accumulator>("FROM " + table + " ORDER BY valve_id"));
-  return ReadRecords<Accumulator>(rows);
 }
 
 // "NAME@VERSION"; version 0 if there is none.
@@ -508,14 +501,17 @@ void HistoryWriter::ConfirmNormal(const std::string& valve_id,
   });
 }
 
+void HistoryWriter::RequireEpisode(const std::string& id) {
+  if (!database_.QueryInt64("SELECT 1 FROM episode WHERE episode_id = ?", id)) {
+    throw NotFoundError("no episode " + id);
+  }
+}
+
 void HistoryWriter::Resume(std::uint64_t episode_id, std::int64_t stamp_ns,
                            std::int64_t now_ns) {
   const std::string id = EpisodeIdText(episode_id);
   CommitBatch([&] {
-    if (!database_.QueryInt64("SELECT 1 FROM episode WHERE episode_id = ?",
-                              id)) {
-      throw NotFoundError("no episode " + id);
-    }
+    RequireEpisode(id);
     database_.Cached(sql::insert_resumed).Bind(id, stamp_ns, now_ns).Run();
   });
 }
@@ -526,13 +522,15 @@ void HistoryWriter::CommitCheckpoint(const Checkpoint& checkpoint) {
     // transaction, so that after an error the caller can merge this checkpoint
     // into the next one.
     StoreCoverage(database_, checkpoint.coverage);
-    StoreAccumulators(database_, "accumulator", checkpoint.accumulators);
+    StoreAccumulators(database_, checkpoint.accumulators);
     StoreHealth(database_, checkpoint.health);
   });
 }
 
 std::vector<Accumulator> HistoryWriter::Accumulators() {
-  return ReadAccumulators(database_, "accumulator");
+  Statement rows = database_.Prepare(
+      SelectSql<Accumulator>("FROM accumulator ORDER BY valve_id"));
+  return ReadRecords<Accumulator>(rows);
 }
 
 void HistoryWriter::MarkSent(const FaultEvent& event) {

@@ -148,6 +148,8 @@ class HistoryWriter {
   };
 
   void StorePending();
+  /// @throws NotFoundError
+  void RequireEpisode(const std::string& id);
   /// @returns the session that it is a sign of.
   std::int64_t StoreSignOfLife(std::int64_t now_ns);
   /// Discards buffers that are now in the file.

@@ -14,10 +14,7 @@ namespace sql = history_sql;
 void HistoryWriter::StoreLook(const EpisodeLook& look) {
   const std::string id = EpisodeIdText(look.episode_id);
   CommitBatch([&] {
-    if (!database_.QueryInt64("SELECT 1 FROM episode WHERE episode_id = ?",
-                              id)) {
-      throw NotFoundError("no episode " + id);
-    }
+    RequireEpisode(id);
     database_.Cached(sql::delete_look).Bind(id).Run();
     database_.Cached(sql::insert_look)
         .Bind(id, look.first_ns, look.period_ns, look.misfit)

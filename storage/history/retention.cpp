@@ -6,6 +6,7 @@
 #include <unordered_set>
 #include <vector>
 
+#include "base/time_text.h"
 #include "base/time_units.h"
 #include "storage/database/locks.h"
 #include "storage/history/health.h"
@@ -171,7 +172,7 @@ PruneResult PruneInPlaceOrCopy(const std::filesystem::path& path,
   } catch (const NoRoomError&) {
     const auto copy =
         std::filesystem::temp_directory_path() /
-        (path.filename().string() + "." + std::to_string(UtcNow()) + ".pruned");
+        (path.filename().string() + "." + std::to_string(NowNs()) + ".pruned");
     const std::filesystem::path packed = copy.string() + ".packed";
     WriteGate gate(path);
     const GateHolder holder(gate, path);

@@ -27,10 +27,7 @@ void StoreStrengthNow(Database& database, const std::string& episode_id,
 void HistoryWriter::StoreStrength(const StrengthPoint& point) {
   const std::string id = EpisodeIdText(point.episode_id);
   CommitBatch([&] {
-    if (!database_.QueryInt64("SELECT 1 FROM episode WHERE episode_id = ?",
-                              id)) {
-      throw NotFoundError("no episode " + id);
-    }
+    RequireEpisode(id);
     database_.Cached(sql::insert_strength)
         .Bind(id, FaultName(point.fault), point.stamp_ns, point.strength,
               point.lowest, point.highest, LayerName(point.layer))

@@ -382,17 +382,4 @@ std::uint64_t Sha256Start(std::span<const std::byte> bytes) {
   return hash;
 }
 
-std::string HashHex(std::uint64_t hash) {
-  std::array<char, 17> text{};
-  std::snprintf(text.data(), text.size(), "%016llx",
-                static_cast<unsigned long long>(hash));
-  return text.data();
-}
-
-std::uint64_t HashOfHex(std::string_view text) {
-  std::uint64_t hash = 0;
-  std::from_chars(text.data(), text.data() + text.size(), hash, 16);
-  return hash;
-}
-
 }  // namespace fdi::storage

@@ -32,9 +32,4 @@ std::uint64_t ContentHash(const ModelSet& models);
 /// First 8 bytes of the SHA-256 of `bytes`, big endian.
 std::uint64_t Sha256Start(std::span<const std::byte> bytes);
 
-/// A hash in its stored form: 16 hex digits.
-std::string HashHex(std::uint64_t hash);
-/// The inverse; 0 if the text is not a hash.
-std::uint64_t HashOfHex(std::string_view text);
-
 }  // namespace fdi::storage

@@ -7,6 +7,7 @@
 
 #include "base/error.h"
 #include "base/text.h"
+#include "base/time_text.h"
 #include "diagnosis/model/fault_catalogue.h"
 #include "storage/database/record.h"
 #include "storage/models/model_codec.h"
@@ -98,7 +99,7 @@ ModelSummary ReadSummary(const Statement& row) {
            summary.flow_unit, summary.observers, summary.training_runs,
            summary.bytes, summary.lowest_vaf, summary.greatest_mse,
            summary.greatest_bias);
-  summary.content_hash = HashOfHex(hash);
+  summary.content_hash = ParseWhole<std::uint64_t>(hash, 16).value_or(0);
   return summary;
 }
 
@@ -111,7 +112,7 @@ void InsertLineage(Database& database, std::int64_t model_set_id,
       sql::insert_lineage, model_set_id, lineage.settings,
       parent ? std::optional(parent->name) : std::nullopt,
       parent ? std::optional(parent->version) : std::nullopt,
-      parent ? std::optional(HashHex(parent->content_hash)) : std::nullopt);
+      parent ? std::optional(Hex16(parent->content_hash)) : std::nullopt);
   Statement episode = database.Prepare(sql::insert_training_episode);
   for (const TrainingEpisode& e : lineage.episodes) {
     episode
@@ -127,7 +128,9 @@ Lineage ReadLineage(Database& database, std::int64_t model_set_id) {
   if (row.Bind(model_set_id).Step()) {
     lineage.settings = row.Text(0);
     if (const auto name = row.OptionalText(1)) {
-      lineage.parent = ParentSet{*name, row.Int(2), HashOfHex(row.Text(3))};
+      lineage.parent =
+          ParentSet{*name, row.Int(2),
+                    ParseWhole<std::uint64_t>(row.Text(3), 16).value_or(0)};
     }
   }
   Statement rows = database.Prepare(sql::training_episodes);
@@ -208,7 +211,7 @@ ModelSet ModelStore::Insert(const ModelSet& models, Activation activation,
   }
   ModelSet saved = models;
   if (saved.created_ns == 0) {
-    saved.created_ns = UtcNow();
+    saved.created_ns = NowNs();
   }
   const std::vector<std::byte> bytes = EncodeModelSet(saved);
   saved.content_hash = ContentHash(saved);
@@ -223,7 +226,7 @@ ModelSet ModelStore::Insert(const ModelSet& models, Activation activation,
     database_.Run(sql::deactivate, saved.name);
   }
   database_.Run(sql::insert_model_set, saved.name, saved.version,
-                HashHex(saved.content_hash), saved.created_ns, saved.software,
+                Hex16(saved.content_hash), saved.created_ns, saved.software,
                 saved.preset, saved.sample_period_s,
                 FlowUnitName(saved.flow_unit), activate, bytes);
   const std::int64_t id = database_.LastInsertRowid();
@@ -250,8 +253,7 @@ ModelSet ModelStore::Load(const ModelReference& reference) {
   models.version = row.Int(1);
   // The CRC-32 finds damaged bytes. Hash and name also find intact bytes that
   // belong to another row.
-  if (HashHex(models.content_hash) != row.Text(2) ||
-      models.name != row.Text(0)) {
+  if (Hex16(models.content_hash) != row.Text(2) || models.name != row.Text(0)) {
     throw DataError(where + " is damaged: its content hash differs");
   }
   Validate(models);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 
+#include "base/time_text.h"
 #include "storage/database/record.h"
 #include "storage/models/sql.h"
 
@@ -36,7 +37,7 @@ std::string_view LoopStateName(LoopState state) {
 void ModelStore::StoreLoop(const PlantLoop& loop) {
   database_.Run(sql::put_loop, loop.name, loop.service, loop.type, loop.grade,
                 loop.group, loop.watch, loop.state, loop.finding,
-                loop.input_hash, UtcNow());
+                loop.input_hash, NowNs());
 }
 
 bool ModelStore::IsEntry(std::string_view pattern) {

@@ -6,6 +6,7 @@
 #include "base/csv_cells.h"
 #include "base/error.h"
 #include "base/text.h"
+#include "base/time_text.h"
 #include "storage/database/record.h"
 #include "storage/models/models.h"
 #include "storage/models/sql.h"
@@ -392,7 +393,7 @@ void ModelStore::StoreBaseline(std::string_view pattern,
   entry.baseline_epoch = record.epoch;
   StoreEntry(entry);
   BaselineRecord stored = record;
-  stored.created_ns = UtcNow();
+  stored.created_ns = NowNs();
   InsertBaseline(database_, entry.pattern, stored);
 }
 
@@ -469,7 +470,7 @@ void ModelStore::StoreType(const ValveType& type) {
     throw ConfigError("valve type '" + type.name +
                       "': expected a name without @");
   }
-  database_.Run(sql::put_valve_type, type.name, UtcNow(), type.bytes,
+  database_.Run(sql::put_valve_type, type.name, NowNs(), type.bytes,
                 type.summary);
 }
 

@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include "base/error.h"
+#include "base/time_text.h"
 #include "storage/runs/sql.h"
 
 namespace fdi::storage {
@@ -63,7 +64,7 @@ void RunRecorder::Announce() {
   liveness_.emplace(database_.path());
   Transaction transaction(database_);
   Recover(database_, *liveness_, chunk_samples_);
-  database_.Run(sql::insert_recorder, getpid(), UtcNow());
+  database_.Run(sql::insert_recorder, getpid(), NowNs());
   const std::int64_t id = database_.LastInsertRowid();
   // The id is locked before the commit makes it visible, so nobody takes this
   // recorder for dead. Ids are never given twice (AUTOINCREMENT), so a locked

@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include "base/error.h"
+#include "base/time_text.h"
 #include "storage/database/record.h"
 #include "storage/runs/sql.h"
 
@@ -137,7 +138,7 @@ std::int64_t InsertRun(Database& database, const std::string& id,
             run.flow_unit, RunOriginName(run.origin), run.scenario, run.seed,
             run.software,
             RunStateName(recorder ? RunState::kRecording : RunState::kComplete),
-            recorder, UtcNow())
+            recorder, NowNs())
       .Run();
   return database.LastInsertRowid();
 }

@@ -6,6 +6,7 @@
 
 #include "base/error.h"
 #include "base/text.h"
+#include "base/time_text.h"
 #include "diagnosis/model/fault_catalogue.h"
 #include "storage/database/record.h"
 #include "storage/runs/run_rows.h"
@@ -344,7 +345,7 @@ void RunStore::Label(std::string_view text, int fault, double strength) {
   }
   database_->Run(sql::insert_label, info.row_id, BoundOf(selector.from_s),
                  BoundOf(selector.to_s), fault, FaultName(fault), strength,
-                 UtcNow());
+                 NowNs());
   transaction.Commit();
 }
 

@@ -4,6 +4,7 @@
 
 #include <gmock/gmock.h>
 
+#include "base/time_text.h"
 #include "storage/runs/run_recorder.h"
 #include "storage/runs/runs.h"
 #include "tests/storage/history_fixture.h"
@@ -169,7 +170,7 @@ class RunRetentionTest : public testing::Test {
 // time at which this test runs.
 TEST_F(RunRetentionTest, AgeIsThatOfTheArrivalWhereAClockWasWrong) {
   RunRecorder recorder(file_);
-  const auto now_day = static_cast<int>((UtcNow() - kStart) / kDay);
+  const auto now_day = static_cast<int>((NowNs() - kStart) / kDay);
   constexpr int kYears = 20 * 365;
   for (const int off : {-kYears, kYears}) {
     const auto run = recorder.Begin(RunOn(now_day + off));
@@ -184,8 +185,8 @@ TEST_F(RunRetentionTest, AgeIsThatOfTheArrivalWhereAClockWasWrong) {
     return PruneRuns(file_, limits).deleted;
   };
 
-  EXPECT_EQ(deleted(UtcNow() - kDay), 0);
-  EXPECT_EQ(deleted(UtcNow() + kDay), 2);
+  EXPECT_EQ(deleted(NowNs() - kDay), 0);
+  EXPECT_EQ(deleted(NowNs() + kDay), 2);
 }
 
 // Of four recorded days one bears a label, and one is being recorded.

@@ -14,6 +14,7 @@
 #include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
 
+#include "base/time_text.h"
 #include "diagnosis/model/fault_catalogue.h"
 #include "plant/plant_reader.h"
 #include "storage/history/history_reader.h"
@@ -1046,8 +1047,8 @@ TEST_F(ShipTest, ARestoredHistoryOverwritesNothing) {
                   kDetected);
     writer.AddGap({"V1", kDetected, from_ns, who});
     writer.Commit(from_ns + kSecond);
-    HistoryEditor(path).Shelve("V1", std::nullopt, UtcNow() + 3600 * kSecond,
-                               By(who, UtcNow()));
+    HistoryEditor(path).Shelve("V1", std::nullopt, NowNs() + 3600 * kSecond,
+                               By(who, NowNs()));
     EXPECT_EQ(Ship("a").code, 0);
   };
   live(kDetected + 100 * kSecond, "first");

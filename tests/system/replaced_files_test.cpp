@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "base/time_text.h"
 #include "storage/history/history_editor.h"
 #include "storage/history/history_reader.h"
 #include "storage/runs/run_recorder.h"
@@ -75,8 +76,8 @@ TEST_F(ReplacedFilesTest, DeletedLogsCostNothing) {
     ASSERT_TRUE(std::filesystem::remove(data_ / file)) << file;
   }
   storage::HistoryEditor(data_ / "history.db")
-      .Shelve("V1", std::nullopt, storage::UtcNow() + 3'600'000'000'000,
-              {"anna", "", "test", storage::UtcNow()});
+      .Shelve("V1", std::nullopt, NowNs() + 3'600'000'000'000,
+              {"anna", "", "test", NowNs()});
   Publish(80, 150);
   ASSERT_TRUE(AwaitEvent(TransitionKind::kClosed)) << monitor->errors();
   EXPECT_TRUE(faults_.back().persisted);

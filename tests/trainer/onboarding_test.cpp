@@ -541,16 +541,6 @@ TEST(CoverageTest, WhatIsLeftOutIsInNothingThatIsLeft) {
   EXPECT_EQ(runs[1].samples.size(), 1300U);
 }
 
-TEST(CoverageTest, GainIsWhatBecomesVisible) {
-  CoverageTable less;
-  less.faults = {{6, false, {}, {}, {}}, {19, false, 0.5, {}, {}}};
-  CoverageTable more;
-  more.faults = {{6, false, 0.1, 0.5, {}}, {19, false, 0.1, 0.1, {}}};
-  const TransmitterGain gain = GainOf(Signal::kF, less, more);
-  EXPECT_EQ(gain.detectable, std::vector<int>{6});
-  EXPECT_EQ(gain.isolable, (std::vector<int>{6, 19}));
-}
-
 TEST(OnboardTest, RefusesWhatIsNotHealthyData) {
   OnboardingOptions options;
   options.name = "x";

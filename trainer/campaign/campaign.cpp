@@ -6,7 +6,6 @@
 #include "base/csv_cells.h"
 #include "base/error.h"
 #include "base/toml_reader.h"
-#include "base/toml_text.h"
 #include "simulator/scenario/scenario_toml.h"
 #include "trainer/campaign/campaign_fields.h"
 #include "trainer/campaign/file_runs.h"
@@ -208,82 +207,10 @@ class Reader {
   std::uint64_t simulated_{0};
 };
 
-// Writes each field that it visits.
-class FieldWriter {
- public:
-  explicit FieldWriter(std::string& text) : text_(text) {}
-
-  void operator()(const char* key, const auto& field, auto, auto) {
-    Line(key, NumberText(field));
-  }
-  void operator()(const char* key, bool field) {
-    Line(key, field ? "true" : "false");
-  }
-  void Line(const char* key, const std::string& value) {
-    text_ += key;
-    text_ += " = " + value + '\n';
-  }
-
- private:
-  std::string& text_;
-};
-
-void WriteSource(const char* table, const SimulatedRun& run,
-                 std::string& text) {
-  text += std::string("[") + table + ".simulate]\n" +
-          simulator::ScenarioText(run.scenario);
-}
-
-void WriteSource(const char*, const ImportedRun& run, std::string& text) {
-  text += "import = " + TomlText(run.file.string()) +
-          "\nvalve = " + TomlText(run.valve_id) + '\n';
-}
-
-void WriteSource(const char*, const RecordedRun& run, std::string& text) {
-  text += "run = " + TomlText(run.selector) + '\n';
-}
-
-// Keys of the run itself come before its sub-table [run.simulate], because TOML
-// counts everything behind the head of a table to that table.
-void WriteRun(const char* table, const CampaignRun& run, std::string& text) {
-  text += std::string("\n[[") + table + "]]\n";
-  FieldWriter writer(text);
-  if (run.horizon_s > 0.0) {
-    writer.Line("horizon_s", NumberText(run.horizon_s));
-  }
-  if (std::isfinite(run.stretch.from_s)) {
-    writer.Line("from_s", NumberText(run.stretch.from_s));
-  }
-  if (std::isfinite(run.stretch.to_s)) {
-    writer.Line("to_s", NumberText(run.stretch.to_s));
-  }
-  std::visit([&](const auto& source) { WriteSource(table, source, text); },
-             run.source);
-}
-
 }  // namespace
 
 Campaign LoadCampaign(const path& file) {
   return Reader(file).Read();
-}
-
-std::string CampaignText(const Campaign& campaign) {
-  TrainingOptions training = campaign.training;
-  std::string text;
-  FieldWriter writer(text);
-  writer.Line("name", TomlText(training.name));
-  writer.Line("preset", TomlText(training.preset));
-  text += "\n[decision]\n";
-  VisitDecision(training.decision, writer);
-  text += "\n[training]\n";
-  VisitTraining(training, writer);
-  for (const CampaignRun& run : campaign.runs) {
-    WriteRun("run", run, text);
-  }
-  for (const CampaignRun& run : campaign.validation) {
-    WriteRun("validation", run, text);
-  }
-  return text;
 }
 
 std::string RunLabel(const CampaignRun& run) {

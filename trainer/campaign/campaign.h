@@ -87,8 +87,4 @@ std::string RunLabel(const CampaignRun& run);
 /// @throws ConfigError naming file, line, key and what is accepted.
 Campaign LoadCampaign(const std::filesystem::path& path);
 
-/// The text from which LoadCampaign() restores `campaign`, all runs spelled
-/// out.
-std::string CampaignText(const Campaign& campaign);
-
 }  // namespace fdi::trainer

@@ -7,6 +7,7 @@
 
 #include "base/error.h"
 #include "base/log.h"
+#include "base/text.h"
 
 namespace fdi::trainer {
 namespace {
@@ -31,24 +32,6 @@ std::string WithVariables(std::string text) {
     begin += std::string_view(value).size();  // It may hold a ${ of its own.
   }
   return text;
-}
-
-// True if `name` is `pattern`, in which a * stands for anything: each * is
-// tried with every length, shortest first.
-bool Matches(std::string_view pattern, std::string_view name) {
-  const std::size_t star = pattern.find('*');
-  if (star == std::string_view::npos) {
-    return pattern == name;
-  }
-  if (!name.starts_with(pattern.substr(0, star))) {
-    return false;
-  }
-  for (std::size_t skip = star; skip <= name.size(); ++skip) {
-    if (Matches(pattern.substr(star + 1), name.substr(skip))) {
-      return true;
-    }
-  }
-  return false;
 }
 
 // The file and the stretch; an @ may be part of the name of a file.
@@ -105,7 +88,7 @@ std::vector<path> MatchingFiles(const std::string& pattern,
   std::error_code error;
   for (const auto& entry : std::filesystem::directory_iterator(
            absolute.has_parent_path() ? absolute.parent_path() : ".", error)) {
-    if (Matches(name, entry.path().filename().string())) {
+    if (MatchesStars(name, entry.path().filename().string())) {
       files.push_back(entry.path());
     }
   }

@@ -12,6 +12,7 @@
 #include "base/error.h"
 #include "base/mutex.h"
 #include "base/parallel_for.h"
+#include "base/text.h"
 #include "diagnosis/model/fault_catalogue.h"
 #include "storage/models/model_codec.h"
 #include "trainer/campaign/campaign_runs.h"
@@ -173,9 +174,9 @@ class PlantRun {
     if (!job.error.empty()) {
       throw DataError(job.error);
     }
-    outcome.loop.input_hash = storage::HashHex(
-        InputHash(job, TextsOf(job, files_),
-                  BasisText(TypeOfRow(i), settings_.onboarding)));
+    outcome.loop.input_hash =
+        Hex16(InputHash(job, TextsOf(job, files_),
+                        BasisText(TypeOfRow(i), settings_.onboarding)));
     const auto before = stored_.find(job.row.name);
     if (before == stored_.end() ||
         before->second.input_hash != outcome.loop.input_hash ||

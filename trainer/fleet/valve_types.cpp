@@ -7,6 +7,7 @@
 
 #include "base/csv_cells.h"
 #include "base/error.h"
+#include "base/text.h"
 #include "base/toml_reader.h"
 #include "base/toml_text.h"
 #include "simulator/scenario/scenario_toml.h"
@@ -75,8 +76,8 @@ std::optional<ModelSet> SetOf(const FoundType& found,
   try {
     ModelSet models = store.Load(found.model_set);
     // A type that came with another store may name a set of this one.
-    const bool same = found.set_hash.empty() ||
-                      found.set_hash == storage::HashHex(models.content_hash);
+    const bool same =
+        found.set_hash.empty() || found.set_hash == Hex16(models.content_hash);
     return same ? std::optional(std::move(models)) : std::nullopt;
   } catch (const NotFoundError&) {
     return std::nullopt;
@@ -102,8 +103,7 @@ std::string TypeText(const ValveType& type, const ModelSet* models) {
          "\nmodel_set = " + TomlText(set) + '\n' +
          (models == nullptr
               ? ""
-              : "set_hash = " +
-                    TomlText(storage::HashHex(models->content_hash)) + '\n') +
+              : "set_hash = " + TomlText(Hex16(models->content_hash)) + '\n') +
          ScenarioText(scenario);
 }
 

@@ -131,28 +131,6 @@ FaultCoverage Summarise(std::vector<FaultScore> scores) {
   return coverage;
 }
 
-// Faults with a value in `more` and none in `less`. Both directions of a fault
-// stand one after the other in a table, so that a look at the last one found
-// avoids duplicates.
-template <typename Member>
-std::vector<int> Gained(const CoverageTable& less, const CoverageTable& more,
-                        Member member) {
-  const auto has = [&](const CoverageTable& table, int fault) {
-    return std::any_of(table.faults.begin(), table.faults.end(),
-                       [&](const FaultCoverage& c) {
-                         return c.fault == fault && (c.*member).has_value();
-                       });
-  };
-  std::vector<int> gained;
-  for (const FaultCoverage& coverage : more.faults) {
-    if (has(more, coverage.fault) && !has(less, coverage.fault) &&
-        (gained.empty() || gained.back() != coverage.fault)) {
-      gained.push_back(coverage.fault);
-    }
-  }
-  return gained;
-}
-
 // How many parts of `count` samples the stretch has room for.
 std::size_t Room(const Stretch& stretch, std::size_t count) {
   return stretch.samples.size() / count;
@@ -186,8 +164,7 @@ CoverageTable ScoreCoverage(const std::vector<FaultCondition>& faults,
       AddPart(ComputeIndices(ScoreRun(plans[p], run)), healthy[p], scores[f]);
     }
   });
-  // Every turn takes out the scores of one fault in one direction. The order of
-  // `faults` is kept, on which Gained() relies.
+  // Every turn takes out the scores of one fault in one direction.
   while (!scores.empty()) {
     const FaultCondition first = scores.front().fault;
     const auto others = std::stable_partition(
@@ -338,12 +315,6 @@ std::vector<CoverageChange> ChangesOf(const CoverageTable& before,
     }
   }
   return changes;
-}
-
-TransmitterGain GainOf(Signal signal, const CoverageTable& less,
-                       const CoverageTable& more) {
-  return {signal, Gained(less, more, &FaultCoverage::detectable),
-          Gained(less, more, &FaultCoverage::isolable)};
 }
 
 }  // namespace fdi::trainer

@@ -24,13 +24,6 @@ struct FaultCoverage {
   std::vector<int> look_alikes{};  ///< Beside it in some final set, or instead.
 };
 
-/// What becomes visible with one more transmitter.
-struct TransmitterGain {
-  Signal signal{Signal::kF};
-  std::vector<int> detectable{};  ///< Faults that were not.
-  std::vector<int> isolable{};    ///< Faults that were not.
-};
-
 struct CoverageTable {
   SignalMask signals{0};
   double seconds{0.0};  ///< That a fault was given to show.
@@ -39,7 +32,6 @@ struct CoverageTable {
   int alarmed{0};  ///< Of these, those with an alarm without a fault.
   /// Share of them that was within what the models know: the least of a part.
   double judged{1.0};
-  std::vector<TransmitterGain> gains{};
 };
 
 /// A part of a healthy record, what faults make of it, and who is to judge it.
@@ -86,11 +78,6 @@ Stretch CutOut(const Stretch& stretch, const RecordPart& part);
 /// What is left of the stretches without `part`, of much of it four blocks of
 /// 300 samples; rests too short to tell anything are left out.
 FaultyStretches Without(const FaultyStretches& all, const RecordPart& part);
-
-/// The gain of `more` over `less`: faults that are detectable or isolable at
-/// some strength in one and not in the other.
-TransmitterGain GainOf(Signal signal, const CoverageTable& less,
-                       const CoverageTable& more);
 
 /// The smallest strength of a fault that is detected, by two sets.
 struct CoverageChange {

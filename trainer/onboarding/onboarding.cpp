@@ -512,28 +512,6 @@ TrainingOptions TrainingOf(const OnboardingOptions& options,
 constexpr std::size_t kTypeSamples = 1800;
 constexpr std::size_t kTypeUnseen = 1020;
 
-// std::function copies what it is given, and the synthesizer has a mutex: hence
-// std::ref().
-CoverageTable AssessSubset(const ValveType& type, const TrainingRun& full,
-                           SignalMask signals, const OnboardingOptions& options,
-                           const Progress& progress) {
-  TrainingRun run = WithSignals(full, signals);
-  Stretch unseen{run.id, {}};
-  for (std::size_t k = kTypeSamples; k < run.samples.size(); ++k) {
-    unseen.samples.push_back(run.samples[k].sample);
-  }
-  run.samples.resize(kTypeSamples);
-  const FaultSynthesizer synthesize(type);
-  const std::vector<FaultCondition> faults =
-      OnboardingFaults(signals, type.parameters);
-  const auto models = std::make_shared<const ModelSet>(
-      TrainDifferenceSet({run}, faults, std::ref(synthesize),
-                         type.parameters.instruments.flow.high,
-                         TrainingOf(options, signals), progress));
-  return AssessCoverage(models, faults, std::ref(synthesize), unseen,
-                        options.threads);
-}
-
 // The type as it is against the longest stretch.
 simulator::RecordFit Compare(const std::vector<TrainingRun>& runs,
                              const ValveType& type) {
@@ -788,33 +766,28 @@ Onboarding Onboard(const std::vector<TrainingRun>& all,
   return result;
 }
 
+// std::function copies what it is given, and the synthesizer has a mutex: hence
+// std::ref().
 CoverageTable AssessType(const ValveType& type, SignalMask signals,
-                         bool with_gains, const OnboardingOptions& options,
+                         const OnboardingOptions& options,
                          const Progress& progress) {
-  const TrainingRun full =
-      SimulateHealthyRun(type, static_cast<double>(kTypeSamples + kTypeUnseen));
-  // All tables rest on one simulated run and differ by the signals alone. Each
-  // gain is that of a single transmitter; what two of them together would show
-  // is not asked.
-  std::vector<Signal> missing;
-  for (const Signal signal :
-       {Signal::kF, Signal::kP1, Signal::kP2, Signal::kT1}) {
-    if (with_gains && (signals & MaskOf(signal)) == 0) {
-      missing.push_back(signal);
-    }
+  TrainingRun run = WithSignals(
+      SimulateHealthyRun(type, static_cast<double>(kTypeSamples + kTypeUnseen)),
+      signals);
+  Stretch unseen{run.id, {}};
+  for (std::size_t k = kTypeSamples; k < run.samples.size(); ++k) {
+    unseen.samples.push_back(run.samples[k].sample);
   }
-  const double share = 1.0 / static_cast<double>(missing.size() + 1);
-  CoverageTable table =
-      AssessSubset(type, full, signals, options, Part(progress, 0.0, share));
-  double from = share;
-  for (const Signal signal : missing) {
-    const auto more = static_cast<SignalMask>(signals | MaskOf(signal));
-    table.gains.push_back(GainOf(
-        signal, table,
-        AssessSubset(type, full, more, options, Part(progress, from, share))));
-    from += share;
-  }
-  return table;
+  run.samples.resize(kTypeSamples);
+  const FaultSynthesizer synthesize(type);
+  const std::vector<FaultCondition> faults =
+      OnboardingFaults(signals, type.parameters);
+  const auto models = std::make_shared<const ModelSet>(
+      TrainDifferenceSet({run}, faults, std::ref(synthesize),
+                         type.parameters.instruments.flow.high,
+                         TrainingOf(options, signals), progress));
+  return AssessCoverage(models, faults, std::ref(synthesize), unseen,
+                        options.threads);
 }
 
 }  // namespace fdi::trainer

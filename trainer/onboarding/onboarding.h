@@ -99,11 +99,10 @@ Onboarding Onboard(const std::vector<TrainingRun>& runs,
                    const OnboardingOptions& options,
                    const Progress& progress = {});
 
-/// What `models`, made for `signals` alone, would gain by each transmitter of
-/// the basic set that is missing: the type is simulated healthy with all
-/// transmitters, and onboarded with and without.
+/// What could be seen of a valve of the type that measures `signals` alone: the
+/// type is simulated healthy, and onboarded.
 CoverageTable AssessType(const ValveType& type, SignalMask signals,
-                         bool with_gains, const OnboardingOptions& options,
+                         const OnboardingOptions& options,
                          const Progress& progress = {});
 
 }  // namespace fdi::trainer

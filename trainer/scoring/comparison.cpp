@@ -5,6 +5,7 @@
 #include <sstream>
 #include <utility>
 
+#include "base/text.h"
 #include "diagnosis/model/fault_catalogue.h"
 #include "report/text_table.h"
 #include "storage/models/model_codec.h"
@@ -159,7 +160,7 @@ Json ModelsJson(const ModelSet& models, const std::vector<EvaluatedRun>& runs) {
   Json json = FiguresJson(runs);
   json["model_set"] = models.name;
   json["version"] = models.version;
-  json["content_hash"] = storage::HashHex(models.content_hash);
+  json["content_hash"] = Hex16(models.content_hash);
   return json;
 }
 

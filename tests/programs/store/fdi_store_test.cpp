@@ -486,7 +486,7 @@ TEST_F(FdiStoreTest, WhatTakesOutputTakesMinusO) {
   EXPECT_EQ(Slurp(directory_.path() / "run.csv"), header_ + Rows(5));
   EXPECT_EQ(Store("models export pump -o pump.fdm").code, 0);
   EXPECT_EQ(Store("models import pump.fdm").code, 0);
-  EXPECT_EQ(Store("history export -o history.csv").code, 0);
+  EXPECT_EQ(Store("history list --csv").code, 0);
 }
 
 TEST_F(FdiStoreTest, CatalogueIsListedAndOverridden) {

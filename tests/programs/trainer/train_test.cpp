@@ -146,17 +146,6 @@ TEST_F(AppTrainTest, FitOfAnOutputThatDidNotVaryHasNoVaf) {
   EXPECT_THAT(Run("show quick@2").out, testing::Not(HasSubstr("-13000")));
 }
 
-TEST_F(AppTrainTest, PrintedCampaignRebuildsTheSameSet) {
-  Write("c.toml", Quick() + TwoConditions());
-  Write("p.toml", Run("train --campaign c.toml --print-campaign").out);
-  ASSERT_FALSE(std::filesystem::exists(Path("data")));
-
-  const json original = RunJson("train --campaign c.toml", "a");
-  const json printed = RunJson("train --campaign p.toml", "b");
-
-  EXPECT_EQ(original["content_hash"], printed["content_hash"]);
-}
-
 TEST_F(AppTrainTest, ImportedFileIsReadOnceAndStretchesAreKept) {
   std::string csv = "t_s,CV_pct,P1_kPa,P2_kPa,T1_degC,X_pct,F_t_h\n";
   for (int k = 0; k < 300; ++k) {
