@@ -139,33 +139,6 @@ std::string_view WithoutFlag(std::string_view cell) {
   return SplitUnit(number).second.empty() ? number : cell;
 }
 
-// With the period T and the step d of two samples, |d - T| < T/2 is accepted:
-// the nearest instant of the grid is then unambiguous. A longer step is a gap,
-// which only `split_gaps_` allows. A step that is too short is never a gap.
-std::string StepCheck::Take(double t_s) {
-  const std::optional<double> last = std::exchange(last_t_s_, t_s);
-  if (!last) {
-    return {};
-  }
-  const double step = t_s - *last;
-  // Negated so that NaN is refused, too.
-  if (!(step > 0.0)) {
-    return "time goes back or stands still: from " + NumberText(*last) +
-           " s to " + NumberText(t_s) +
-           " s; expected rows in the order of time; try to sort the file";
-  }
-  if (period_s_ == 0.0) {
-    period_s_ = step;
-  }
-  const double off = step - period_s_;
-  if (std::abs(off) < 0.5 * period_s_ || (split_gaps_ && off > 0.0)) {
-    return {};
-  }
-  return "time jumps by " + NumberText(step) + " s to " + NumberText(t_s) +
-         " s, the sample period is " + NumberText(period_s_) +
-         " s; try --split-gaps for gaps";
-}
-
 CsvReader::CsvReader(CsvOptions options)
     : options_(std::move(options)), clock_(options_.map.zone) {
   Require(options_.period_s >= 0.0, "the sample period is not negative");

@@ -208,27 +208,7 @@ struct CsvRow {
   std::int64_t line{0};
 };
 
-/// Checks the time steps of samples that arrive one by one.
-class StepCheck {
- public:
-  /// @param period_s 0: taken from the first step.
-  explicit StepCheck(bool split_gaps, double period_s = 0.0)
-      : split_gaps_(split_gaps), period_s_(period_s) {}
-
-  /// A step may differ from the period by half of it, or be longer with
-  /// `split_gaps`. @returns what is wrong with the next step; empty if it is
-  /// valid.
-  std::string Take(double t_s);
-  double period_s() const { return period_s_; }
-
- private:
-  bool split_gaps_;
-  double period_s_;
-  std::optional<double> last_t_s_;
-};
-
-/// Reads a table line by line, e.g. from a pipe; checking the time steps is
-/// left to the caller.
+/// Reads a table line by line; checking the time steps is left to the caller.
 ///
 /// Header: t_s,CV_pct,P1_kPa,P2_kPa,T1_degC,X_pct,F_m3_h (or F_t_h), in any
 /// order and case; optional SP_pct,CVI,Ps_kPa,Pz_kPa; optional PV, and with it

@@ -256,7 +256,8 @@ constexpr OtherForm kOtherForms[] = {
      "jq -r '\"time,value,good\", (.Items[] | [.Timestamp, .Value, .Good] | "
      "@csv)' FILE.json > FILE.csv, one file a tag"},
     {"JSON lines", "{", "\"t_s\"",
-     "fdi-simulator replay --file - < FILE, which publishes them"},
+     "jq -rs '(.[0] | keys_unsorted) as $k | $k, (.[] | [.[$k[]]]) | @csv' "
+     "FILE > FILE.csv"},
     {"JSON", "{", "", "jq -r '.[] | [.time, .tag, .value] | @csv'"},
     {"JSON", "[", "\":", "jq -r '.[] | [.time, .tag, .value] | @csv'"},
 };

@@ -56,6 +56,9 @@ constexpr auto kRemoved = std::to_array<Removed>({
     {"fdi-simulator", "run", "--export", "-o FILE"},
     {"fdi-simulator", "run", "--cold-start", "--set cold_start=true"},
     {"fdi-simulator", "replay", "--csv", "--file FILE"},
+    {"fdi-simulator", "replay", "--period",
+     "a file tells its period; samples that arrive one by one are readings for "
+     "fdi-gateway in --lines -"},
     {"fdi-store", "", "keys",
      "the script fdi-keys makes, renews and lists keys"},
     {"fdi-store", "", "migrate",

@@ -30,9 +30,7 @@ std::vector<report::VerbExamples> Examples() {
       {"replay",
        {{"A record of the plant as it was, ten times faster",
          "fdi-simulator replay --file fv101.csv --valve FV-101 --speed 10"},
-        {"Part of a stored run", "fdi-simulator replay --run 1a2b@600:1200"},
-        {"From any gateway that writes JSON lines",
-         "fdi-simulator replay --file - --valve FV-101"}}},
+        {"Part of a stored run", "fdi-simulator replay --run 1a2b@600:1200"}}},
   };
 }
 

@@ -1,17 +1,19 @@
 #include <chrono>
+#include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include <CLI/CLI.hpp>
-#include <unistd.h>
 
 #include "base/error.h"
+#include "base/log.h"
+#include "import/csv.h"
 #include "import/tag_map.h"
 #include "programs/simulator/delivery.h"
-#include "programs/simulator/recorded_feed.h"
 #include "programs/simulator/verbs.h"
 #include "report/help.h"
 #include "simulator/second_look/valve_physics.h"
@@ -23,22 +25,22 @@
 namespace fdi::simulator {
 namespace {
 
-constexpr const char* kStdinName = "-";
-
 struct ReplayOptions {
   std::string file;
   std::string run;
   std::string valve;
   bool keep_stamps{false};
+  bool split_gaps{false};
   importer::TableOptions table;
-  StreamOptions stream;
   DeliveryOptions delivery;
 };
+
+using Parts = std::vector<std::vector<LabelledSample>>;
 
 // The samples to replay, and their valve.
 struct Recording {
   std::string valve_id;
-  StoredFeed::Parts parts;  // None is empty.
+  Parts parts;  // None is empty.
 };
 
 Recording LoadRun(const ReplayOptions& options,
@@ -77,17 +79,25 @@ std::optional<FlowTarget> FlowTargetOf(const std::string& valve,
 
 Recording LoadCsv(const ReplayOptions& options,
                   const report::Context& context) {
-  importer::CsvTable table = importer::ReadCsvFile(
-      options.file, {.map = options.stream.map,
-                     .required = MaskOf(Signal::kCv),
-                     .split_gaps = options.stream.split_gaps,
-                     .log = context.log});
+  const auto target = FlowTargetOf(options.valve, context);
+  const importer::ColumnMap map = options.table.Read(context.options.utc);
+  if (target) {
+    importer::CheckGasFlow(map, MolarMass(target->medium));
+  }
+  importer::CsvTable table =
+      importer::ReadCsvFile(options.file, {.map = map,
+                                           .required = MaskOf(Signal::kCv),
+                                           .split_gaps = options.split_gaps,
+                                           .log = context.log});
   Recording recording;
   const FlowUnit own = table.header.flow_unit;
-  const FlowTarget to =
-      FlowTargetOf(options.valve, context).value_or(FlowTarget{own});
-  if ((table.header.signals & MaskOf(Signal::kF)) != 0) {
-    ReportConversion(context.log, options.file, own, to.unit);
+  const FlowTarget to = target.value_or(FlowTarget{own});
+  if ((table.header.signals & MaskOf(Signal::kF)) != 0 && own != to.unit) {
+    context.log(LogLevel::kInfo,
+                EventLine("flow_converted",
+                          {{"run", options.file},
+                           {"from", std::string(FlowUnitName(own))},
+                           {"to", std::string(FlowUnitName(to.unit))}}));
   }
   FlowConversion conversion(to);
   for (SampleSeries& run : table.runs) {
@@ -109,12 +119,8 @@ void Check(const ReplayOptions& options) {
   if (options.keep_stamps && !options.delivery.start.empty()) {
     throw ConfigError("--keep-stamps and --start exclude each other");
   }
-  if (options.delivery.end_now &&
-      (options.keep_stamps || options.file == kStdinName)) {
-    throw ConfigError(
-        "--end-now goes neither with --keep-stamps nor with --file -, whose "
-        "end "
-        "is not known");
+  if (options.keep_stamps && options.delivery.end_now) {
+    throw ConfigError("--keep-stamps and --end-now exclude each other");
   }
   if (options.file.empty() && options.table.given()) {
     throw ConfigError("--map, --zone and --resample are of --file");
@@ -122,89 +128,81 @@ void Check(const ReplayOptions& options) {
   StartOf(options.delivery, 0.0, 1.0);  // An invalid one is rejected first.
 }
 
-// Opens the feed; sets `valve_id` if the options do not.
-std::unique_ptr<Feed> OpenFeed(const ReplayOptions& options, double speed,
-                               Restamping restamping,
-                               const report::Context& context,
-                               report::StopSignals& signals,
-                               std::string& valve_id) {
-  if (options.file == kStdinName) {
-    if (options.stream.map.resampling || options.stream.map.long_table) {
-      throw ConfigError(
-          "--file -: what is resampled or long is read as a whole; try a file");
+// Samples that are known in advance, shifted so that the first is stamped with
+// `start_ns`, or unchanged without it.
+class StoredFeed final : public Feed {
+ public:
+  StoredFeed(Parts parts, std::optional<std::int64_t> start_ns,
+             std::uint64_t source_id)
+      : parts_(std::move(parts)), source_id_(source_id) {
+    if (start_ns && !parts_.empty()) {
+      shift_ns_ = *start_ns - parts_.front().front().sample.stamp_ns;
     }
-    StreamOptions stream = options.stream;
-    stream.flow = FlowTargetOf(options.valve, context);
-    return std::make_unique<StreamFeed>(STDIN_FILENO, signals, stream,
-                                        restamping, context.log);
   }
-  Recording recording = options.run.empty() ? LoadCsv(options, context)
-                                            : LoadRun(options, context);
-  if (valve_id.empty()) {
-    valve_id = recording.valve_id;
+
+  std::optional<FedSample> Next() override {
+    while (part_ < parts_.size() && next_ == parts_[part_].size()) {
+      parts_[part_++] = {};  // Freed behind its last sample.
+      next_ = 0;
+    }
+    if (part_ == parts_.size()) {
+      return std::nullopt;
+    }
+    FedSample fed{0, parts_[part_][next_++]};
+    fed.labelled.sample.source_id = source_id_;
+    fed.labelled.sample.stamp_ns += shift_ns_;
+    return fed;
   }
-  if (!recording.parts.empty()) {
-    restamping.start =
-        [&options, speed,
-         duration_s =
-             1e-9 * static_cast<double>(
-                        recording.parts.back().back().sample.stamp_ns -
-                        recording.parts.front().front().sample.stamp_ns)] {
-          return StartOf(options.delivery, duration_s, speed);
-        };
-  }
-  return std::make_unique<StoredFeed>(std::move(recording.parts), restamping);
+
+ private:
+  Parts parts_;
+  std::uint64_t source_id_;
+  std::int64_t shift_ns_{0};
+  std::size_t part_{0};
+  std::size_t next_{0};
+};
+
+double SecondsOf(const Parts& parts) {
+  return parts.empty()
+             ? 0.0
+             : 1e-9 *
+                   static_cast<double>(parts.back().back().sample.stamp_ns -
+                                       parts.front().front().sample.stamp_ns);
 }
 
-report::Report Replay(const ReplayOptions& given,
+report::Report Replay(const ReplayOptions& options,
                       const report::Context& context) {
-  ReplayOptions options = given;
   Check(options);
-  options.stream.map = options.table.Read(context.options.utc);
-  if (const auto target = FlowTargetOf(options.valve, context)) {
-    importer::CheckGasFlow(options.stream.map, MolarMass(target->medium));
-  }
-  const bool at_once = options.file == kStdinName && !options.delivery.speed;
-  const double speed =
-      ParseSpeed(options.delivery.speed.value_or(at_once ? "max" : "1"));
-  SamplePublisherOptions publishing =
-      PublisherOptionsOf(options.delivery, speed);
-  if (at_once) {
-    // A gateway continues without readers; an existing one paces it.
-    publishing.needs_reader = options.delivery.wait_reader_s > 0.0;
-  }
-  Restamping restamping;
-  restamping.keep = options.keep_stamps;
-  restamping.start = [&options, speed] {
-    return StartOf(options.delivery, 0.0, speed);
-  };
-  restamping.source_id = NewSourceId();
-
+  const double speed = ParseSpeed(options.delivery.speed.value_or("1"));
   report::StopSignals signals;
   // Nothing is published before the whole file is read.
   signals.EndWithin(std::chrono::milliseconds(800),
                     "fdi-simulator: error: interrupted\n");
-  FedValve valve{options.valve, restamping.source_id};
-  const auto feed =
-      OpenFeed(options, speed, restamping, context, signals, valve.valve_id);
+  Recording recording = options.run.empty() ? LoadCsv(options, context)
+                                            : LoadRun(options, context);
   signals.EndWithin(std::chrono::milliseconds(0));
+  FedValve valve{options.valve.empty() ? recording.valve_id : options.valve,
+                 NewSourceId()};
   RequireValveId(valve.valve_id);
   FeedSinks sinks;
   sinks.publisher = std::make_unique<SamplePublisher>(
-      publishing, std::vector{valve.valve_id}, context, signals);
+      PublisherOptionsOf(options.delivery, speed), std::vector{valve.valve_id},
+      context, signals);
   sinks.publisher->AwaitReader();
-  return Deliver(*feed, sinks, speed, signals, {valve});
+  std::optional<std::int64_t> start_ns;
+  if (!options.keep_stamps) {
+    start_ns = StartOf(options.delivery, SecondsOf(recording.parts), speed);
+  }
+  StoredFeed feed(std::move(recording.parts), start_ns, valve.source_id);
+  return Deliver(feed, sinks, speed, signals, {valve});
 }
 
 }  // namespace
 
 void AddReplayVerb(report::Program& program) {
-  auto [verb, options] = AddVerb(
-      program, "replay",
-      "Publish a stored run, a CSV file or what comes on stdin", Replay);
-  verb.add_option("--file", options.file,
-                  "CSV file; - reads CSV or JSON lines from stdin and passes "
-                  "each on at once, unless --speed is given")
+  auto [verb, options] =
+      AddVerb(program, "replay", "Publish a stored run or a CSV file", Replay);
+  verb.add_option("--file", options.file, "CSV file; - is stdin")
       ->type_name("FILE|-");
   options.table.AddTo(verb);
   verb.add_option("--run", options.run, "A stored run, or a stretch of it")
@@ -215,16 +213,9 @@ void AddReplayVerb(report::Program& program) {
   AddDeliveryOptions(verb, options.delivery);
   verb.add_flag("--keep-stamps", options.keep_stamps,
                 "Keep the time stamps instead of beginning now; t_s of a CSV "
-                "or of JSON is then Unix time");
-  verb.add_flag("--split-gaps", options.stream.split_gaps,
-                "Accept gaps in the times of a CSV or of JSON, and keep them");
-  verb.add_option("--period", options.stream.period_s,
-                  "Sample period of lines on stdin (default: their first "
-                  "step; 1 s for JSON lines without t_s, which are stamped "
-                  "on arrival)")
-      ->check(CLI::Range(1e-3, 3600.0))
-      ->default_str("")
-      ->type_name("S");
+                "is then Unix time");
+  verb.add_flag("--split-gaps", options.split_gaps,
+                "Accept gaps in the times of a CSV, and keep them");
   report::ShowInHelpAll(verb, {"--resample", "--wait-reader", "--keep-alive"});
 }
 

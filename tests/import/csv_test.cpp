@@ -325,12 +325,6 @@ TEST(CsvTest, LineByLineReaderAnswersWithEachRow) {
   EXPECT_THROW(reader.Finish(), DataError);
   EXPECT_EQ(reader.TakeLine("0,1,2,3,4,5,6")->t_s, 0.0);
   EXPECT_EQ(reader.TakeLine("0.5,1,2,3,4,5,6")->t_s, 0.5);
-
-  StepCheck steps(false);
-  for (const double t_s : {0.0, 0.5, 1.1, 1.5}) {
-    EXPECT_EQ(steps.Take(t_s), "");
-  }
-  EXPECT_THAT(steps.Take(7.0), HasSubstr("time jumps by 5.5 s"));
 }
 
 TEST(CsvTest, WrittenNumbersReadBackAsTheSameBits) {

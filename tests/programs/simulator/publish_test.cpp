@@ -72,10 +72,6 @@ TEST_F(AppPublishTest, StampsThatEndNowAreNeverAheadOfTheClock) {
     EXPECT_LE(last_ns, NowNs());
     EXPECT_GE(last_ns, began_ns - 1'000'000'000);
   }
-  const Ended refused =
-      RunProgram({"replay", "--file", "-", "--valve", "E", "--end-now"});
-  EXPECT_EQ(refused.code, 2);
-  EXPECT_THAT(refused.err, HasSubstr("whose end is not known"));
 }
 
 TEST_F(AppPublishTest, AtMaxSpeedASlowReaderLosesNothing) {
