@@ -240,9 +240,6 @@ FaultTexts LoadFaultTexts(const GlobalOptions& options) {
       std::filesystem::exists(own)) {
     texts.Override(own);
   }
-  if (!options.fault_catalogue.empty()) {
-    texts.Override(options.fault_catalogue);
-  }
   return texts;
 }
 

@@ -118,7 +118,7 @@ class FaultTexts {
 };
 
 /// The catalogue installed with the programs, overridden by DATA/faults.toml if
-/// it exists, then by --fault-catalogue.
+/// it exists.
 FaultTexts LoadFaultTexts(const GlobalOptions& options);
 
 /// {"faults": [{"fault", "name", "check", "discipline", "namur", "severity":

@@ -1,6 +1,5 @@
 #include "report/global_options.h"
 
-#include <algorithm>
 #include <map>
 #include <memory>
 #include <sstream>
@@ -121,76 +120,6 @@ void Collect(const CLI::App& root, const CLI::App& app,
   }
 }
 
-// Inserts an option's value with the type that its text suggests, if TextOf()
-// gives that text back: "007" and "1e3" may be names.
-void Insert(toml::table& table, const std::string& key,
-            const std::string& text) {
-  const auto insert_as = [&](auto number) {
-    const char* const end = text.data() + text.size();
-    const auto [stop, error] = std::from_chars(text.data(), end, number);
-    const bool same = error == std::errc() && stop == end &&
-                      TextOf(toml::value(number), key) == text;
-    if (same) {
-      table.insert_or_assign(key, number);
-    }
-    return same;
-  };
-  if (text == "true" || text == "false") {
-    table.insert_or_assign(key, text == "true");
-  } else if (!insert_as(std::int64_t{0}) && !insert_as(0.0)) {
-    table.insert_or_assign(key, text);
-  }
-}
-
-// If its default were read back, it would exclude other options or need one
-// that is not given.
-bool BindsOthers(const CLI::Option& option) {
-  const auto needed = option.get_needs();
-  return !option.get_excludes().empty() ||
-         std::any_of(needed.begin(), needed.end(),
-                     [](const auto* other) { return other->count() == 0; });
-}
-
-toml::table Effective(CLI::App& app) {
-  toml::table table;
-  for (CLI::Option* option : app.get_options()) {
-    if (!IsKey(*option) || option == app.get_help_ptr()) {
-      continue;
-    }
-    if (option->count() == 0 && BindsOthers(*option)) {
-      continue;
-    }
-    const std::string& key = option->get_lnames().front();
-    const bool flag = option->get_expected_max() == 0;
-    if (option->count() == 0 && !flag && option->get_expected_min() == 0) {
-      // Replaces the value that the option has when given without one.
-      option->capture_default_str();
-    }
-    if (option->count() > 1 && !flag) {
-      toml::array list;
-      for (const std::string& text : option->results()) {
-        list.push_back(text);
-      }
-      table.insert_or_assign(key, std::move(list));
-    } else if (option->count() > 0) {
-      const std::string& text = option->results().front();
-      // The result of --no-KEY is what it turns off: false.
-      Insert(table, key, flag ? option->get_flag_value(key, text) : text);
-    } else if (flag) {
-      table.insert_or_assign(key, false);
-    } else if (const std::string text = option->get_default_str();
-               !text.empty() && text != "\"\"" && text != "[]" &&
-               text != "{}") {  // An empty list, by the version of CLI11.
-      const bool quoted = text.size() > 1 && text.front() == '"';
-      Insert(table, key, quoted ? text.substr(1, text.size() - 2) : text);
-    }
-  }
-  for (CLI::App* verb : app.get_subcommands()) {
-    table.insert_or_assign(verb->get_name(), Effective(*verb));
-  }
-  return table;
-}
-
 // Makes CLI11 read --config as TOML 1.0 with toml++: a key is the option of
 // that name, a table is a verb.
 class TomlConfig : public CLI::Config {
@@ -201,8 +130,7 @@ class TomlConfig : public CLI::Config {
   // @throws CLI::ConfigError naming line and key: invalid TOML, an unknown
   //   key, a value that is neither text, number nor flag.
   std::vector<CLI::ConfigItem> from_config(std::istream& in) const override;
-  // Unused, because its app cannot be queried for defaults; see
-  // EffectiveToml().
+  // Unused: nothing prints the configuration.
   std::string to_config(const CLI::App*, bool, bool,
                         std::string) const override {
     return {};
@@ -281,10 +209,6 @@ void AddGlobalOptions(CLI::App& app, GlobalOptions& options) {
                  "--KEY, a table [VERB] for those of a verb")
       ->type_name("FILE.toml")
       ->configurable(false);
-  app.add_flag_callback(
-         "--print-config", [] { throw PrintConfigRequest(); },
-         "Print the effective configuration as TOML and exit")
-      ->configurable(false);
 }
 
 void AddBusOptions(CLI::App& app, GlobalOptions& options) {
@@ -313,22 +237,6 @@ void AddBusOptions(CLI::App& app, GlobalOptions& options) {
       ->check(CLI::ExistingFile)
       ->type_name("FILE.xml");
   SetTakeLastPolicy(app);
-}
-
-void AddFaultCatalogueOption(CLI::App& app, GlobalOptions& options) {
-  app.add_option("--fault-catalogue", options.fault_catalogue,
-                 "TOML file whose names and advice for faults replace those of "
-                 "the installed catalogue and of faults.toml in the data "
-                 "directory")
-      ->check(CLI::ExistingFile)
-      ->type_name("FILE.toml");
-  SetTakeLastPolicy(app);
-}
-
-std::string EffectiveToml(CLI::App& root) {
-  std::ostringstream text;
-  text << Effective(root) << '\n';
-  return text.str();
 }
 
 std::string SoftwareVersion() {

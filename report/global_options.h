@@ -11,8 +11,8 @@ class App;
 
 namespace fdi::report {
 
-/// Options that may precede or follow the verb. Bus options and the fault
-/// catalogue apply only to the programs that use them.
+/// Options that may precede or follow the verb. Bus options apply only to the
+/// programs that use them.
 struct GlobalOptions {
   std::filesystem::path data_dir{"./fdi-data"};  ///< --data, env FDI_DATA
   int domain{0};                                 ///< --domain 0..232
@@ -23,27 +23,16 @@ struct GlobalOptions {
   std::string partition;  ///< --partition NAME[,NAME] of samples, or empty
   std::filesystem::path qos_file;  ///< --qos FILE.xml, or empty
   std::filesystem::path security;  ///< --security DIR, or empty
-  /// --fault-catalogue FILE.toml, or empty; see FaultTexts.
-  std::filesystem::path fault_catalogue;
   LogLevel log_level{LogLevel::kInfo};
   bool json{false};
   bool utc{false};  ///< Times for people in UTC instead of the local zone.
 };
 
-/// Thrown by --print-config once all options have been parsed.
-struct PrintConfigRequest {};
-
-/// Adds --help --version --data --config --print-config --json --utc
-/// --log-level to the root `app`; `options` must outlive it.
+/// Adds --help --version --data --config --json --utc --log-level to the root
+/// `app`; `options` must outlive it.
 void AddGlobalOptions(CLI::App& app, GlobalOptions& options);
 /// Adds --domain --interface --transport --partition --security --qos.
 void AddBusOptions(CLI::App& app, GlobalOptions& options);
-/// Adds --fault-catalogue.
-void AddFaultCatalogueOption(CLI::App& app, GlobalOptions& options);
-
-/// The effective configuration in the format of --config: every option with a
-/// value, of the program `root` and of the chosen verb.
-std::string EffectiveToml(CLI::App& root);
 
 /// Version of the project and git revision: "0.1.0+438d5bd". Stored with each
 /// run and model set.

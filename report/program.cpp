@@ -207,10 +207,6 @@ void Program::AddBusOptions() {
   report::AddBusOptions(*app_, options_);
 }
 
-void Program::AddFaultCatalogueOption() {
-  report::AddFaultCatalogueOption(*app_, options_);
-}
-
 CLI::App& Program::AddGroup(const std::string& name,
                             const std::string& description) {
   CLI::App& group = *app_->add_subcommand(name, description);
@@ -304,9 +300,6 @@ int Program::ParseAndRun(int argc, const char* const* argv) {
   }
   try {
     app_->parse(argc, argv);
-  } catch (const PrintConfigRequest&) {
-    std::cout << EffectiveToml(*app_);
-    return kExitOk;
   } catch (const ExampleCheckRequest&) {
     return ReportExamples();
   } catch (const CLI::Success& request) {

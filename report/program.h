@@ -75,8 +75,6 @@ class Program {
   /// Adds --domain, --interface, --transport and --qos, for programs that use
   /// DDS.
   void AddBusOptions();
-  /// Adds --fault-catalogue, for programs that use LoadFaultTexts().
-  void AddFaultCatalogueOption();
 
   /// The parser with its global options, for special needs.
   CLI::App& root();

@@ -111,8 +111,8 @@ while (<$surface>) {
   $option{"$words $name"} = 1 if $name;
   $group{$words =~ s/ [^ ]+$//r} = 1;
 }
-my $global = qr/--(?:config|data|domain|fault-catalogue|help|help-all
-  |interface|json|log-level|partition|print-config|qos|security|transport|utc
+my $global = qr/--(?:config|data|domain|help|help-all
+  |interface|json|log-level|partition|qos|security|transport|utc
   |version)/x;
 for my $file (@ARGV) {
   open my $stream, '<', $file or die "$file: $!";

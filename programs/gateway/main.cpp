@@ -39,7 +39,6 @@ int main(int argc, char** argv) {
   program.AddBusOptions();
   program.MapError<fdi::storage::SqliteError>(fdi::report::kExitData);
   program.MapError<fdi::idl::TransportError>(fdi::report::kExitTransport);
-  program.AddFaultCatalogueOption();
   fdi::gateway::AddInVerb(program);
   fdi::gateway::AddOutVerb(program);
   program.AddExamples(Examples());

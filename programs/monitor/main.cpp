@@ -46,7 +46,6 @@ int main(int argc, char** argv) {
   fdi::report::Program program("fdi-monitor",
                                "Recognises which fault a control valve has");
   program.AddBusOptions();
-  program.AddFaultCatalogueOption();
   program.MapError<fdi::storage::SqliteError>(fdi::report::kExitData);
   program.MapError<fdi::idl::TransportError>(fdi::report::kExitTransport);
   fdi::monitor::AddRunVerb(program);

@@ -146,13 +146,11 @@ const std::vector<std::string>& EpisodeKeys() {
 }
 
 // An episode is stored with the name that its fault had in the catalogue at
-// that time. That name is shown, unless the user states a catalogue or it was
-// stored without one.
+// that time, which is shown where it was not stored without one.
 void NameFaults(std::vector<Episode>& episodes, const Context& context) {
   std::optional<report::FaultTexts> texts;
   for (Episode& episode : episodes) {
-    const bool named = episode.fault_name.has_value();
-    if (episode.fault && (!named || !context.options.fault_catalogue.empty())) {
+    if (episode.fault && !episode.fault_name) {
       if (!texts) {
         texts = report::LoadFaultTexts(context.options);
       }

@@ -7,7 +7,6 @@ int main(int argc, char** argv) {
   fdi::report::Program program(
       "fdi-store",
       "Runs, model sets, valves and the fault history of the data directory");
-  program.AddFaultCatalogueOption();
   program.MapError<fdi::storage::SqliteError>(fdi::report::kExitData);
   fdi::storage::AddRunsVerbs(program);
   fdi::storage::AddModelsVerbs(program);

@@ -159,8 +159,7 @@ Json Rows(const Items& items, RowOf row_of) {
 
 /// The columns of the view fault_history, in its order.
 const std::vector<std::string>& EpisodeKeys();
-/// Puts the names of the fault catalogue where the history has none, or
-/// everywhere if --fault-catalogue is given.
+/// Puts the names of the fault catalogue where the history has none.
 void NameFaults(std::vector<Episode>& episodes, const Context& context);
 Json EpisodeJson(const Alarm& alarm);
 Json ShelfJson(const Shelf& shelf);

@@ -111,16 +111,15 @@ TEST_F(FaultTextsTest, WhatHasNoNameIsUnknown) {
   EXPECT_EQ(texts_.Words("unknown", 0.0).name, texts_.Of(0).name);
 }
 
-TEST_F(FaultTextsTest, FileOfTheUserWinsOverTheFolders) {
+TEST_F(FaultTextsTest, FileInTheDataDirectoryOverrides) {
   GlobalOptions options;
   options.data_dir = directory_.path();
-  Write("faults.toml", "[f9]\nname = 'folder'\n[f8]\nname = 'folder'");
-  options.fault_catalogue = Write("mine.toml", "[f9]\nname = 'mine'");
+  Write("faults.toml", "[f9]\nname = 'mine'");
 
   const FaultTexts texts = LoadFaultTexts(options);
 
   EXPECT_EQ(texts.Of(9).name, "mine");
-  EXPECT_EQ(texts.Of(8).name, "folder");
+  EXPECT_EQ(texts.Of(8).name, texts_.Of(8).name);
 }
 
 TEST(SharedFileTest, MissingFileNamesWhereItWasLookedFor) {

@@ -442,54 +442,6 @@ TEST_F(ProgramConfigTest, MissingFileIsAUsageError) {
             kExitUsage);
 }
 
-TEST_F(ProgramConfigTest, PrintedConfigReadsBackAsTheSameConfig) {
-  const Outcome printed =
-      RunProgram({"--domain", "9", "greet", "--gain", "-0.25", "--who",
-                  "two words", "--print-config"});
-  ASSERT_EQ(printed.code, kExitOk) << printed.err;
-
-  const Outcome read = RunProgram({"greet", "--config", Write(printed.out)});
-
-  EXPECT_EQ(read.code, kExitOk) << read.err << printed.out;
-  EXPECT_EQ(read.options.domain, 9);
-  EXPECT_EQ(read.who, "two words");
-  EXPECT_EQ(read.gain, -0.25);
-  const Outcome again =
-      RunProgram({"greet", "--config", path_.c_str(), "--print-config"});
-  EXPECT_EQ(again.out, printed.out);
-}
-
-TEST_F(ProgramConfigTest, PrintedDefaultsReadBack) {
-  const Outcome printed = RunProgram({"greet", "--print-config"});
-
-  const Outcome read = RunProgram({"greet", "--config", Write(printed.out)});
-
-  EXPECT_EQ(read.code, kExitOk) << read.err << printed.out;
-  EXPECT_THAT(read.friends, IsEmpty());
-  EXPECT_TRUE(read.echo);
-  EXPECT_EQ(
-      RunProgram({"greet", "--config", path_.c_str(), "--print-config"}).out,
-      printed.out);
-}
-
-TEST_F(ProgramConfigTest, PrintedNegationIsTrueWhereItIsGiven) {
-  const Outcome printed = RunProgram({"greet", "--no-echo", "--print-config"});
-  EXPECT_THAT(printed.out, HasSubstr("no-echo = true"));
-
-  EXPECT_FALSE(RunProgram({"greet", "--config", Write(printed.out)}).echo);
-}
-
-TEST_F(ProgramConfigTest, PrintedConfigKeepsTextThatLooksLikeANumber) {
-  for (const char* name : {"007", "1e3", "0x10", "1.50", "-0", "inf", "12"}) {
-    const Outcome printed =
-        RunProgram({"greet", "--who", name, "--print-config"});
-
-    const Outcome read = RunProgram({"greet", "--config", Write(printed.out)});
-
-    EXPECT_EQ(read.who, name) << printed.out;
-  }
-}
-
 TEST_F(ProgramConfigTest, ConfigIsBlamedOnlyForWhatStandsInIt) {
   const Outcome outcome = RunProgram({"greet", "--within", "5x"});
 

@@ -9,7 +9,7 @@ CREATE TABLE monitor_session (
   stop_ns INTEGER,            -- NULL while it runs.
   clean INTEGER CHECK (clean IN (0, 1)),
   software TEXT NOT NULL,
-  config TEXT NOT NULL        -- As --print-config shows it.
+  config TEXT NOT NULL        -- The command line.
 ) STRICT;
 
 -- Episodes -------------------------------------------------------------------

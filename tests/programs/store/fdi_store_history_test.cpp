@@ -111,7 +111,7 @@ TEST_F(FdiStoreHistoryTest, AHundredColumnsSayHowBadItIsInPlainWords) {
   }
 }
 
-// With names of the history (none here), and of a catalogue that is given.
+// The history has no names here, so they are those of the catalogue.
 TEST_F(FdiStoreHistoryTest, WhatEndedEarlyIsNotUnlikeAnyKnownFault) {
   {
     HistoryWriter writer(path_);
@@ -124,16 +124,10 @@ TEST_F(FdiStoreHistoryTest, WhatEndedEarlyIsNotUnlikeAnyKnownFault) {
     event.transition.reason = EndReason::kCleared;
     writer.Record(event, kDetected);
   }
-  for (const std::string more : {"", " --fault-catalogue names.toml"}) {
-    if (!more.empty()) {
-      Write("names.toml", "[f7]\nname = \"seven\"\n");
-    }
-    const json row =
-        StoreJson("history list --valve PV-9" + more)["episodes"][0];
-    EXPECT_EQ(row["fault"], "unknown");
-    EXPECT_EQ(row["fault_name"], "Fault that ended before it had a name");
-    EXPECT_EQ(row["certainty"], "not yet");
-  }
+  const json row = StoreJson("history list --valve PV-9")["episodes"][0];
+  EXPECT_EQ(row["fault"], "unknown");
+  EXPECT_EQ(row["fault_name"], "Fault that ended before it had a name");
+  EXPECT_EQ(row["certainty"], "not yet");
   EXPECT_THAT(Store("history show last").out,
               HasSubstr("not yet: Fault that ended before it had a name"));
 }
