@@ -7,41 +7,9 @@
 #include <string>
 #include <system_error>
 
-#include <unistd.h>
-
 #include "base/error.h"
 
 namespace fdi::report {
-
-void EnsureFolder(const std::filesystem::path& folder) {
-  std::error_code error;
-  if (!std::filesystem::is_directory(folder, error)) {
-    // Creates only the last component, so that a mistyped path does not create
-    // a tree. The empty component makes "report" and "report/" have the same
-    // parent.
-    const std::filesystem::path whole =
-        std::filesystem::absolute(folder / "").lexically_normal();
-    const std::filesystem::path parent = whole.parent_path().parent_path();
-    if (!std::filesystem::is_directory(parent, error)) {
-      throw DataError("cannot make folder " + folder.string() +
-                      ": there is no folder " + parent.string());
-    }
-    error.clear();
-    std::filesystem::create_directory(folder, error);
-    if (error) {
-      throw DataError("cannot make folder " + folder.string() + ": " +
-                      error.message());
-    }
-    if (!std::filesystem::is_directory(folder, error)) {
-      throw DataError(folder.string() + " is a file, not a folder");
-    }
-  }
-  // Checked before hours of work, not after.
-  if (access(folder.c_str(), W_OK | X_OK) != 0) {
-    throw DataError("cannot write to folder " + folder.string() + ": " +
-                    std::strerror(errno));
-  }
-}
 
 void WriteOutput(const std::filesystem::path& path,
                  const std::function<void(std::ostream&)>& write) {

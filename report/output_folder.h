@@ -7,11 +7,6 @@
 
 namespace fdi::report {
 
-/// Creates `folder` unless it exists; its parent must exist.
-/// @throws DataError naming the missing parent, or the folder that cannot be
-///   created or written to.
-void EnsureFolder(const std::filesystem::path& folder);
-
 /// Has `write` write the file `path`, or stdout for "-". The file is replaced
 /// atomically, so a failure leaves no partial file; a pipe or a device is
 /// written to.

@@ -204,10 +204,6 @@ StopSignals::Event StopSignals::WaitFor(std::chrono::milliseconds timeout) {
   }
 }
 
-int StopSignals::descriptor() const noexcept {
-  return g_event;
-}
-
 OutputPatience::OutputPatience() {
   if (g_stop) {
     g_last_words = "";

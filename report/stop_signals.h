@@ -34,8 +34,6 @@ class StopSignals {
   /// Waits for a signal. Returns kStop from the first stop on, and kReload once
   /// per SIGHUP (signals in quick succession count once).
   Event WaitFor(std::chrono::milliseconds timeout);
-  /// Becomes readable when a signal arrives; for poll().
-  int descriptor() const noexcept;
 };
 
 }  // namespace fdi::report

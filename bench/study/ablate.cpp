@@ -166,8 +166,8 @@ report::Report MakeParts(const AblateOptions& options,
   const Detector detector = EngineDetector(models);
   std::vector<ScoredRun> runs;  // Loaded once some part is missing.
   const fs::path folder = options.parts / options.column;
-  report::EnsureFolder(options.parts);
-  report::EnsureFolder(folder);
+  fs::create_directory(options.parts);
+  fs::create_directory(folder);
   int made = 0;
   for (const auto& [name, bit] : Switches()) {
     const fs::path part = folder / (name + ".csv");

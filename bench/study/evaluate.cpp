@@ -169,7 +169,7 @@ Scores ScoreAndWrite(const EvaluateOptions& options,
 report::Report RunEvaluate(const EvaluateOptions& options,
                            const report::Context& context) {
   if (!options.report.empty()) {
-    report::EnsureFolder(options.report);
+    std::filesystem::create_directory(options.report);
   }
   const auto models = LoadModels(options, context);
   const Detector detector = EngineDetector(models);

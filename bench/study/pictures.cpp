@@ -12,6 +12,7 @@
 
 #include "base/error.h"
 #include "base/log.h"
+#include "bench/study/report_page.h"
 #include "bench/study/verbs.h"
 #include "diagnosis/model/model_set.h"
 #include "report/output_folder.h"
@@ -168,7 +169,7 @@ plot::Figure MembershipFigure(const TsModel& model, std::size_t j,
         AntecedentWords(model, model.rules[r], j, flow_unit);
     plot::Series series{.title = "rule " + std::to_string(r + 1) + ": " +
                                  (words.empty() ? "any" : words),
-                        .colour = plot::SeriesColour(r),
+                        .colour = SeriesColour(r),
                         .width = 2.0,
                         .y = {}};
     for (const double x : figure.x) {
@@ -274,7 +275,7 @@ void WriteModelPictures(const ModelSet& models,
                         const storage::DataDirectory& directory,
                         const std::filesystem::path& folder,
                         const LogSink& log) {
-  report::EnsureFolder(folder);
+  std::filesystem::create_directory(folder);
   std::set<std::string> names;
   std::vector<std::string> missing;
   const TrainingData data(models, directory, missing);

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <optional>
 #include <set>
+#include <sstream>
+#include <string_view>
 #include <utility>
 
 #include "base/text.h"
@@ -23,6 +25,41 @@ namespace {
 
 using report::FormatNumber;
 using report::Json;
+
+// An SVG document of gnuplot as an element of the page, at a third of its size.
+// Its definitions are those of point shapes, which no picture has, and their
+// ids would occur once per picture. gnuplot opens a group for each change of
+// its pen, so that most groups are empty, and writes attributes that are the
+// defaults of SVG or that the style of the page gives.
+std::string Embedded(const std::string& svg) {
+  std::vector<std::string> kept;
+  std::istringstream lines(svg.substr(svg.find("<svg")));
+  bool defines = false;
+  for (std::string line; std::getline(lines, line);) {
+    line.erase(0, line.find_first_not_of(" \t"));
+    defines = defines || line == "<defs>";
+    if (line == "</g>" && kept.back().starts_with("<g fill=")) {
+      kept.pop_back();
+    } else if (!defines && !line.empty() && !line.starts_with("xmlns:xlink")) {
+      kept.push_back(line);
+    }
+    defines = defines && line != "</defs>";
+  }
+  std::string text;
+  for (const std::string& line : kept) {
+    text += line + '\n';
+  }
+  for (const std::string_view needless :
+       {" stroke-linecap=\"butt\" stroke-linejoin=\"miter\"",
+        " class=\"gridline\"",
+        " font-family=\"DejaVu Sans,Verdana,sans-serif\""}) {
+    for (std::size_t at = text.find(needless); at != std::string::npos;
+         at = text.find(needless, at)) {
+      text.erase(at, needless.size());
+    }
+  }
+  return text;
+}
 
 constexpr double kPictureWidth = 1100.0;  // [px]
 constexpr double kLegendWidth = 210.0;    // [px]
@@ -164,6 +201,13 @@ std::string BandKey() {
 
 }  // namespace
 
+const char* SeriesColour(std::size_t index) {
+  static constexpr std::array kColours{
+      plot::ink::kVermilion, plot::ink::kBlue, plot::ink::kGreen,
+      plot::ink::kOrange,    plot::ink::kSky,  plot::ink::kPurple};
+  return kColours[index % kColours.size()];
+}
+
 // Collects the verdicts on one run and draws them on one time axis.
 class ReportPage::RunPicture {
  public:
@@ -253,7 +297,7 @@ class ReportPage::RunPicture {
     std::string svg;
     for (figure.groups = kMaxGroups; figure.groups >= kMinGroups;
          figure.groups = figure.groups * 3 / 4) {
-      svg = plot::SvgElement(figure);
+      svg = Embedded(plot::DrawFigure(figure, plot::Format::kSvg));
       if (svg.size() <= kPictureBytes) {
         break;
       }
@@ -331,7 +375,7 @@ class ReportPage::RunPicture {
         panels.back().label = "CV, X" + unit;
       }
       panels.back().series.push_back({.title = name + " measured",
-                                      .colour = plot::SeriesColour(i),
+                                      .colour = SeriesColour(i),
                                       .dash = kShown[i] == Signal::kCv
                                                   ? plot::Dash::kDashed
                                                   : plot::Dash::kSolid,
@@ -403,7 +447,7 @@ class ReportPage::RunPicture {
       const bool is_truth = fault == run.indices.fault;
       panel.series.push_back(
           {.title = "d_" + FaultName(fault) + (is_truth ? " (the fault)" : ""),
-           .colour = plot::SeriesColour(panel.series.size() - 1),
+           .colour = SeriesColour(panel.series.size() - 1),
            .width = is_truth ? 3.0 : 1.5,
            .y = fault_factors_[f]});
     }

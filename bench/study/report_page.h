@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <memory>
 #include <ostream>
 #include <string>
@@ -10,6 +11,9 @@
 #include "report/fault_texts.h"
 
 namespace fdi::trainer::study {
+
+/// Colour for series number `index`, repeating; never black or grey.
+const char* SeriesColour(std::size_t index);
 
 /// The page of `evaluate --report`: one HTML file that needs no script and no
 /// other file. Figures over all runs, by fault and by group; indices of every

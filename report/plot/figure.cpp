@@ -1,11 +1,9 @@
 #include "report/plot/figure.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <sstream>
-#include <string_view>
 #include <vector>
 
 #include "base/error.h"
@@ -476,49 +474,7 @@ class ScriptWriter {
   std::ostringstream out_;
 };
 
-// An SVG document of gnuplot as an element of the page, at a third of its size.
-// Its definitions are those of point shapes, which no picture has, and their
-// ids would occur once per picture. gnuplot opens a group for each change of
-// its pen, so that most groups are empty, and writes attributes that are the
-// defaults of SVG or that the style of the page gives.
-std::string Embedded(const std::string& svg) {
-  std::vector<std::string> kept;
-  std::istringstream lines(svg.substr(svg.find("<svg")));
-  bool defines = false;
-  for (std::string line; std::getline(lines, line);) {
-    line.erase(0, line.find_first_not_of(" \t"));
-    defines = defines || line == "<defs>";
-    if (line == "</g>" && kept.back().starts_with("<g fill=")) {
-      kept.pop_back();
-    } else if (!defines && !line.empty() && !line.starts_with("xmlns:xlink")) {
-      kept.push_back(line);
-    }
-    defines = defines && line != "</defs>";
-  }
-  std::string text;
-  for (const std::string& line : kept) {
-    text += line + '\n';
-  }
-  for (const std::string_view needless :
-       {" stroke-linecap=\"butt\" stroke-linejoin=\"miter\"",
-        " class=\"gridline\"",
-        " font-family=\"DejaVu Sans,Verdana,sans-serif\""}) {
-    for (std::size_t at = text.find(needless); at != std::string::npos;
-         at = text.find(needless, at)) {
-      text.erase(at, needless.size());
-    }
-  }
-  return text;
-}
-
 }  // namespace
-
-const char* SeriesColour(std::size_t index) {
-  static constexpr std::array kColours{ink::kVermilion, ink::kBlue,
-                                       ink::kGreen,     ink::kOrange,
-                                       ink::kSky,       ink::kPurple};
-  return kColours[index % kColours.size()];
-}
 
 Format FormatOf(const std::filesystem::path& file) {
   const std::string ending = file.extension().string();
@@ -552,10 +508,6 @@ std::string DrawFigure(const Figure& figure, Format format,
         return GnuplotScript(figure, format, output);
       },
       limits);
-}
-
-std::string SvgElement(const Figure& figure, const GnuplotLimits& limits) {
-  return Embedded(DrawFigure(figure, Format::kSvg, limits));
 }
 
 void DrawFigure(const Figure& figure, const std::filesystem::path& output) {

@@ -32,7 +32,7 @@ inline constexpr const char* kPurple = "#cc79a7";
 /// A missing value of a series: a gap in its line.
 inline constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
 
-enum class Dash { kSolid = 1, kDashed = 2, kDotted = 3, kDashDot = 4 };
+enum class Dash { kSolid = 1, kDashed = 2, kDashDot = 4 };
 
 /// How the points of a series are drawn.
 enum class Shape {
@@ -121,9 +121,6 @@ struct Figure {
   std::size_t groups{1600};
 };
 
-/// Colour for series number `index`, repeating; never black or grey.
-const char* SeriesColour(std::size_t index);
-
 enum class Format { kPng, kSvg };
 
 /// Format by file extension, .png or .svg. @throws ConfigError
@@ -139,11 +136,6 @@ std::string GnuplotScript(const Figure& figure, Format format,
 ///   is missing or fails.
 std::string DrawFigure(const Figure& figure, Format format,
                        const GnuplotLimits& limits = {});
-
-/// The same as an <svg> element for Report::Picture(). Of figures without
-/// Shape::kPoints only.
-/// @throws as DrawFigure().
-std::string SvgElement(const Figure& figure, const GnuplotLimits& limits = {});
 
 /// Draws to the file `output`, whose extension gives the format. The file is
 /// created only if drawing succeeds.
