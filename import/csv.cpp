@@ -54,6 +54,7 @@ struct Columns {
   std::vector<SignalColumn> signals;
   bool mode{false};
   bool truth{false};
+  bool stamps{false};
 };
 
 Columns ColumnsOf(std::span<const LabelledSample> samples, FlowUnit flow_unit) {
@@ -88,6 +89,9 @@ std::vector<std::string> HeaderOf(const Columns& columns) {
     cells.emplace_back(kFaultColumn);
     cells.emplace_back(kStrengthColumn);
   }
+  if (columns.stamps) {
+    cells.insert(cells.end(), {"stamp_ns", "utc"});
+  }
   return cells;
 }
 
@@ -113,6 +117,10 @@ std::vector<std::string> RowOf(const LabelledSample& labelled,
     const FaultTruth truth = labelled.truth.value_or(FaultTruth{});
     cells.push_back(FaultName(truth.fault));
     cells.push_back(NumberText(truth.strength));
+  }
+  if (columns.stamps) {
+    cells.push_back(std::to_string(sample.stamp_ns));
+    cells.push_back(FormatTime(sample.stamp_ns, true));
   }
   return cells;
 }
@@ -1042,8 +1050,9 @@ bool CsvReader::TakeTime(CsvRow& row) {
 }
 
 void WriteCsv(std::ostream& output, std::span<const LabelledSample> samples,
-              FlowUnit flow_unit, std::int64_t start_ns) {
-  const Columns columns = ColumnsOf(samples, flow_unit);
+              FlowUnit flow_unit, std::int64_t start_ns, bool stamps) {
+  Columns columns = ColumnsOf(samples, flow_unit);
+  columns.stamps = stamps;
   WriteCsvLine(output, HeaderOf(columns));
   for (const LabelledSample& labelled : samples) {
     WriteCsvLine(output, RowOf(labelled, columns, start_ns));

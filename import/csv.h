@@ -381,7 +381,8 @@ double MedianStep(const std::vector<double>& times_s);
 /// not AUTO throughout; fault and fault_strength if the truth is known. Numbers
 /// round-trip bit for bit. t_s counts from `start_ns`. The cell of a missing
 /// signal, or of a flow in another unit than the run's, is empty.
+/// @param stamps also write stamp_ns and utc, which a reader ignores.
 void WriteCsv(std::ostream& output, std::span<const LabelledSample> samples,
-              FlowUnit flow_unit, std::int64_t start_ns);
+              FlowUnit flow_unit, std::int64_t start_ns, bool stamps = false);
 
 }  // namespace fdi::importer

@@ -45,7 +45,7 @@ for file in etc/default/fdi-monitor usr/lib/systemd/system/fdi-monitor.service \
   usr/share/doc/fdi/{copyright,changelog.gz,changelog.Debian.gz,README.md} \
   usr/bin/fdi-keys usr/share/man/man1/fdi-keys.1.gz \
   usr/share/doc/fdi/docs/tutorial.md usr/share/fdi/console/index.html \
-  usr/share/fdi/nginx/fdi.conf \
+  usr/share/fdi/nginx/fdi.conf usr/lib/fdi/fdi_samples.so \
   usr/lib/systemd/system/fdi-gateway@.service usr/share/fdi/opcua/client.mjs; do
   [ -s "$root/$file" ] || fail "$file is missing"
 done

@@ -256,6 +256,7 @@ Report ImportRuns(const RunImportOptions& options, const Context& context) {
 struct FileOptions {
   std::string selector;
   std::string output;
+  bool stamps{false};
 };
 
 // What the intake rejected is left out, because late and repeated samples would
@@ -270,7 +271,7 @@ int ExportRun(const FileOptions& options, const Context& context) {
   }
   report::WriteOutput(options.output, [&](std::ostream& out) {
     importer::WriteCsv(out, samples, run.info.run.flow_unit,
-                       run.info.run.start_ns);
+                       run.info.run.start_ns, options.stamps);
   });
   if (const std::size_t left_out = run.samples.size() - samples.size()) {
     context.log(LogLevel::kWarning,
@@ -364,6 +365,8 @@ void AddRunsVerbs(report::Program& program) {
               "Write a run, or a stretch of it, as CSV", ExportRun);
   exporting.add_option("run", exported.selector, kSelector)->required();
   AddOutput(exporting, exported.output);
+  exporting.add_flag("--stamps", exported.stamps,
+                     "Also write stamp_ns, which is exact, and utc");
 
   auto [label, label_options] =
       AddVerb(program, group, "label",

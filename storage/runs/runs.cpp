@@ -134,7 +134,7 @@ std::string ImportPart(Database& database, const SampleSeries& part,
 const Schema& RunsSchema() {
   static const Schema schema{
       "run",
-      0x46444972,  // "FDIr"
+      kRunsApplicationId,
       Synchronous::kNormal,
       {sql::kMigrations.begin(), sql::kMigrations.end()},
       sql::kBaseline,

@@ -104,6 +104,9 @@ struct StoredRun {
   std::vector<StoredSample> samples;
 };
 
+/// Marks a file as a runs.db.
+inline constexpr std::int32_t kRunsApplicationId = 0x46444972;  // "FDIr"
+
 /// Schema of runs.db: tables run, run_label, chunk, tail, recorder and the view
 /// run_summary; see docs/data.md.
 const Schema& RunsSchema();
