@@ -4,7 +4,7 @@
 # is one that nothing logs. Links between documents lead somewhere, each page is
 # in one part of docs/README.md, README.md and docs/results.md keep their
 # lengths, docs/method.md has a row for every rule of the decision, and
-# docs/faults.md is up to date.
+# docs/faults.md and docs/json.md are up to date.
 set -u
 cd "$(dirname "$0")/.."
 failed=0
@@ -75,6 +75,7 @@ words=$(wc -w <README.md)
 lines=$(wc -l <docs/results.md)
 [ "$lines" -le 120 ] || complain "docs/results.md has $lines lines, at most 120"
 tests/faults_page.sh --check || failed=1
+tests/json_page.sh --check || failed=1
 
 # docs/method.md explains every rule that can be left out, in the order in which
 # they act.

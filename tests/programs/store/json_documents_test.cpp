@@ -1,11 +1,13 @@
-// docs/json.md and the programs say the same: every key that a verb prints is
-// documented, and every documented key is printed by some verb.
+// docs/json.toml, of which docs/json.md is made, and the programs say the same:
+// every key that a verb prints is documented, and every documented key is
+// printed by some verb.
 #include <cmath>
 #include <map>
 #include <regex>
 #include <set>
 
 #include <gmock/gmock.h>
+#include <toml++/toml.h>
 
 #include "storage/models/models.h"
 #include "tests/programs/store/store_program_fixture.h"
@@ -17,45 +19,35 @@ namespace {
 
 using testing::IsEmpty;
 
-// A type of the page: a word (string, time, run, ...), perhaps "or null", or an
-// example of JSON with such words in it: ["run"], {"*": "number"}.
+// A type: a word (text, time, run, ...), or JSON without quotes with such words
+// in it: [run], {*: num}. A question mark behind it allows null.
 struct Type {
   json shape;
   bool or_null{false};
 };
 
-Type ParseType(std::string text) {
-  Type type;
-  const std::string null = " or null";
-  if (text.ends_with(null)) {
-    type.or_null = true;
-    text.resize(text.size() - null.size());
+// Of "TYPE (UNIT); MEANING", of which only the type is needed.
+Type ParseType(const std::string& text) {
+  std::string type = text.substr(0, std::min(text.find(" ("), text.find(';')));
+  const bool or_null = type.ends_with('?');
+  if (or_null) {
+    type.pop_back();
   }
-  std::erase(text, '`');
-  type.shape = text.front() == '[' || text.front() == '{' ? json::parse(text)
-                                                          : json(text);
-  return type;
+  static const std::regex word(R"([A-Za-z0-9_*?]+)");
+  return {json::parse(std::regex_replace(type, word, "\"$&\"")), or_null};
 }
 
-// What docs/json.md says.
+// What docs/json.toml says.
 class Page {
  public:
   using Kind = std::map<std::string, Type>;
 
-  explicit Page(const std::string& text) {
-    // A cell may hold "\|", which is no border.
-    const std::regex row(R"(^\| `([^`]+)` \| ((?:[^|\\]|\\.)*?) ?\|.*)");
-    std::istringstream lines(text);
-    std::string kind;
-    for (std::string line; std::getline(lines, line);) {
-      std::smatch match;
-      if (line.starts_with("### `")) {
-        kind = line.substr(5, line.rfind('`') - 5);
-        kinds_[kind];
-      } else if (line.starts_with("## ")) {
-        kind.clear();
-      } else if (std::regex_match(line, match, row)) {
-        AddRow(kind, match[1], match[2]);
+  explicit Page(const std::string& file) {
+    const toml::table tables = toml::parse_file(file);
+    for (const auto& [kind, keys] : tables) {
+      for (const auto& [key, value] : *keys.as_table()) {
+        AddKey(std::string(kind), std::string(key), value.value_or(""),
+               tables["common"][key].value_or(""));
       }
     }
   }
@@ -104,12 +96,17 @@ class Page {
   }
 
  private:
-  void AddRow(const std::string& kind, const std::string& key,
-              const std::string& type) {
-    if (!kind.empty()) {
-      kinds_[kind][key] = key.starts_with("...") ? Type{} : ParseType(type);
-    } else if (key.starts_with("fdi-")) {
-      verbs_[key] = ParseType(type);
+  void AddKey(const std::string& kind, const std::string& key,
+              const std::string& text, const std::string& common) {
+    if (kind == "verbs") {
+      verbs_[key] = ParseType(text);
+    } else if (key == "...") {
+      std::istringstream names(text);
+      for (std::string name; names >> name;) {
+        kinds_[kind]["..." + name];
+      }
+    } else {
+      kinds_[kind][key] = ParseType(text.empty() ? common : text);
     }
   }
 
@@ -163,8 +160,14 @@ class Page {
     return "";
   }
 
-  void CheckWord(const json& value, const std::string& word,
+  void CheckWord(const json& value, std::string word,
                  const std::string& where) {
+    if (word.ends_with('?')) {
+      if (value.is_null()) {
+        return;
+      }
+      word.pop_back();
+    }
     if (kinds_.contains(word)) {
       if (!value.is_object()) {
         return Complain(where + " is no " + word);
@@ -181,11 +184,11 @@ class Page {
       return;
     }
     static const std::regex time(R"(\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d(\.\d+)?Z)");
-    const bool fits = word == "any"       ? true
-                      : word == "string"  ? value.is_string()
-                      : word == "boolean" ? value.is_boolean()
-                      : word == "integer" ? value.is_number_integer()
-                      : word == "number"  ? value.is_number()
+    const bool fits = word == "any"    ? true
+                      : word == "text" ? value.is_string()
+                      : word == "bool" ? value.is_boolean()
+                      : word == "int"  ? value.is_number_integer()
+                      : word == "num"  ? value.is_number()
                       : word == "time"
                           ? value.is_string() &&
                                 std::regex_match(value.get<std::string>(), time)
@@ -301,7 +304,7 @@ class JsonDocumentsTest : public FdiStoreTest {
 };
 
 TEST_F(JsonDocumentsTest, ProgramsAndPageHaveTheSameKeys) {
-  Page page(Slurp(FDI_JSON_PAGE));
+  Page page(FDI_JSON_KEYS);
   const std::string id =
       Printed(page, "runs import", "a.csv --valve LV-1")["run_id"];
   Printed(page, "runs sniff", "a.csv -o tags.toml");
@@ -414,7 +417,7 @@ TEST_F(JsonDocumentsTest, SimulatorAndTrainerAreOnThePage) {
   if (!exists(bin / "fdi-trainer") || !exists(bin / "fdi-simulator")) {
     GTEST_SKIP() << "fdi-trainer or fdi-simulator is not built";
   }
-  Page page(Slurp(FDI_JSON_PAGE));
+  Page page(FDI_JSON_KEYS);
   Write("quick.toml",
         "name = \"quick\"\n[training]\nmax_rules = 1\nmax_regressors = 2\n"
         "starts = 1\n[scenario]\nparameters = \"paper-operating-point\"\n"
