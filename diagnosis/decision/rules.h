@@ -9,8 +9,8 @@
 /// The rules by which an episode gets, keeps and loses its name, in the order
 /// in which they act. Each later one may override what the earlier ones made of
 /// the same sample. To add a rule: a row here, its case where its stage runs,
-/// the test that fails without it, and the row of docs/results/ablation.md that
-/// shows what it buys.
+/// the test that fails without it, its row in docs/method.md, and the row of
+/// docs/results/ablation.md that shows what it buys.
 namespace fdi {
 
 /// In the order in which they act, as kRules has them.
