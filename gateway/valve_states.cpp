@@ -112,7 +112,7 @@ void ValveStates::Add(const Json& record, Clock::time_point now) {
 }
 
 std::vector<Outgoing> ValveStates::Due(std::int64_t now_ns,
-                                       Clock::time_point now) {
+                                       Clock::time_point now, bool missing) {
   std::vector<Outgoing> due;
   for (Json& event : std::exchange(new_events_, {})) {
     // The bus may tell an event twice, and a broker, too.
@@ -135,16 +135,73 @@ std::vector<Outgoing> ValveStates::Due(std::int64_t now_ns,
          row["as_of_utc"], now, due);
   }
   for (const std::string& valve_id : expected_) {
-    if (!known.contains(valve_id)) {
+    if (missing && !known.contains(valve_id)) {
       Tell(prefix_ + TopicLevel(valve_id) + "/state",
            {{"valve_id", valve_id},
+            {"group", GroupOf(valve_id)},
             {"health", "CHECK_FUNCTION"},
-            {"reason", "no monitor tells of it since this gateway started"}},
+            {"reason", "no monitor tells of it"},
+            {"alarms", AlarmsOf(valve_id)}},
            Json(), now, due);
     }
   }
   valves_ = known.size();
+  // A valve that goes must not stay as it was told last.
+  expected_.merge(known);
   return due;
+}
+
+void ValveStates::SetAlarms(
+    const std::optional<std::vector<storage::Alarm>>& alarms) {
+  has_history_ = alarms.has_value();
+  alarms_.clear();
+  if (!alarms) {
+    return;
+  }
+  for (const storage::Alarm& alarm : *alarms) {
+    const std::string& valve_id = alarm.episode.valve_id;
+    expected_.insert(valve_id);
+    alarms_.try_emplace(valve_id, Json::array())
+        .first->second.push_back(AlarmOf(alarm));
+  }
+}
+
+Json ValveStates::AlarmOf(const storage::Alarm& alarm) const {
+  const storage::Episode& episode = alarm.episode;
+  const report::FaultWords words = texts_.Words(
+      episode.fault.value_or("unknown"), episode.strength, episode.priority);
+  const auto time = [](const std::optional<std::int64_t>& stamp_ns) {
+    return stamp_ns ? Json(FormatTime(*stamp_ns, true)) : Json();
+  };
+  const auto text = [](const std::optional<std::string>& value) {
+    return value ? Json(*value) : Json();
+  };
+  return {{"episode_id", episode.episode_id},
+          {"state", storage::AlarmStateName(alarm.state)},
+          {"health", HealthOf(words.namur)},
+          {"fault", text(episode.fault)},
+          {"name", words.name},
+          {"check", words.check},
+          {"severity", SeverityName(words.severity)},
+          {"detected_utc", time(episode.detected_ns)},
+          {"unconfirmed_utc", time(episode.unconfirmed_ns)},
+          {"acked_by", text(episode.acked_by)},
+          {"acked_utc", time(episode.acked_ns)},
+          {"ack_comment", text(episode.ack_comment)},
+          {"shelved_until_utc",
+           alarm.shelf ? time(alarm.shelf->until_ns) : Json()}};
+}
+
+Json ValveStates::AlarmsOf(const std::string& valve_id) const {
+  const auto found = alarms_.find(valve_id);
+  return found != alarms_.end() ? found->second
+         : has_history_         ? Json::array()
+                                : Json();
+}
+
+Json ValveStates::GroupOf(const std::string& valve_id) const {
+  const auto found = groups_.find(valve_id);
+  return found == groups_.end() ? Json() : Json(found->second);
 }
 
 Json ValveStates::StateOf(const Json& row, bool monitored) const {
@@ -182,6 +239,7 @@ Json ValveStates::StateOf(const Json& row, bool monitored) const {
     return shown ? std::move(value) : Json();
   };
   return {{"valve_id", valve_id},
+          {"group", GroupOf(valve_id)},
           {"health", health},
           {"reason", reason},
           {"state", state},
@@ -197,7 +255,8 @@ Json ValveStates::StateOf(const Json& row, bool monitored) const {
           {"priority", when(alarm, PriorityOf(words.severity))},
           {"since_utc", row["since_utc"]},
           {"check", when(alarm && !fault.empty(), words.check)},
-          {"model_set", row["model_set"]}};
+          {"model_set", row["model_set"]},
+          {"alarms", AlarmsOf(valve_id)}};
 }
 
 void ValveStates::Tell(const std::string& topic, Json state, const Json& as_of,

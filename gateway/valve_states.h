@@ -3,6 +3,7 @@
 #include <chrono>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <set>
 #include <string>
 #include <string_view>
@@ -11,6 +12,7 @@
 #include "monitor/bus/watch_table.h"
 #include "report/fault_texts.h"
 #include "report/json_output.h"
+#include "storage/history/alarm.h"
 
 namespace fdi::gateway {
 
@@ -46,14 +48,24 @@ class ValveStates {
   /// @param record as WatchRecord::object; of any topic.
   void Add(const report::Json& record, Clock::time_point now);
   void Remove(const std::string& valve_id) { table_.Remove(valve_id); }
-  /// A valve that the broker still tells of, from before the start.
+  /// A valve that ought to be there: one of the plant's table, or one of which
+  /// the broker still tells from before the start.
   void Expect(const std::string& valve_id) { expected_.insert(valve_id); }
+  void SetGroup(const std::string& valve_id, const std::string& group) {
+    groups_[valve_id] = group;
+  }
+  /// The alarms of all valves that somebody has still to see or that stand.
+  /// @param alarms nothing: the history cannot be read.
+  void SetAlarms(const std::optional<std::vector<storage::Alarm>>& alarms);
   /// All states go out again: the connection is a new one.
   void Forget() { published_.clear(); }
 
   /// Events that have come, then states that have changed, or were told a
   /// minute ago: `as_of_utc` goes on. Call once a second.
-  std::vector<Outgoing> Due(std::int64_t now_ns, Clock::time_point now);
+  /// @param missing also valves of which no monitor tells; false while a
+  ///   monitor may just not have been heard yet.
+  std::vector<Outgoing> Due(std::int64_t now_ns, Clock::time_point now,
+                            bool missing = true);
   /// The last will: the monitor's topic while this program is not running.
   Outgoing Farewell() const;
 
@@ -65,6 +77,9 @@ class ValveStates {
     Clock::time_point at;
   };
   report::Json StateOf(const report::Json& row, bool monitored) const;
+  report::Json AlarmOf(const storage::Alarm& alarm) const;
+  report::Json AlarmsOf(const std::string& valve_id) const;
+  report::Json GroupOf(const std::string& valve_id) const;
   void Tell(const std::string& topic, report::Json state,
             const report::Json& as_of, Clock::time_point now,
             std::vector<Outgoing>& due);
@@ -74,6 +89,9 @@ class ValveStates {
   std::string prefix_;
   std::vector<report::Json> new_events_;
   std::set<std::string> expected_;
+  std::map<std::string, std::string> groups_;
+  bool has_history_{false};
+  std::map<std::string, report::Json> alarms_;  // Arrays, by valve.
   std::map<std::string, Published> published_;  // By topic.
   std::size_t valves_{0};
 };

@@ -1,4 +1,9 @@
 #include <chrono>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -7,7 +12,9 @@
 
 #include "base/error.h"
 #include "base/time_text.h"
+#include "diagnosis/records/valve_glob.h"
 #include "gateway/duties.h"
+#include "gateway/live_table.h"
 #include "gateway/mqtt_client.h"
 #include "gateway/valve_states.h"
 #include "monitor/bus/bus_view.h"
@@ -15,6 +22,8 @@
 #include "programs/gateway/verbs.h"
 #include "report/program.h"
 #include "report/stop_signals.h"
+#include "storage/database/data_directory.h"
+#include "storage/history/history_reader.h"
 
 namespace fdi::gateway {
 namespace {
@@ -28,6 +37,8 @@ constexpr std::chrono::seconds kStopPatience(3);
 
 struct OutOptions {
   MqttOptions mqtt;
+  std::string lines;
+  std::string plant;
   std::string site{"plant"};
   std::string valves{"*"};
   std::string http;
@@ -56,13 +67,167 @@ class Former {
   std::vector<std::string> valves_;
 };
 
-int RunOut(const OutOptions& options, const report::Context& context) {
-  if (options.mqtt.url.empty()) {
-    throw ConfigError("out takes --mqtt URL");
+// The alarms as operators have left them, from the history of a monitor on this
+// host.
+class AlarmReader {
+ public:
+  AlarmReader(std::string valves, const report::Context& context)
+      : valves_(std::move(valves)),
+        path_(storage::DataDirectory{context.options.data_dir}.history()),
+        log_(context.log) {}
+
+  /// Nothing where there is no history, or where it cannot be read.
+  std::optional<std::vector<storage::Alarm>> Read() {
+    try {
+      if (!history_ && !std::filesystem::exists(path_)) {
+        return std::nullopt;
+      }
+      if (!history_) {
+        history_ = std::make_unique<storage::HistoryReader>(path_);
+      }
+      history_->Version();  // Opens a file anew that was replaced.
+      auto alarms = history_->AlarmList(NowNs());
+      std::erase_if(alarms, [this](const storage::Alarm& alarm) {
+        return !GlobMatches(valves_, alarm.episode.valve_id);
+      });
+      return alarms;
+    } catch (const std::exception& error) {
+      history_.reset();
+      log_.Warn("history_unreadable", path_, {{"reason", error.what()}});
+      return std::nullopt;
+    }
   }
+
+ private:
+  std::string valves_;
+  std::filesystem::path path_;
+  CalmLog log_;
+  std::unique_ptr<storage::HistoryReader> history_;
+};
+
+// Where messages go.
+class Outlet {
+ public:
+  virtual ~Outlet() = default;
+  virtual bool Publish(const Outgoing& message) = 0;
+  // Whether messages can go out now; tells `states` what to say again.
+  virtual bool Ready(ValveStates& states) = 0;
+  // Whether a valve that no monitor has told of can be said to be missing.
+  virtual bool KnowsAll() const { return true; }
+  virtual void End(const Outgoing& farewell) = 0;
+};
+
+class BrokerOutlet : public Outlet {
+ public:
+  BrokerOutlet(const OutOptions& options, const Outgoing& will,
+               const LogSink& log)
+      : client_(options.mqtt, {will.topic, will.payload}, log),
+        former_(TopicPrefix(options.site)) {
+    client_.Start();
+  }
+  bool Publish(const Outgoing& message) override {
+    return client_.Publish(message.topic, message.payload, message.retained);
+  }
+  bool Ready(ValveStates& states) override {
+    client_.Take(events_, std::chrono::milliseconds(0));
+    for (const MqttEvent& event : events_) {
+      former_.Take(event);
+      if (event.kind == MqttEvent::Kind::kConnected) {
+        client_.Subscribe({former_.pattern()});
+        states.Forget();
+      }
+    }
+    for (const std::string& valve_id : former_.valves()) {
+      states.Expect(valve_id);
+    }
+    return client_.connected();
+  }
+  // What the broker has kept stands until the monitors have been heard.
+  bool KnowsAll() const override {
+    return Clock::now() - start_ >= kAcquainted;
+  }
+  void End(const Outgoing& farewell) override {
+    client_.Publish(farewell.topic, farewell.payload, true);
+    client_.Stop();
+  }
+
+ private:
+  MqttClient client_;
+  Former former_;
+  std::vector<MqttEvent> events_;
+  Clock::time_point start_{Clock::now()};
+};
+
+// A line a message, {"topic", "payload"}, and one a second, so that its reader
+// knows that this program lives.
+class LineOutlet : public Outlet {
+ public:
+  explicit LineOutlet(const std::string& path) {
+    if (path != "-") {
+      file_.open(path);
+      out_ = &file_;
+    }
+  }
+  bool Publish(const Outgoing& message) override {
+    *out_ << "{\"topic\":" << report::JsonText(message.topic)
+          << ",\"payload\":" << message.payload << "}\n";
+    return true;
+  }
+  bool Ready(ValveStates& /*states*/) override {
+    const auto now = Clock::now();
+    if (now - alive_ >= kTold) {
+      alive_ = now;
+      *out_ << "{\"topic\":null}" << std::endl;
+    }
+    if (!*out_) {
+      throw DataError("--lines: nobody reads what is written");
+    }
+    return true;
+  }
+  void End(const Outgoing& farewell) override {
+    Publish(farewell);
+    out_->flush();
+  }
+
+ private:
+  std::ofstream file_;
+  std::ostream* out_{&std::cout};
+  Clock::time_point alive_;
+};
+
+std::unique_ptr<Outlet> OpenOutlet(const OutOptions& options,
+                                   const Outgoing& will, const LogSink& log) {
+  if (options.lines.empty() == options.mqtt.url.empty()) {
+    throw ConfigError("out takes one of --mqtt URL and --lines FILE|-");
+  }
+  if (options.lines.empty()) {
+    return std::make_unique<BrokerOutlet>(options, will, log);
+  }
+  return std::make_unique<LineOutlet>(options.lines);
+}
+
+// The valves of the plant's table are told of whether or not a monitor does.
+void ExpectTable(const OutOptions& options, ValveStates& states) {
+  if (options.plant.empty()) {
+    return;
+  }
+  const LiveTable table = ReadLiveTable(options.plant, false);
+  for (const importer::LiveValve& valve : table.valves) {
+    if (GlobMatches(options.valves, valve.id)) {
+      states.Expect(valve.id);
+      states.SetGroup(valve.id, valve.group);
+    }
+  }
+  for (const RefusedRow& row : table.refused) {
+    if (GlobMatches(options.valves, row.name)) {
+      states.Expect(row.name);
+    }
+  }
+}
+
+int RunOut(const OutOptions& options, const report::Context& context) {
   ValveStates states(report::LoadFaultTexts(context.options), options.site);
-  const Outgoing will = states.Farewell();
-  MqttClient client(options.mqtt, {will.topic, will.payload}, context.log);
+  ExpectTable(options, states);
   Duties duties(options.http);
   report::StopSignals signals;
   signals.EndWithin(kStopPatience);
@@ -71,57 +236,42 @@ int RunOut(const OutOptions& options, const report::Context& context) {
   monitor::WatchRecords records(true, [&](const monitor::WatchRecord& record) {
     states.Add(record.object, Clock::now());
   });
-  Former former(TopicPrefix(options.site));
-  client.Start();
+  AlarmReader alarms(options.valves, context);
+  const Outgoing farewell = states.Farewell();
+  const auto outlet = OpenOutlet(options, farewell, context.log);
   const std::string ready =
       EventLine("gateway_ready", {{"site", options.site}});
   context.log(LogLevel::kInfo, ready);
   duties.Ready(ready);
-  const Clock::time_point start = Clock::now();
-  Clock::time_point told = start;
+  Clock::time_point told;
   std::uint64_t published = 0;
-  std::vector<MqttEvent> events;
+  bool connected = false;
   while (!signals.stop_requested()) {
     bus.Take([&](const auto& message,
                  const auto&) { records.Add(message, Clock::now()); },
              [&](const std::string& valve_id) { states.Remove(valve_id); });
     const Clock::time_point now = Clock::now();
     records.Flush(now);
-    client.Take(events, std::chrono::milliseconds(0));
-    for (const MqttEvent& event : events) {
-      former.Take(event);
-      if (event.kind == MqttEvent::Kind::kConnected) {
-        client.Subscribe({former.pattern()});
-        states.Forget();
-        told = {};
-      }
-    }
-    if (client.connected() && now - told >= kTold) {
+    connected = outlet->Ready(states);
+    if (connected && now - told >= kTold) {
       told = now;
-      if (now - start >= kAcquainted) {
-        for (const std::string& valve_id : former.valves()) {
-          states.Expect(valve_id);
-        }
-      }
-      for (const Outgoing& message : states.Due(NowNs(), now)) {
-        published +=
-            client.Publish(message.topic, message.payload, message.retained)
-                ? 1U
-                : 0U;
+      states.SetAlarms(alarms.Read());
+      for (const Outgoing& message :
+           states.Due(NowNs(), now, outlet->KnowsAll())) {
+        published += outlet->Publish(message) ? 1U : 0U;
       }
     }
     duties.Tick([&] {
       return std::vector<Metric>{
           {"valves", "Valves that are told of.",
            static_cast<double>(states.valves())},
-          {"published_total", "Messages that went to the broker.",
+          {"published_total", "Messages that went out.",
            static_cast<double>(published)},
           {"broker_connected", "1 while there is a connection.",
-           client.connected() ? 1.0 : 0.0}};
+           connected ? 1.0 : 0.0}};
     });
   }
-  client.Publish(will.topic, will.payload, true);
-  client.Stop();
+  outlet->End(farewell);
   return report::kExitOk;
 }
 
@@ -129,8 +279,16 @@ int RunOut(const OutOptions& options, const report::Context& context) {
 
 void AddOutVerb(report::Program& program) {
   auto [verb, options] = AddVerb(
-      program, "out", "Findings of all monitors go to a broker", RunOut);
+      program, "out", "Findings of all monitors go to a broker, or are printed",
+      RunOut);
   options.mqtt.AddTo(verb);
+  verb.add_option("--lines", options.lines,
+                  "Print the messages instead, one a line (docs/connect.md)")
+      ->type_name("FILE|-");
+  verb.add_option("--plant", options.plant,
+                  "Table of the valves (docs/plant.md): its valves are told of "
+                  "even if no monitor does, with their groups")
+      ->type_name("FILE");
   verb.add_option("--site", options.site,
                   "Name of the plant in the topics fdi/SITE/VALVE/state")
       ->type_name("NAME");

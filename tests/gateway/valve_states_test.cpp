@@ -161,6 +161,60 @@ TEST_F(ValveStatesTest, AValveThatNobodyTellsOfAnyMore) {
   EXPECT_THAT(state["reason"], HasSubstr("no monitor tells of it"));
 }
 
+TEST_F(ValveStatesTest, AMissingValveWaitsUntilMonitorsWereHeard) {
+  states_.Expect("FV/1");
+  states_.SetGroup("FV/1", "hall 1");
+  EXPECT_EQ(states_.Due(0, now_, false).size(), 1U);  // The monitor's.
+  EXPECT_EQ(StateTold()["group"], "hall 1");
+}
+
+TEST_F(ValveStatesTest, AValveThatGoesIsNotNormalAnyMore) {
+  Hear(1);
+  Hear(2);
+  EXPECT_EQ(StateTold()["health"], "NORMAL");
+  states_.Remove("FV/1");
+  EXPECT_EQ(StateTold()["health"], "CHECK_FUNCTION");
+}
+
+storage::Alarm AcknowledgedAlarm() {
+  storage::Alarm alarm;
+  alarm.episode.episode_id = "0000000000000001";
+  alarm.episode.valve_id = "FV/1";
+  alarm.episode.fault = "f19";
+  alarm.episode.detected_ns = 40 * kSecond;
+  alarm.episode.acked_by = "anna";
+  alarm.episode.acked_ns = 50 * kSecond;
+  alarm.episode.ack_comment = "on the way";
+  alarm.state = storage::AlarmState::kAcked;
+  return alarm;
+}
+
+TEST_F(ValveStatesTest, TheAlarmsOfTheHistoryAreToldWithWhoHasSeenThem) {
+  Hear(1);
+  Hear(2);
+  EXPECT_TRUE(StateTold()["alarms"].is_null());  // There is no history.
+  states_.SetAlarms(std::vector<storage::Alarm>());
+  EXPECT_EQ(StateTold()["alarms"], Json::array());
+  states_.SetAlarms(std::vector{AcknowledgedAlarm()});
+  const Json alarm = StateTold()["alarms"][0];
+  EXPECT_EQ(alarm["episode_id"], "0000000000000001");
+  EXPECT_EQ(alarm["state"], "ACKED");
+  EXPECT_EQ(alarm["health"], "FAILURE");
+  EXPECT_EQ(alarm["name"], "Flow transmitter wrong");
+  EXPECT_EQ(alarm["detected_utc"], "1970-01-01T00:00:40Z");
+  EXPECT_EQ(alarm["acked_by"], "anna");
+  EXPECT_EQ(alarm["acked_utc"], "1970-01-01T00:00:50Z");
+  EXPECT_EQ(alarm["ack_comment"], "on the way");
+  EXPECT_TRUE(alarm["shelved_until_utc"].is_null());
+}
+
+TEST_F(ValveStatesTest, AnAlarmOfAValveThatNobodyTellsOfIsTold) {
+  states_.SetAlarms(std::vector{AcknowledgedAlarm()});
+  const Json state = StateTold();
+  EXPECT_EQ(state["health"], "CHECK_FUNCTION");
+  EXPECT_EQ(state["alarms"].size(), 1U);
+}
+
 // The table of keys is the schema.
 TEST_F(ValveStatesTest, ThePageExplainsEachKey) {
   Hear(1);
