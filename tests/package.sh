@@ -46,7 +46,8 @@ for file in etc/default/fdi-monitor usr/lib/systemd/system/fdi-monitor.service \
   usr/bin/fdi-keys usr/share/man/man1/fdi-keys.1.gz \
   usr/share/doc/fdi/docs/tutorial.md usr/share/fdi/console/index.html \
   usr/share/fdi/nginx/fdi.conf usr/lib/fdi/fdi_samples.so \
-  usr/lib/systemd/system/fdi-gateway@.service usr/share/fdi/opcua/client.mjs; do
+  usr/lib/systemd/system/fdi-gateway@.service usr/share/fdi/opcua/client.mjs \
+  usr/share/fdi/opcua/server.mjs; do
   [ -s "$root/$file" ] || fail "$file is missing"
 done
 grep -q '^ExecStart=/usr/bin/fdi-monitor run' \
