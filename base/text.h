@@ -45,8 +45,8 @@ inline std::string Hex16(std::uint64_t value) {
   return text;
 }
 
-/// Whether `text` is `pattern`, in which each * stands for anything. Goes back
-/// to the last star only: O(length of pattern x length of text).
+/// Matches `text` against `pattern`, in which each * stands for anything. Goes
+/// back to the last star only: O(length of pattern x length of text).
 inline bool MatchesStars(std::string_view pattern, std::string_view text) {
   std::size_t p = 0;
   std::size_t t = 0;

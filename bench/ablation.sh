@@ -266,7 +266,7 @@ if is_wanted lost-flow; then
   ablate lost-flow-of-three three "${files[@]}"
 fi
 
-# What a look answers: the given loop; weak faults, which the observers name now
+# Columns with looks: the given loop; weak faults, which the observers name now
 # and then; and a valve with 500 N of friction that is known without its
 # pressures.
 if is_wanted loop-looks; then
@@ -302,7 +302,7 @@ for n in 1 2; do
   ablate friction-looks-$n "friction --second-look" "${files[@]}"
 done
 
-# What others recorded: real events of actuator 3; single bad readings, a start
+# Recordings of others: real events of actuator 3; single bad readings, a start
 # and faults of the collection cases-4.
 if is_wanted real; then
   once A3 "$bin/fdi-trainer" onboard --valve A3 --no-coverage \

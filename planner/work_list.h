@@ -58,7 +58,7 @@ struct WorkQuery {
 /// plant's table, and valves with an entry of their own. Empty without the
 /// file.
 std::vector<PlannedLoop> LoopsOf(const std::filesystem::path& models);
-/// What `valves repaired` noted. Empty without the file.
+/// The repairs that `valves repaired` noted. Empty without the file.
 std::vector<Repair> RepairsOf(const std::filesystem::path& models);
 
 /// The one list of what is wrong, as text, CSV, JSON, page to print and view of

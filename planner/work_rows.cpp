@@ -146,8 +146,8 @@ bool IsOver(const Episode& episode) {
   return (episode.cleared_ns || episode.ended_ns) && !episode.unconfirmed_ns;
 }
 
-// What is over is done by what was done later. An alarm whose data ended is
-// done by a repair after that.
+// A later repair or label is done with an episode that is over. An alarm whose
+// data ended takes a repair after that.
 bool IsDone(const Episode& episode, const Repair& by) {
   return IsOver(episode)
              ? episode.detected_ns <= by.at_ns
@@ -446,8 +446,8 @@ report::FaultWords QuantisedWords() {
   return words;
 }
 
-// What audit and engine say of one valve at one time is one finding, also where
-// they contradict each other.
+// Audit and engine make one finding of one valve at one time, also where they
+// contradict each other.
 bool RowReader::JoinFault(const LoopAudits::Window& audit,
                           const std::string& text) {
   for (WorkRow& row : rows_) {

@@ -314,9 +314,9 @@ ValveParameters WithUnknowns(ValveParameters parameters,
 
 constexpr std::ptrdiff_t kMinTrimRows = 30;
 
-// Whether enough rows have both readings. Otherwise what stands in the place of
-// X has to do: the command of a valve without a position transmitter, and the
-// line between two readings where tags are stored at different times.
+// Enough rows have both readings. Otherwise a substitute of X has to do: the
+// command of a valve without a position transmitter, and the line between two
+// readings where tags are stored at different times.
 bool HasPosition(const std::vector<HealthyRecord>& records) {
   std::ptrdiff_t both = 0;
   for (const HealthyRecord& record : records) {

@@ -86,7 +86,7 @@ if [ -n "$python" ]; then
 else
   echo "samples_module: no Python that can load extensions"
 fi
-# What an export adds for people does not disturb an import.
+# The columns that an export adds for people do not disturb an import.
 fdi_store --data again runs import export.csv --valve FV-101 >/dev/null
 fdi_store --data again runs export last --stamps -o again.csv
 cut -d, -f1-7 export.csv | cmp - <(cut -d, -f1-7 again.csv) || fail "import"
@@ -96,7 +96,7 @@ sqlite3 other.db "create table t (a)"
 sql other.db "attach 'runs.db' as runs; select count(*) from sample" |
   grep -qx 3800 || fail "attached"
 
-# What cannot be.
+# Queries and files that cannot be.
 refuses other.db 'none of the open databases is a runs.db' \
   "select * from sample"
 refuses runs.db 'no such column' "select pressure from sample"

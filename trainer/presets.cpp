@@ -4,7 +4,7 @@
 namespace fdi::trainer {
 namespace {
 
-// Of names before t_k (docs/method.md).
+// The error of names before t_k (docs/method.md).
 constexpr double kEarlyError = 1e-3;
 
 TrainingOptions Paper() {

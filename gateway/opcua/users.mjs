@@ -29,7 +29,7 @@ export class Users {
 
   mayAct(name) { return mayAct.includes(this.#byName.get(name)?.role); }
 
-  // Whether it is the password of this user.
+  // @returns a promise of whether it is the password of this user.
   check(name, password) {
     if (!this.#byName.has(name)) return Promise.resolve(false);
     const turn = this.#turns.get(name) ?? Promise.resolve();

@@ -11,7 +11,7 @@ const health = {NORMAL: 0, FAILURE: 1, CHECK_FUNCTION: 2, OFF_SPEC: 3, MAINTENAN
 // 1 to 1000 in OPC 10000-5, in equal steps.
 export const severities = {low: 250, medium: 500, high: 750, critical: 1000};
 
-// What a variable says of a state. DeviceHealth and Description are always good:
+// The value of each variable in a state. DeviceHealth and Description are always good:
 // that nobody judges the valve is known.
 const variables = {
   DeviceHealth: {type: 'Int32', of: state => health[state.health] ?? health.CHECK_FUNCTION},

@@ -17,7 +17,7 @@ bool IsFresh(std::int64_t as_of_ns, std::int64_t told_ns) {
   return as_of_ns >= told_ns && as_of_ns - told_ns < kRefreshNs;
 }
 
-// What the alarm adds to the state of its valve.
+// Adds the alarm to the state of its valve.
 void AddAlarm(const findings::Finding& alarm, idl::ValveStateMessage& state) {
   const bool named = alarm.strength.has_value();
   state.state = named ? State::kIsolated : State::kDetected;
@@ -44,7 +44,7 @@ BusValveStates::BusValveStates(idl::Participant& participant,
 void BusValveStates::Recover(const storage::Episode& episode) {
   const MutexLock lock(mutex_);
   Valve& valve = valves_[episode.valve_id];
-  // What is open takes the place of what its data left unconfirmed.
+  // An open episode takes the place of one that its data left unconfirmed.
   if (valve.alarm && episode.ended_ns) {
     return;
   }

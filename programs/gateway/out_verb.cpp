@@ -110,9 +110,9 @@ class Outlet {
  public:
   virtual ~Outlet() = default;
   virtual bool Publish(const Outgoing& message) = 0;
-  // Whether messages can go out now; tells `states` what to say again.
+  // @returns whether messages can go out now; tells `states` what to say again.
   virtual bool Ready(ValveStates& states) = 0;
-  // Whether a valve that no monitor has told of can be said to be missing.
+  // A valve that no monitor has told of by now is missing.
   virtual bool KnowsAll() const { return true; }
   virtual void End(const Outgoing& farewell) = 0;
 };
@@ -142,7 +142,7 @@ class BrokerOutlet : public Outlet {
     }
     return client_.connected();
   }
-  // What the broker has kept stands until the monitors have been heard.
+  // The states that the broker has kept stand until the monitors were heard.
   bool KnowsAll() const override {
     return Clock::now() - start_ >= kAcquainted;
   }

@@ -80,8 +80,7 @@ struct Alarm {
   std::optional<Shelf> shelf;
 };
 
-/// Whether an episode that ends so is not known to be over: only its data
-/// ended.
+/// An episode that ends so is not known to be over: only its data ended.
 bool LeavesUnconfirmed(EndReason reason);
 
 /// The alarm that `event` belongs to, made from the event alone because it is

@@ -240,7 +240,7 @@ class ModelStore {
   std::optional<ValveEntry> AddValveEvent(std::string_view pattern,
                                           const ValveEvent& event);
   std::vector<ValveEvent> ValveEvents(std::string_view pattern);
-  /// What was noted of all valves, with the id or glob, by time.
+  /// The repairs noted of all valves, with the id or glob, by time.
   std::vector<std::pair<std::string, ValveEvent>> Repairs();
 
   /// Stores a valve type, replacing one of the same name. @throws ConfigError

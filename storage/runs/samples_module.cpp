@@ -335,7 +335,7 @@ void Cursor::Result(sqlite3_context* context, int column) const {
     case kFlowUnit:
       return ResultText(context, FlowUnitName(sample.flow_unit));
     default:
-      // What is not measured is NULL, and SQLite makes NULL of NaN.
+      // A signal that is not measured is NULL; SQLite makes NULL of NaN, too.
       if (const auto signal = static_cast<Signal>(column - kFirstSignal);
           sample.Has(signal)) {
         sqlite3_result_double(context, sample[signal]);
@@ -361,8 +361,7 @@ Cursor& Of(sqlite3_vtab_cursor* cursor) {
   return static_cast<Cursor&>(*cursor);
 }
 
-// Whether a comparison narrows the chunks that are read: that of a run or valve
-// by name, or of a time.
+// A comparison with a run, a valve or a time narrows the chunks that are read.
 bool Narrows(int column, int op) {
   switch (op) {
     case SQLITE_INDEX_CONSTRAINT_EQ:

@@ -40,7 +40,7 @@ serve() {  # OPTIONS
   await 60 grep -q "opcua_server: ready" server.log
 }
 
-# What cannot be is said at the start.
+# The server refuses at the start what cannot be.
 node server.mjs --port $port --host 0.0.0.0 2>refused.log && fail "open to all without users"
 grep -q "takes --users" refused.log || fail "$(cat refused.log)"
 echo "anna:secret:acknowledge" >users

@@ -344,7 +344,7 @@ class ShiftTest : public MonitorFixture {
                     {"strength", row["strength"]}};
       }
     }
-    // What is labelled and over is done.
+    // A finding that is labelled and over is done.
     std::erase_if(list, [](const auto& item) {
       const json& row = item.second;
       return row["shelved"] == true ||
@@ -373,8 +373,8 @@ class ShiftTest : public MonitorFixture {
     }
     return alarms;
   }
-  // What somebody hears who comes to the bus now. Its strengths are those of
-  // the last event.
+  // The states as a late reader of the bus hears them. Their strengths are
+  // those of the last event.
   Alarms FromBus() const {
     idl::Participant here(participant_->options());
     idl::Subscriber<idl::ValveStateMessage> states(here);

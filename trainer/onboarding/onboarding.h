@@ -99,7 +99,7 @@ Onboarding Onboard(const std::vector<TrainingRun>& runs,
                    const OnboardingOptions& options,
                    const Progress& progress = {});
 
-/// What could be seen of a valve of the type that measures `signals` alone: the
+/// The coverage that a valve of the type would have with `signals` alone: the
 /// type is simulated healthy, and onboarded.
 CoverageTable AssessType(const ValveType& type, SignalMask signals,
                          const OnboardingOptions& options,

@@ -409,7 +409,7 @@ TEST_F(FdiStoreTest, ValvesAreDescribedAndTheirEpochCounts) {
             0);
   EXPECT_EQ(Store("valves repaired 'LV-*'").code, 2);
   EXPECT_EQ(Store("valves repaired 'LV-*' painted").code, 2);
-  // What its models were made for is restored: names stay.
+  // The work restores the valve of which the models were made: names stay.
   EXPECT_EQ(Store("valves repaired 'LV-*' repacked").code, 0);
   // A valve of the default set has no entry.
   EXPECT_THAT(Store("valves repaired OTHER recalibrated").out,

@@ -26,7 +26,7 @@ struct Type {
   bool or_null{false};
 };
 
-// Of "TYPE (UNIT); MEANING", of which only the type is needed.
+// @param text "TYPE (UNIT); MEANING", of which only the type is needed.
 Type ParseType(const std::string& text) {
   std::string type = text.substr(0, std::min(text.find(" ("), text.find(';')));
   const bool or_null = type.ends_with('?');
@@ -37,7 +37,7 @@ Type ParseType(const std::string& text) {
   return {json::parse(std::regex_replace(type, word, "\"$&\"")), or_null};
 }
 
-// What docs/json.toml says.
+// The kinds of docs/json.toml.
 class Page {
  public:
   using Kind = std::map<std::string, Type>;
