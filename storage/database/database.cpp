@@ -311,6 +311,12 @@ void Database::Execute(const std::string& script) {
 }
 
 int Database::CheckIdentity(const Schema& schema) {
+  const auto refuse_begun = [this] {
+    Refuse<OutdatedError>(
+        path_,
+        "is empty: who made it was stopped before it was done; the next "
+        "program that writes, or `fdi-store doctor`, goes on with it");
+  };
   std::int64_t id = 0;
   std::int64_t version = 0;
   std::int64_t objects = 0;
@@ -320,6 +326,11 @@ int Database::CheckIdentity(const Schema& schema) {
     objects = connection_->execAndGet("SELECT count(*) FROM sqlite_schema")
                   .getInt64();
   } catch (const SQLite::Exception& error) {
+    // Only a file that is not in WAL mode yet can have left a journal, which a
+    // writer alone rolls back.
+    if (error.getExtendedErrorCode() == SQLITE_READONLY_ROLLBACK) {
+      refuse_begun();
+    }
     const int code = error.getErrorCode();
     if (access_ == Access::kReader &&
         (code == SQLITE_READONLY || code == SQLITE_CANTOPEN)) {
@@ -337,10 +348,7 @@ int Database::CheckIdentity(const Schema& schema) {
   // committed together, so there is nothing between empty and complete.
   const bool blank = id == 0 && version == 0 && objects == 0;
   if (blank && access_ == Access::kReader) {
-    Refuse<OutdatedError>(
-        path_,
-        "is empty: who made it was stopped before it was done; the next "
-        "program that writes, or `fdi-store doctor`, goes on with it");
+    refuse_begun();
   }
   if (id != schema.application_id && !blank) {
     Refuse(path_, "is not a " + std::string(schema.kind) +

@@ -2,6 +2,7 @@
 
 #include <fstream>
 
+#include <SQLiteCpp/SQLiteCpp.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/wait.h>
@@ -49,6 +50,26 @@ class DatabaseTest : public ::testing::Test {
   TemporaryDirectory directory_;
   std::filesystem::path file_{directory_.path() / "test.db"};
 };
+
+// A program is killed while SQLite turns a new file into one with a log: the
+// journal of that change is left, and a reader may not roll it back.
+TEST_F(DatabaseTest,
+       AJournalThatAKilledProgramLeftIsOneOfAFileThatWasOnlyBegun) {
+  const std::filesystem::path begun = directory_.path() / "begun.db";
+  {
+    SQLite::Database raw(begun.string(),
+                         SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE);
+    // Without a sync SQLite writes the head of the journal at once, so that the
+    // journal counts as one of a change that was interrupted.
+    raw.exec(
+        "PRAGMA synchronous=OFF; CREATE TABLE x (y); BEGIN; DROP TABLE x;");
+    for (const char* suffix : {"", "-journal"}) {
+      std::filesystem::copy(begun.string() + suffix, file_.string() + suffix);
+    }
+  }
+  EXPECT_THAT(MessageOf(SchemaOf(1), Access::kReader), HasSubstr("is empty"));
+  EXPECT_THROW(Database(file_, SchemaOf(1), Access::kReader), OutdatedError);
+}
 
 // In SQLite's own, ! is a member of the set.
 TEST_F(DatabaseTest, GlobIsTheOneOfTheMonitor) {
