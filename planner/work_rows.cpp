@@ -161,13 +161,15 @@ std::optional<Repair> LabelOf(const Episode& episode,
   if (!episode.label || !IsOver(episode)) {
     return std::nullopt;
   }
-  for (const auto& entry : history.Events(episode.id) | std::views::reverse) {
-    if (entry.kind == "LABEL") {
-      return Repair{episode.valve_id, entry.stamp_ns, entry.who,
-                    "labelled " + *episode.label};
-    }
+  const std::vector<storage::HistoryEntry> entries = history.Events(episode.id);
+  const auto entry =
+      std::find_if(entries.rbegin(), entries.rend(),
+                   [](const auto& each) { return each.kind == "LABEL"; });
+  if (entry == entries.rend()) {
+    return std::nullopt;
   }
-  return std::nullopt;
+  return Repair{episode.valve_id, entry->stamp_ns, entry->who,
+                "labelled " + *episode.label};
 }
 
 // Makes the rows of all valves.

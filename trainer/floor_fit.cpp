@@ -216,13 +216,8 @@ void FitLevels(const std::vector<Stretch>& stretches, FloorLimits& floor) {
 // out. Where X hardly moves, the slope is noise, and the exponent stays at its
 // default. With the f of a trim, y is ln(F/(f √dP)) and n is 0.
 //
-// Without X, the straight line is that of CV, and the factor takes the most
-// open position that the rod may have, as Floor does.
-//
-// The factor solves the test F > c F(X − L/2, dP) + m F_high of Floor for the
-// largest c that the record reached for flow_samples in a row; the share in the
-// test F < s LeastFlowAt(X, dP) − m F_high is found likewise.
-void FitFlow(const std::vector<Stretch>& stretches, FloorLimits& floor) {
+// Without X, the straight line is that of CV. False where no row tells it.
+bool FitFlowCurve(const std::vector<Stretch>& stretches, FloorLimits& floor) {
   FitLevels(stretches, floor);
   const bool shaped = !floor.flow_shape.empty();
   double w = 0.0;
@@ -252,7 +247,7 @@ void FitFlow(const std::vector<Stretch>& stretches, FloorLimits& floor) {
     }
   }
   if (w <= 0.0) {
-    return;
+    return false;
   }
   const double variance = wxx / w - wx / w * (wx / w);
   if (shaped) {
@@ -262,6 +257,15 @@ void FitFlow(const std::vector<Stretch>& stretches, FloorLimits& floor) {
         std::clamp(-(wxy / w - wx / w * (wy / w)) / variance, 1.0, 8.0);
   }
   floor.flow_gain = std::exp(wy / w + floor.flow_exponent * wx / w);
+  return true;
+}
+
+// The factor solves the test F > c F(X − L/2, dP) + m F_high of Floor for the
+// largest c that the record reached for flow_samples in a row; the share in the
+// test F < s LeastFlowAt(X, dP) − m F_high is found likewise.
+// Without X, the factor takes the most open position that the rod may have, as
+// Floor does.
+void FitFlowFactors(const std::vector<Stretch>& stretches, FloorLimits& floor) {
   double too_little = floor.flow_factor;  // its inverse is the share
   for (const Stretch& stretch : stretches) {
     std::vector<double> ratios;
@@ -307,8 +311,8 @@ std::optional<FloorLimits> FitFloor(const Condition& normal, double period_s,
   if (!first.Has(Signal::kCv) || !(has_x || first.Has(Signal::kF))) {
     return std::nullopt;
   }
-  // FitDeviation() runs the rod that FitRod() has found, FitFlow() allows for
-  // the deviation that FitDeviation() has found.
+  // FitDeviation() runs the rod that FitRod() has found, and FitFlowFactors()
+  // allows for the deviation that FitDeviation() has found.
   FloorLimits floor;
   const auto samples = [&](double seconds) {
     return std::max(2, static_cast<int>(std::lround(seconds / period_s)));
@@ -323,7 +327,9 @@ std::optional<FloorLimits> FitFloor(const Condition& normal, double period_s,
   }
   if (first.Has(Signal::kF)) {
     floor.flow_shape = std::move(flow_shape);
-    FitFlow(stretches, floor);
+    if (FitFlowCurve(stretches, floor)) {
+      FitFlowFactors(stretches, floor);
+    }
   }
   return floor;
 }
