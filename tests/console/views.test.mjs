@@ -792,9 +792,7 @@ test('a click counts though the list is made anew while it is pressed',
           {write: true, user: 'anna', role: 'engineer'});
       const page = await openShared(browser, address, '#/alarms');
       const press = async (name) => {
-        const box = await page.getByRole('button', {name, exact: true})
-            .boundingBox();
-        await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
+        await page.getByRole('button', {name, exact: true}).hover();
         await page.mouse.down();
       };
 
