@@ -17,11 +17,15 @@ bool IsFresh(std::int64_t as_of_ns, std::int64_t told_ns) {
   return as_of_ns >= told_ns && as_of_ns - told_ns < kRefreshNs;
 }
 
+std::uint64_t EpisodeOf(const findings::Finding& alarm) {
+  return storage::ParseEpisodeId(alarm.episode_id).value_or(0);
+}
+
 // Adds the alarm to the state of its valve.
 void AddAlarm(const findings::Finding& alarm, idl::ValveStateMessage& state) {
   const bool named = alarm.strength.has_value();
   state.state = named ? State::kIsolated : State::kDetected;
-  state.episode_id = storage::ParseEpisodeId(alarm.episode_id).value_or(0);
+  state.episode_id = EpisodeOf(alarm);
   if (named || alarm.certainty == Certainty::kNotKnown) {
     state.fault = alarm.fault.value_or("unknown");
   }
@@ -72,6 +76,35 @@ void BusValveStates::OnEvent(const FaultEvent& event) {
     valve.left = over;
   }
   Tell(event.valve_id, valve);
+}
+
+std::vector<std::uint64_t> BusValveStates::Unconfirmed() const {
+  const MutexLock lock(mutex_);
+  std::vector<std::uint64_t> episodes;
+  for (const auto& [valve_id, valve] : valves_) {
+    if (valve.left && valve.alarm) {
+      episodes.push_back(EpisodeOf(*valve.alarm));
+    }
+  }
+  return episodes;
+}
+
+void BusValveStates::EndUnconfirmed(
+    const std::vector<std::uint64_t>& episodes) {
+  const MutexLock lock(mutex_);
+  for (auto& [valve_id, valve] : valves_) {
+    if (!valve.left || !valve.alarm ||
+        std::ranges::find(episodes, EpisodeOf(*valve.alarm)) ==
+            episodes.end()) {
+      continue;
+    }
+    valve.alarm.reset();
+    valve.left = false;
+    if (valve.silent) {
+      valve.state = State::kNormal;  // The last verdict was of the alarm.
+    }
+    Tell(valve_id, valve);
+  }
 }
 
 void BusValveStates::OnVerdict(const std::string& valve_id,

@@ -5,6 +5,7 @@
 #include <string>
 #include <string_view>
 #include <unordered_map>
+#include <vector>
 
 #include "base/mutex.h"
 #include "idl/endpoint.h"
@@ -20,9 +21,11 @@ namespace fdi::monitor {
 /// A verdict tells whether the valve is judged, an event what its alarm is. An
 /// alarm whose data ended, or that an earlier session left active, is not
 /// confirmed until the valve is found abnormal again, and goes when the valve
-/// is found normal.
+/// is found normal, or when the history says that somebody has acknowledged its
+/// end.
 ///
-/// The diagnosis thread calls what ValveListener has, the publisher OnEvent().
+/// The diagnosis thread calls what ValveListener has, the publisher OnEvent(),
+/// and the thread of the service the others.
 class BusValveStates : public ValveListener {
  public:
   /// @param monitor as in its MonitorStatus.
@@ -32,6 +35,10 @@ class BusValveStates : public ValveListener {
   /// An alarm that was active when this session began. Before all else.
   void Recover(const storage::Episode& episode);
   void OnEvent(const FaultEvent& event);
+  /// The episodes of the alarms that no data confirm.
+  std::vector<std::uint64_t> Unconfirmed() const;
+  /// Drops those of the Unconfirmed() alarms whose `episodes` are over.
+  void EndUnconfirmed(const std::vector<std::uint64_t>& episodes);
 
   std::string_view name() const override { return "states"; }
   void OnVerdict(const std::string& valve_id, const Sample& sample,
@@ -60,7 +67,7 @@ class BusValveStates : public ValveListener {
   const std::string monitor_;
   const report::FaultTexts texts_;
   idl::Publisher<idl::ValveStateMessage> publisher_;
-  Mutex mutex_;
+  mutable Mutex mutex_;
   std::unordered_map<std::string, Valve> valves_ GUARDED_BY(mutex_);
 };
 

@@ -318,6 +318,25 @@ void Service::RecoverAlarms() {
   }
 }
 
+// An alarm whose data have ended is over once somebody acknowledges it
+// (HistoryEditor). That is done by another process or the page, which tell
+// nobody, so the history is asked. What it cannot say now stands.
+void Service::EndAcknowledgedAlarms() {
+  const std::vector<std::uint64_t> waiting = states_.Unconfirmed();
+  if (waiting.empty()) {
+    return;
+  }
+  try {
+    if (!alarm_reader_) {
+      alarm_reader_ = std::make_unique<storage::HistoryReader>(data_.history());
+    }
+    alarm_reader_->database().Refresh();
+    states_.EndUnconfirmed(alarm_reader_->Over(waiting));
+  } catch (const std::exception&) {
+    alarm_reader_.reset();
+  }
+}
+
 void Service::StartParts() {
   if (options_.parts.empty()) {
     return;
@@ -488,6 +507,7 @@ void Service::Tick() {
           [this] { shares_.Tick([this] { return pipeline_.valve_names(); }); });
   attempt("transport", [this] { ReportLoss(); });
   attempt("heartbeat", [this] { ReportStall(); });
+  attempt("alarms", [this] { EndAcknowledgedAlarms(); });
   attempt("status", [this] { PublishStatus(); });
   if (Clock::now() - last_status_line_ >=
       Milliseconds(options_.status_period_s)) {

@@ -90,6 +90,7 @@ class Service {
   void Start();
   void ResendEvents();
   void RecoverAlarms();
+  void EndAcknowledgedAlarms();
   void StartParts();
   void TellAssignedValves();
   void ServeProbes();
@@ -122,6 +123,8 @@ class Service {
   std::unique_ptr<EventHook> hook_;  // Null: no event hook.
   // Of the step "on_event", one event at a time; null: not open.
   std::unique_ptr<storage::HistoryReader> shelf_reader_;
+  // Of the thread of Run(); null: not open.
+  std::unique_ptr<storage::HistoryReader> alarm_reader_;
   idl::Participant participant_;
   idl::Participant intake_participant_;  // See idl::Overflow.
   idl::Publisher<idl::ModelSetInfoMessage> models_topic_;

@@ -283,6 +283,19 @@ AlarmCounts HistoryReader::CountAlarms(std::int64_t now_ns) {
   return counts;
 }
 
+std::vector<std::uint64_t> HistoryReader::Over(
+    const std::vector<std::uint64_t>& episodes) {
+  const Snapshot snapshot(database_);
+  std::vector<std::uint64_t> over;
+  for (const std::uint64_t episode : episodes) {
+    Statement row = database_.Prepare(sql::is_over);
+    if (row.Bind(EpisodeIdText(episode)).Step()) {
+      over.push_back(episode);
+    }
+  }
+  return over;
+}
+
 AlarmStatistics HistoryReader::AlarmFigures(const EpisodeFilter& filter,
                                             std::int64_t now_ns) {
   return ComputeAlarmStatistics(ReadAlarmSpans(database_, filter),

@@ -50,6 +50,9 @@ SELECT e.priority, 0, count(*) FROM episode e INDEXED BY episode_returned
 WHERE e.acked_by IS NULL AND e.ended_ns IS NOT NULL AND e.unconfirmed_ns IS NULL
   AND (e.cleared_ns IS NOT NULL OR
        e.end_reason NOT IN ('stream_ended', 'stale_timeout', 'unknown'))
+-- name: is_over
+SELECT 1 FROM episode
+WHERE episode_id = ? AND ended_ns IS NOT NULL AND unconfirmed_ns IS NULL
 -- name: newest_of_fault
 SELECT f.episode_id
 FROM episode_fault f INDEXED BY episode_fault_by_fault

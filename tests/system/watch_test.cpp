@@ -7,6 +7,8 @@
 #include <nlohmann/json.hpp>
 #include <sys/wait.h>
 
+#include "base/time_text.h"
+#include "storage/history/history_editor.h"
 #include "tests/system/monitor_fixture.h"
 #include "tests/system/pty_process.h"
 
@@ -128,6 +130,48 @@ TEST_F(WatchSystemTest, AnAlarmOfBeforeARestartStandsUntilTheValveIsNormal) {
                 std::chrono::milliseconds(10));
     return normal;
   }));
+}
+
+// The page and the list have left it; nobody tells the monitor.
+TEST_F(WatchSystemTest, AnAlarmWhoseEndSomebodyAcknowledgedLeavesTheBus) {
+  samples_->Dispose({"V1", {}});
+  ASSERT_TRUE(AwaitEvent(TransitionKind::kClosed));
+  idl::Participant here(participant_->options());
+  idl::Subscriber<idl::ValveStateMessage> states(here);
+  idl::ValveStateMessage last;
+  const auto told = [&](const auto& condition) {
+    return Await([&] {
+      states.Take({[&](const auto& state, const auto&) { last = state; }, {}},
+                  std::chrono::milliseconds(10));
+      return condition();
+    });
+  };
+  ASSERT_TRUE(
+      told([&] { return last.unconfirmed_ns != 0 && last.fault == "f7"; }));
+
+  storage::HistoryEditor(data_ / "history.db")
+      .Acknowledge("last", {"anna", "seen", "test", NowNs()});
+
+  EXPECT_TRUE(told([&] { return last.episode_id == 0; }));
+  EXPECT_EQ(last.fault, "");
+  EXPECT_NE(last.unconfirmed_ns, 0);  // Nobody knows that it is normal.
+  const auto table = LastTable();
+  ASSERT_EQ(table["valves"].size(), 1U);
+  EXPECT_EQ(table["valves"][0]["state"], "NOT_CONFIRMED");
+  EXPECT_EQ(table["valves"][0]["certainty"], nullptr);
+}
+
+// It stands as long as its data come.
+TEST_F(WatchSystemTest, AnAcknowledgedAlarmStaysOnTheBusWhileItStands) {
+  storage::HistoryEditor(data_ / "history.db")
+      .Acknowledge("last", {"anna", "seen", "test", NowNs()});
+
+  samples_->Dispose({"V1", {}});
+  ASSERT_TRUE(AwaitEvent(TransitionKind::kClosed));
+
+  const auto table = LastTable();
+  ASSERT_EQ(table["valves"].size(), 1U);
+  EXPECT_EQ(table["valves"][0]["fault"], "f7");
 }
 
 TEST_F(WatchSystemTest, TheTableComesAgainUntilCtrlC) {
