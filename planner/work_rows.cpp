@@ -70,9 +70,8 @@ std::string EpisodeText(const Finding& finding, std::int64_t now_ns) {
   if (finding.confirmed) {
     text += ", confirmed by a label";
   }
-  if (const auto witness = findings::NamedByText(finding.layer.value_or(""));
-      !witness.empty()) {
-    text += ", " + std::string(witness);
+  if (!finding.witness.empty()) {
+    text += ", " + finding.witness;
   }
   return text;
 }
@@ -299,8 +298,9 @@ void RowReader::AddEpisodes(storage::History& history) {
   std::set<std::string>
       seen;  // The plant has one that moved with its valve twice.
   for (const Episode& episode : episodes) {
+    // The episode that took over says what this one was.
     if (!seen.insert(episode.episode_id).second || episode.label == "false" ||
-        shelved(episode)) {
+        IsTakenOver(episode) || shelved(episode)) {
       continue;
     }
     SameFault& same = faults[{episode.valve_id, FaultOf(episode)}];
@@ -448,6 +448,19 @@ report::FaultWords QuantisedWords() {
   return words;
 }
 
+// A name that the audit contradicts is less certain, as that of an episode
+// which took over from one of the audit (storage::CertaintyOf()).
+void Doubt(const std::string& audit, Finding& finding) {
+  const Certainty before = *finding.certainty;
+  const Certainty certainty =
+      WithAudit(before, finding.fault.value_or(""), audit);
+  if (certainty != before && !finding.confirmed) {
+    finding.certainty = certainty;
+    finding.confidence *= findings::CertaintyFactor(certainty) /
+                          findings::CertaintyFactor(before);
+  }
+}
+
 // Audit and engine make one finding of one valve at one time, also where they
 // contradict each other.
 bool RowReader::JoinFault(const LoopAudits::Window& audit,
@@ -457,6 +470,7 @@ bool RowReader::JoinFault(const LoopAudits::Window& audit,
     const std::int64_t end_ns = f.ended_ns.value_or(query_.now_ns);
     if (f.kind == "episode" && f.valve_id == audit.loop &&
         audit.start_ns <= end_ns && audit.end_ns >= *f.since_ns) {
+      Doubt(CatalogueName(audit.verdict), row.finding);
       if (row.why.find(text) == std::string::npos) {
         row.why += "; the audit of its loop says: " + text;
       }

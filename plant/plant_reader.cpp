@@ -180,6 +180,13 @@ EpisodeLook LookOf(std::uint64_t episode_id, const PlantRows& header,
   ParseColumn("first_ns", header.Text(0, 0), look.first_ns);
   ParseColumn("period", header.Text(0, 1), look.period_ns);
   ParseColumn("misfit", header.Text(0, 2), look.misfit);
+  if (const auto rival = header.Text(0, 3)) {
+    look.rival = LookRival{RequireFinding(*rival), 1.0};
+    ParseColumn("times", header.Text(0, 4), look.rival->times);
+  }
+  for (const std::string& name : SplitNames(header.Text(0, 5).value_or(""))) {
+    look.observers.push_back(RequireFinding(name));
+  }
   if (look.period_ns <= 0 || look.period_ns > kNsPerDay) {
     RefuseValue(std::to_string(look.period_ns), "no period");
   }

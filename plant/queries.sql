@@ -80,7 +80,8 @@ FROM batch c CROSS JOIN episode_trace t
   ON t.episode_id = c.key AND t.chunk = c.part
 WHERE c.item = 'trace'
 -- name: episode_look
-SELECT l.episode_id, l.first_ns, l.period_ns, l.misfit
+SELECT l.episode_id, l.first_ns, l.period_ns, l.misfit, l.rival, l.times,
+  l.observers
 FROM batch c CROSS JOIN episode_look l ON l.episode_id = c.key
 WHERE c.item = 'look'
 -- name: episode_look_fault
@@ -299,8 +300,15 @@ SELECT * FROM (
      WHERE (s.episode_id, s.monitor_id) = (e.episode_id, e.monitor_id)
        AND s.kind = 'SECOND'
      ORDER BY s.stamp_ns DESC LIMIT 1),
+    (SELECT CASE WHEN a.layer = 'audit' AND a.end_reason = 'superseded'
+       THEN a.fault END
+     FROM episode a
+     WHERE (a.valve_id, a.monitor_id) = (e.valve_id, e.monitor_id)
+       AND a.detected_ns < e.detected_ns
+     ORDER BY a.detected_ns DESC LIMIT 1), l.rival, l.times, l.observers,
     e.host, e.monitor
-  FROM episode e
+  FROM episode e LEFT JOIN episode_look l
+    ON (l.episode_id, l.monitor_id) = (e.episode_id, e.monitor_id)
   WHERE {episodes}
   ORDER BY utc(e.detected_ns) DESC, e.valve_id DESC LIMIT {limit}) l
 ORDER BY detected_ns, valve_id, host, monitor
@@ -350,7 +358,8 @@ episode_id = $1 AND monitor_id = (
 SELECT sample_codec, sample_crc, instants, samples, vector_crc, vectors
 FROM episode_trace WHERE
 -- name: plant_look
-SELECT first_ns, period_ns, misfit FROM episode_look WHERE
+SELECT first_ns, period_ns, misfit, rival, times, observers
+FROM episode_look WHERE
 -- name: plant_look_faults
 SELECT fault, strength, lowest, highest, begins_ns, growing
 FROM episode_look_fault WHERE

@@ -50,6 +50,20 @@ Certainty CertaintyOf(std::string_view faults, Layer layer, double factor,
   return cause && factor >= least ? Certainty::kSure : Certainty::kLikely;
 }
 
+Certainty WithAudit(Certainty certainty, std::string_view faults,
+                    std::string_view audit) {
+  const std::optional<int> found = ParseFinding(audit);
+  const bool rod = found == kNoResponse || found == kStiction;
+  bool leaves_rod = rod && certainty > Certainty::kOneOf;
+  while (leaves_rod && !faults.empty()) {
+    const std::size_t bar = std::min(faults.find('|'), faults.size());
+    const std::optional<int> fault = ParseFault(faults.substr(0, bar));
+    leaves_rod = fault && FaultFactsOf(*fault).acts_on != ActsOn::kRod;
+    faults.remove_prefix(std::min(bar + 1, faults.size()));
+  }
+  return leaves_rod ? Certainty::kOneOf : certainty;
+}
+
 std::vector<std::string> LookAlikesBeside(
     std::string_view faults, Layer layer, double strength,
     const std::vector<std::string>& known) {

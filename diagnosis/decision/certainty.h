@@ -70,6 +70,12 @@ inline Certainty WithLookAlikes(Certainty certainty,
   return look_alikes.empty() ? certainty : Certainty::kOneOf;
 }
 
+/// `certainty` of a name of whose loop the audit finds `audit` at the same
+/// time: where the rod does not answer the command, or sticks, no fault that
+/// leaves the rod alone is likely. @param audit as FaultName(); empty: nothing.
+Certainty WithAudit(Certainty certainty, std::string_view faults,
+                    std::string_view audit);
+
 /// Those of the name that `event` gives; none if it came from the bus.
 std::vector<std::string> LookAlikesOf(const FaultEvent& event);
 

@@ -11,6 +11,20 @@ namespace {
 // Smaller changes of a strength are not worth a row of the history.
 constexpr double kMinMove = 0.02;
 
+// A distance is in twice the log-likelihood of errors as large as those of the
+// best explanation (SecondLook), so that it tells the mean square of its own.
+std::optional<LookRival> RivalOf(const LookAnswer& answer) {
+  for (const Explanation& e : answer.others) {
+    if (!Explains(answer.faults, e.fault) && answer.misfit > 0.0 &&
+        answer.readings > 0.0) {
+      const double more =
+          e.distance * std::max(1.0, answer.misfit) / answer.readings;
+      return LookRival{e.fault, (answer.misfit + more) / answer.misfit};
+    }
+  }
+  return std::nullopt;
+}
+
 }  // namespace
 
 EpisodeNames::EpisodeNames(std::shared_ptr<const ModelSet> models,
@@ -77,6 +91,11 @@ std::optional<EpisodeName::Look> EpisodeNames::TakeAnswer(
   auto look = LookThatCounts(engine, *models_, answer);
   if (look && std::exchange(look_ns_, answer->stamp_ns) != answer->stamp_ns) {
     look_ = RecordOf(*answer);
+    for (std::size_t i = 0; i < models_->faults.size(); ++i) {
+      if (Has(engine.isolated, i) && IsFault(models_->faults[i])) {
+        look_->observers.push_back(models_->faults[i]);
+      }
+    }
     RecordStrengths(*answer);
   }
   return look;
@@ -199,6 +218,7 @@ EpisodeLook EpisodeNames::RecordOf(const LookAnswer& answer) const {
       look.faults.push_back({e.fault, e.strength, e.lowest, e.highest,
                              std::max(begins_ns, look.first_ns), e.growing});
     }
+    look.rival = RivalOf(answer);
   }
   for (const RecordAnswer& row : answer.simulated) {
     look.x_pct.push_back(row.x_pct);

@@ -101,6 +101,7 @@ LookAnswer AnswerOf(const SecondLook& look, bool early) {
   LookAnswer answer;
   answer.early = early;
   answer.misfit = look.misfit;
+  answer.readings = look.readings;
   answer.simulated = look.best;
   double nothing = std::numeric_limits<double>::infinity();
   for (const Explanation& e : look.ranked) {
@@ -122,6 +123,12 @@ LookAnswer AnswerOf(const SecondLook& look, bool early) {
         !Explains(answer.faults, e.fault) &&
         !Explains(answer.beside, e.fault)) {
       answer.beside.push_back(e);
+    }
+  }
+  for (const Explanation& e : look.ranked) {
+    if (e.fault != 0 && !Explains(answer.faults, e.fault) &&
+        !Explains(answer.others, e.fault)) {
+      answer.others.push_back(e);
     }
   }
   const bool healthy =

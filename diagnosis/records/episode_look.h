@@ -19,6 +19,15 @@ struct LookFault {
   bool operator==(const LookFault&) const = default;
 };
 
+/// The best explanation by a fault that a look does not name.
+struct LookRival {
+  int fault{0};
+  /// Its mean square error over that of the best explanation.
+  double times{1.0};
+
+  bool operator==(const LookRival&) const = default;
+};
+
 /// What the last second look at an episode made of it: the answer that counts,
 /// and how the valve would have moved under the fault that explains it best.
 struct EpisodeLook {
@@ -28,9 +37,11 @@ struct EpisodeLook {
   /// Mean square of the errors in units of the healthy ones; far above 1 where
   /// nothing fits.
   double misfit{0.0};
-  std::vector<LookFault> faults;  ///< Best first; none: no fault fits.
-  std::vector<double> x_pct;      ///< Simulated position, a row each [%].
-  std::vector<double> flow;       ///< Simulated flow, in the unit of F.
+  std::vector<LookFault> faults;     ///< Best first; none: no fault fits.
+  std::optional<LookRival> rival{};  ///< Nothing: all faults are named.
+  std::vector<int> observers{};      ///< What the observers named then.
+  std::vector<double> x_pct;         ///< Simulated position, a row each [%].
+  std::vector<double> flow;          ///< Simulated flow, in the unit of F.
 
   bool operator==(const EpisodeLook&) const = default;
 

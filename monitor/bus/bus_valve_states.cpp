@@ -53,6 +53,7 @@ void BusValveStates::Recover(const storage::Episode& episode) {
     return;
   }
   valve.alarm = findings::FindingOf(episode, texts_);
+  valve.audit = episode.audit;
   valve.model_set = episode.model_set;
   valve.left = true;
   valve.as_of_ns = valve.alarm->unconfirmed_ns.value_or(valve.alarm->last_ns);
@@ -63,9 +64,10 @@ void BusValveStates::OnEvent(const FaultEvent& event) {
   if (event.resent) {
     return;  // Of an earlier session, whose alarms are recovered.
   }
-  const storage::Episode episode = storage::AlarmOf(event).episode;
+  storage::Episode episode = storage::AlarmOf(event).episode;
   const MutexLock lock(mutex_);
   Valve& valve = valves_[event.valve_id];
+  episode.audit = valve.audit;
   const bool over = episode.cleared_ns || episode.ended_ns;
   // The valve may have been found normal before its events were stored.
   if (over &&
@@ -74,6 +76,9 @@ void BusValveStates::OnEvent(const FaultEvent& event) {
   } else {
     valve.alarm = findings::FindingOf(episode, texts_);
     valve.left = over;
+  }
+  if (event.transition.kind == TransitionKind::kClosed) {
+    valve.audit = IsTakenOver(episode) ? episode.fault : std::nullopt;
   }
   Tell(event.valve_id, valve);
 }

@@ -178,6 +178,7 @@ Json EpisodeJson(const Alarm& alarm) {
       {"fault", TextJson(episode.fault)},
       {"certainty", CertaintyName(CertaintyOf(episode))},
       {"look_alikes", LookAlikesOf(episode)},
+      {"witness", WitnessText(episode)},
       {"peak_factor", episode.peak_factor},
       {"model_set", episode.model_set},
       {"end_reason", TextJson(episode.end_reason)},

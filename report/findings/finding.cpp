@@ -42,13 +42,6 @@ double CertaintyFactor(Certainty certainty) {
   return 0.25;
 }
 
-std::string_view NamedByText(std::string_view layer) {
-  return layer == LayerName(Layer::kPhysics)
-             ? "named by simulation of the valve"
-         : layer == LayerName(Layer::kAudit) ? "named by the audit of the loop"
-                                             : "";
-}
-
 double GradeFactor(std::optional<int> grade) {
   return grade == 1 ? 2.0 : grade == 3 ? 0.5 : 1.0;
 }
@@ -104,6 +97,7 @@ Finding FindingOf(const storage::Episode& episode,
   finding.layer = episode.layer;
   finding.certainty = storage::CertaintyOf(episode);
   finding.look_alikes = storage::LookAlikesOf(episode);
+  finding.witness = storage::WitnessText(episode);
   if (IsNamed(episode)) {
     finding.strength = episode.strength;
   }

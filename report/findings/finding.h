@@ -43,6 +43,7 @@ struct Finding {
   std::optional<std::string> layer{};  ///< LayerName() of what named it.
   std::optional<Certainty> certainty{};
   std::vector<std::string> look_alikes{};
+  std::string witness{};             ///< storage::WitnessText()
   std::optional<double> strength{};  ///< Signed [-]; nothing before a name.
   std::optional<int> grade{};        ///< RankFacts::grades.
   double confidence{1.0};            ///< What certainty weighs, 0..1 [-].
@@ -70,9 +71,6 @@ double SeverityPoints(Severity severity);
 /// How often what is done about a finding is right: sure 1, likely 0.75, one of
 /// or not known 0.5, not yet 0.25. Conventions, as the points of severity are.
 double CertaintyFactor(Certainty certainty);
-/// "named by simulation of the valve", "named by the audit of the loop"; empty
-/// for the observers, who name most faults.
-std::string_view NamedByText(std::string_view layer);
 /// 1 counts 2, 3 counts a half, and 2 or nothing 1: a plant that states no
 /// grades is ranked by severity and certainty.
 double GradeFactor(std::optional<int> grade);

@@ -185,12 +185,18 @@ AlarmState AlarmStateOf(const Episode& episode, bool shelved) {
       episode.unconfirmed_ns || (!episode.ended_ns && !episode.cleared_ns);
   // Where the data ended, an alarm has not returned to normal. It is over once
   // somebody has acknowledged that, or the next episode has taken its place.
-  const bool no_return = !active && !episode.cleared_ns &&
-                         (episode.end_reason == "stream_ended" ||
-                          episode.end_reason == "stale_timeout" ||
-                          episode.end_reason == "unknown");
+  const bool no_return =
+      !active && !episode.cleared_ns &&
+      (episode.end_reason == "stream_ended" ||
+       episode.end_reason == "stale_timeout" ||
+       episode.end_reason == "unknown" || IsTakenOver(episode));
   return AlarmStateOf(active, episode.acked_by.has_value() || no_return,
                       shelved);
+}
+
+bool IsTakenOver(const Episode& episode) {
+  return episode.end_reason == "superseded" &&
+         episode.layer == LayerName(Layer::kAudit);
 }
 
 bool LeavesUnconfirmed(EndReason reason) {

@@ -83,6 +83,10 @@ struct Alarm {
 /// An episode that ends so is not known to be over: only its data ended.
 bool LeavesUnconfirmed(EndReason reason);
 
+/// The observers have found something meanwhile, and their episode says what
+/// this one of the audit was (Episode::audit): it has not returned to normal.
+bool IsTakenOver(const Episode& episode);
+
 /// The alarm that `event` belongs to, made from the event alone because it is
 /// not, or not yet, in the history.
 Alarm AlarmOf(const FaultEvent& event);

@@ -1,17 +1,75 @@
 #include "storage/history/certainty.h"
 
+#include <cmath>
+#include <cstdio>
+
 namespace fdi::storage {
+namespace {
+
+// "f6 or f18"
+std::string OrText(std::string faults) {
+  for (std::size_t bar = 0;
+       (bar = faults.find('|', bar)) != std::string::npos;) {
+    faults.replace(bar, 1, " or ");
+  }
+  return faults;
+}
+
+// "1.4 times", "40 times": more digits would say more than a fit knows.
+std::string TimesText(double times) {
+  constexpr double kMost = 1000.0;
+  constexpr double kDigits = 10.0;
+  if (times > kMost) {
+    return "more than 1000 times";
+  }
+  char text[32];
+  std::snprintf(text, sizeof text,
+                times < kDigits ? "%.1f times" : "%.0f times", times);
+  return text;
+}
+
+}  // namespace
 
 Certainty CertaintyOf(const Episode& episode) {
   const bool outside =
       episode.unknown_kind == UnknownName(Unknown::kOutsideKnown);
   // What ended without a name is "unknown", whether a fault fitted or not.
-  return WithLookAlikes(
-      fdi::CertaintyOf(IsNamed(episode) ? *episode.fault : "",
-                       ParseLayer(episode.layer.value_or("")),
-                       episode.peak_factor,
-                       outside ? Unknown::kOutsideKnown : Unknown::kTooEarly),
-      LookAlikesOf(episode));
+  const std::string faults = IsNamed(episode) ? *episode.fault : "";
+  return WithAudit(
+      WithLookAlikes(fdi::CertaintyOf(
+                         faults, ParseLayer(episode.layer.value_or("")),
+                         episode.peak_factor,
+                         outside ? Unknown::kOutsideKnown : Unknown::kTooEarly),
+                     LookAlikesOf(episode)),
+      faults, episode.audit.value_or(""));
+}
+
+std::string WitnessText(const Episode& episode) {
+  std::string text;
+  const std::string layer = episode.layer.value_or("");
+  const std::string fault = episode.fault.value_or("");
+  if (IsNamed(episode) && layer == LayerName(Layer::kPhysics)) {
+    text = "named by simulation of the valve";
+    if (episode.rival && episode.rival_times) {
+      text += ": " + OrText(fault) + " explains it " +
+              TimesText(*episode.rival_times) + " better than " +
+              *episode.rival;
+    }
+    if (episode.observers) {
+      text += episode.observers->empty() ? ", the observers are undecided"
+              : *episode.observers == fault
+                  ? ", the observers agree"
+                  : ", the observers say " + OrText(*episode.observers);
+    }
+  } else if (IsNamed(episode) && layer == LayerName(Layer::kAudit)) {
+    text = "named by the audit of the loop";
+  }
+  if (const auto audit = ParseFinding(episode.audit.value_or(""))) {
+    text += (text.empty() ? "" : "; ") +
+            ("the audit of its loop says: " +
+             std::string(FaultFactsOf(*audit).description));
+  }
+  return text;
 }
 
 std::vector<std::string> LookAlikesOf(const Episode& episode) {

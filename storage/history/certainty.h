@@ -16,6 +16,11 @@ Certainty CertaintyOf(const Episode& episode);
 /// (LookAlikesBeside()).
 std::vector<std::string> LookAlikesOf(const Episode& episode);
 
+/// What the witnesses say of its name: "named by simulation of the valve: f2
+/// explains it 40 times better than f19, the observers are undecided; the audit
+/// of its loop says: the valve sticks". Empty where the observers alone speak.
+std::string WitnessText(const Episode& episode);
+
 /// What stands in the place of a name, as in the view fault_history; empty for
 /// an episode that has a name or is unlike any known fault.
 std::string_view NoNameText(const Episode& episode);

@@ -87,6 +87,14 @@ struct Episode {
   std::optional<std::string> ack_comment;
   /// What came on top of the fault: names joined by |, or "unknown".
   std::optional<std::string> second;
+  /// What the audit of its loop had found until this episode took over.
+  std::optional<std::string> audit;
+  /// Of the look that counts (EpisodeLook): the best explanation by a fault
+  /// that is not named, and how many times larger its mean square error is;
+  /// what the observers named then, joined by |. Nothing without a look.
+  std::optional<std::string> rival;
+  std::optional<double> rival_times;
+  std::optional<std::string> observers;
 };
 
 /// Whether its faults have a name, and with it a strength.
@@ -156,7 +164,8 @@ FDI_FIELDS(fdi::storage::Episode, episode_id, valve_id, detected_utc,
            cleared_ns, ended_ns, acked_ns, trace_end_ns, session_id, fault_bits,
            strength, unknown_kind, layer, flow_unit, channels, faults, known,
            lowest, highest, worst_strength, priority, unconfirmed_ns,
-           fault_name, ack_comment, second)
+           fault_name, ack_comment, second, audit, rival, rival_times,
+           observers)
 
 FDI_FIELDS(fdi::storage::MonitorSession, session_id, start_ns, alive_ns,
            stop_ns, clean, software, config)

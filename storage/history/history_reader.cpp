@@ -69,8 +69,9 @@ std::string StateCondition(EpisodeState state) {
       "e.unconfirmed_ns IS NULL AND "
       "coalesce(e.cleared_ns, e.ended_ns) IS NOT NULL";
   constexpr const char* kReturned =
-      " AND (e.cleared_ns IS NOT NULL OR e.end_reason NOT IN "
-      "('stream_ended', 'stale_timeout', 'unknown'))";
+      " AND (e.cleared_ns IS NOT NULL OR (e.end_reason NOT IN "
+      "('stream_ended', 'stale_timeout', 'unknown') AND NOT (e.end_reason = "
+      "'superseded' AND coalesce(e.layer, '') = 'audit')))";
   constexpr const char* kAcked = " AND e.acked_by IS NOT NULL";
   constexpr const char* kUnacked = " AND e.acked_by IS NULL";
   std::string open = " AND e.ended_ns IS NULL";

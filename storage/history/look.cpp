@@ -2,6 +2,7 @@
 #include <string>
 
 #include "base/error.h"
+#include "base/text.h"
 #include "diagnosis/model/fault_catalogue.h"
 #include "storage/history/episode.h"
 #include "storage/history/history_reader.h"
@@ -17,7 +18,11 @@ void HistoryWriter::StoreLook(const EpisodeLook& look) {
     RequireEpisode(id);
     database_.Cached(sql::delete_look).Bind(id).Run();
     database_.Cached(sql::insert_look)
-        .Bind(id, look.first_ns, look.period_ns, look.misfit)
+        .Bind(id, look.first_ns, look.period_ns, look.misfit,
+              look.rival ? std::optional(FaultName(look.rival->fault))
+                         : std::nullopt,
+              look.rival ? std::optional(look.rival->times) : std::nullopt,
+              JoinText(look.observers, "|", FaultName))
         .Run();
     int rank = 0;
     for (const LookFault& f : look.faults) {
@@ -42,7 +47,17 @@ std::optional<EpisodeLook> HistoryReader::Look(std::uint64_t episode_id) {
   }
   EpisodeLook look;
   look.episode_id = episode_id;
-  header.Read(0, look.first_ns, look.period_ns, look.misfit);
+  std::optional<std::string> rival;
+  std::optional<double> times;
+  std::optional<std::string> observers;
+  header.Read(0, look.first_ns, look.period_ns, look.misfit, rival, times,
+              observers);
+  if (rival && times) {
+    look.rival = LookRival{RequireFinding(*rival), *times};
+  }
+  for (const std::string& name : SplitNames(observers.value_or(""))) {
+    look.observers.push_back(RequireFinding(name));
+  }
   Statement faults = database_.Prepare(sql::look_faults);
   faults.Bind(id);
   while (faults.Step()) {

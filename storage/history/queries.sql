@@ -15,8 +15,13 @@ SELECT v.episode_id, v.valve_id, v.detected_utc, v.isolated_utc,
   e.priority, e.unconfirmed_ns, v.fault_name, v.ack_comment,
   (SELECT nullif(s.value, 'none') FROM episode_event s
    WHERE s.episode_id = e.episode_id AND s.kind = 'SECOND'
-   ORDER BY s.stamp_ns DESC LIMIT 1)
+   ORDER BY s.stamp_ns DESC LIMIT 1),
+  (SELECT CASE WHEN a.layer = 'audit' AND a.end_reason = 'superseded'
+     THEN a.fault END
+   FROM episode a WHERE a.valve_id = e.valve_id AND a.detected_ns < e.detected_ns
+   ORDER BY a.detected_ns DESC LIMIT 1), l.rival, l.times, l.observers
 FROM episode e CROSS JOIN fault_history v USING (episode_id)
+  LEFT JOIN episode_look l ON l.episode_id = e.episode_id
 WHERE
 -- name: newest_episode
 SELECT episode_id FROM episode ORDER BY detected_ns DESC, rowid DESC LIMIT 1
@@ -34,7 +39,9 @@ e.episode_id IN (
     SELECT episode_id FROM episode INDEXED BY episode_returned
     WHERE acked_by IS NULL AND ended_ns IS NOT NULL AND unconfirmed_ns IS NULL
       AND (cleared_ns IS NOT NULL OR
-           end_reason NOT IN ('stream_ended', 'stale_timeout', 'unknown'))
+           (end_reason NOT IN ('stream_ended', 'stale_timeout', 'unknown')
+            AND NOT (end_reason = 'superseded'
+                     AND coalesce(layer, '') = 'audit')))
     ORDER BY detected_ns DESC, valve_id DESC LIMIT ?1)
   LIMIT ?1)
 ORDER BY e.detected_ns DESC, e.valve_id DESC
@@ -49,7 +56,9 @@ WHERE (e.ended_ns IS NULL OR e.unconfirmed_ns IS NOT NULL)
 SELECT e.priority, 0, count(*) FROM episode e INDEXED BY episode_returned
 WHERE e.acked_by IS NULL AND e.ended_ns IS NOT NULL AND e.unconfirmed_ns IS NULL
   AND (e.cleared_ns IS NOT NULL OR
-       e.end_reason NOT IN ('stream_ended', 'stale_timeout', 'unknown'))
+       (e.end_reason NOT IN ('stream_ended', 'stale_timeout', 'unknown')
+        AND NOT (e.end_reason = 'superseded'
+                 AND coalesce(e.layer, '') = 'audit')))
 -- name: is_over
 SELECT 1 FROM episode
 WHERE episode_id = ? AND ended_ns IS NOT NULL AND unconfirmed_ns IS NULL
@@ -216,8 +225,9 @@ FROM episode_trace WHERE episode_id = ? ORDER BY chunk
 -- name: delete_look
 DELETE FROM episode_look WHERE episode_id = ?
 -- name: insert_look
-INSERT INTO episode_look (episode_id, first_ns, period_ns, misfit)
-VALUES (?, ?, ?, ?)
+INSERT INTO episode_look (episode_id, first_ns, period_ns, misfit, rival, times,
+  observers)
+VALUES (?, ?, ?, ?, ?, ?, ?)
 -- name: insert_look_fault
 INSERT INTO episode_look_fault (episode_id, rank, fault, strength, lowest,
   highest, begins_ns, growing)
@@ -225,7 +235,8 @@ VALUES (?, ?, ?, ?, ?, ?, ?, ?)
 -- name: insert_look_row
 INSERT INTO episode_look_row (episode_id, row, x_pct, flow) VALUES (?, ?, ?, ?)
 -- name: look
-SELECT first_ns, period_ns, misfit FROM episode_look WHERE episode_id = ?
+SELECT first_ns, period_ns, misfit, rival, times, observers
+FROM episode_look WHERE episode_id = ?
 -- name: look_faults
 SELECT fault, strength, lowest, highest, begins_ns, growing
 FROM episode_look_fault WHERE episode_id = ? ORDER BY rank

@@ -50,6 +50,18 @@ TEST(CertaintyTest, WhatASetDoesNotKnowAndLooksTheSameStandsBeside) {
   EXPECT_EQ(WithLookAlikes(Certainty::kNotYet, {}), Certainty::kNotYet);
 }
 
+TEST(CertaintyTest, ARodThatDoesNotAnswerContradictsWhatLeavesItAlone) {
+  using enum Certainty;
+  EXPECT_EQ(WithAudit(kSure, "f7", "no_response"), kOneOf);
+  EXPECT_EQ(WithAudit(kLikely, "f19", "stiction"), kOneOf);
+  EXPECT_EQ(WithAudit(kLikely, "f6|f18", "stiction"), kOneOf);
+  EXPECT_EQ(WithAudit(kSure, "f1", "no_response"), kSure);
+  EXPECT_EQ(WithAudit(kSure, "f4", "stiction"), kSure);
+  EXPECT_EQ(WithAudit(kSure, "f7", "oscillation_tuning"), kSure);
+  EXPECT_EQ(WithAudit(kSure, "f7", ""), kSure);
+  EXPECT_EQ(WithAudit(kNotYet, "", "no_response"), kNotYet);
+}
+
 TEST(CertaintyTest, AKnownFaultHasTheSignOfItsObserversIfThatIsOneOfTwo) {
   const std::vector<int> faults{2, 4, 12, 19, 201};
   const std::vector<Observer> observers{

@@ -30,7 +30,9 @@ class FindsF1 final : public LookSimulation {
   SecondLook Look(const LookWindow& window,
                   const std::stop_token& /*stop*/) const override {
     SecondLook look;
-    look.ranked.resize(2);
+    look.ranked.resize(3);
+    look.ranked[2].fault = 2;
+    look.ranked[2].distance = 3900.0;
     look.ranked[0].fault = 1;
     look.ranked[0].strength = 0.5;
     look.ranked[1].distance = 100.0;
@@ -94,7 +96,11 @@ TEST_F(DecisionTest, TheObserversNameAnEpisodeUntilALookDoes) {
   EXPECT_EQ(last_.kind, kReisolated);
   EXPECT_EQ(last_.layer, Layer::kPhysics);
   EXPECT_EQ(last_.strength, 0.5);
-  ASSERT_TRUE(decision_.TakeLook());
+  const auto look = decision_.TakeLook();
+  ASSERT_TRUE(look);
+  // The mean square error of 1 by f1, and 3900 / 100 readings more by f2.
+  EXPECT_EQ(look->rival, (LookRival{2, 40.0}));
+  EXPECT_THAT(look->observers, ElementsAre(7));
 
   Feed(kFaultBegins + 200, 0.0);
   EXPECT_EQ(last_.kind, kClosed);

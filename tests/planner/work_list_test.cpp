@@ -313,8 +313,35 @@ TEST_F(WorkListTest, WhatTheAuditSaysOfAnEpisodeIsNoSecondRow) {
   EXPECT_THAT(of("episode")["why"].get<std::string>(),
               AllOf(HasSubstr("the audit of its loop says: "),
                     HasSubstr("X stands at 0 %")));
+  EXPECT_EQ(of("episode")["certainty"], "one of");
+  EXPECT_EQ(of("episode")["confidence"], 0.5);
   EXPECT_THAT(of("audit")["why"].get<std::string>(),
               HasSubstr("X stood at 0 %"));
+}
+
+// Until the observers found more, the audit alone had an alarm.
+TEST_F(WorkListTest, WhatTookOverFromTheAuditIsOneRow) {
+  models_.faults.push_back(kStiction);
+  for (const TransitionKind kind :
+       {TransitionKind::kDetected, TransitionKind::kIsolated,
+        TransitionKind::kClosed}) {
+    const bool closed = kind == TransitionKind::kClosed;
+    FaultEvent event =
+        Event(kind, closed ? 60 : 10, 0b1000, 1.0,
+              closed ? EndReason::kSuperseded : EndReason::kNone, "L1");
+    event.transition.layer = Layer::kAudit;
+    event.transition.detection_stamp_ns = kDetected - kSecond;
+    event.episode_id = 77;
+    writer_.Record(event, kDetected);
+  }
+  RecordOpen("L1", 0b100);  // f19, which leaves the rod alone.
+  const Json rows = Rows();
+  ASSERT_EQ(rows.size(), 1u);
+  EXPECT_EQ(rows[0]["fault"], "f19");
+  EXPECT_EQ(rows[0]["witness"], "the audit of its loop says: the valve sticks");
+  EXPECT_THAT(rows[0]["why"].get<std::string>(),
+              HasSubstr("the audit of its loop says: the valve sticks"));
+  EXPECT_EQ(rows[0]["certainty"], "one of");
 }
 
 TEST_F(WorkListTest, ATrendIsARowOfItsOwn) {

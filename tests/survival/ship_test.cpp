@@ -146,10 +146,13 @@ TEST_F(ShipTest, WhatChangesIsShippedAgain) {
   look.period_ns = kSecond;
   look.faults = {{1, 0.5, 0.4, 0.6, kDetected, false},
                  {7, 0.2, 0.1, 0.3, kDetected, true}};
+  look.rival = LookRival{3, 12.5};
+  look.observers = {1, 7};
   look.x_pct = {1.0, 2.0};
   look.flow = {3.0, 4.0};
   writer.StoreLook(look);
   follow("a second look");
+  look.rival.reset();
   look.faults.pop_back();
   look.x_pct = {5.0};
   look.flow = {6.0};
@@ -426,7 +429,7 @@ TEST_F(ShipTest, RefusalsHaveAReasonAndCode3) {
   EXPECT_EQ(Store("history list --db '" + Url("screen") + "'").code, 0);
   owner.Run("UPDATE fdi.plant SET version = version + 1");
   refused(Ship("a"),
-          "schema fdi has version 10, this program needs 9: update "
+          "schema fdi has version 11, this program needs 10: update "
           "this program");
   refused(Store("ship --data " + Folder("a").string() +
                 " --db 'postgresql://x:secret@/plant?host=/nowhere'"),

@@ -46,12 +46,12 @@ export const moreText = ({look_alikes: others, second}, title = faultTitle) =>
   (!second ? '' : `, and ${second === 'unknown' ?
     'a second fault without a name' : title(second)}`);
 
-/** The same as an element that tells experts the number behind it. */
+/** The same as an element that tells what is behind it. */
 export function certaintyNode(row, name = 'tag') {
   const text = certaintyText(row);
   const factor = row.factor ?? row.peak_factor;
   return text === '' ? null : h('span', {class: name,
-    title: factor === null ? null : factorTitle(factor)}, text);
+    title: row.witness || (factor === null ? null : factorTitle(factor))}, text);
 }
 
 export const factorTitle = (d) => `decision factor ${factorText(d)}`;

@@ -52,14 +52,15 @@ TEST_F(FdiStoreHistoryTest, ListedEpisodesHaveTheColumnsOfTheView) {
 
   ASSERT_EQ(listed["episodes"].size(), 1U);
   const json& episode = listed["episodes"][0];
-  EXPECT_THAT(KeysOf(episode),
-              testing::UnorderedElementsAre(
-                  "episode_id", "valve_id", "detected_utc", "isolated_utc",
-                  "cleared_utc", "ended_utc", "fault", "peak_factor",
-                  "model_set", "end_reason", "label", "acked_by", "strength",
-                  "worst_strength", "severity", "priority", "unconfirmed_utc",
-                  "certainty", "look_alikes", "fault_name", "acked_utc",
-                  "ack_comment", "alarm_state", "shelved_until_utc", "second"));
+  EXPECT_THAT(
+      KeysOf(episode),
+      testing::UnorderedElementsAre(
+          "episode_id", "valve_id", "detected_utc", "isolated_utc",
+          "cleared_utc", "ended_utc", "fault", "peak_factor", "model_set",
+          "end_reason", "label", "acked_by", "strength", "worst_strength",
+          "severity", "priority", "unconfirmed_utc", "certainty", "look_alikes",
+          "fault_name", "acked_utc", "ack_comment", "alarm_state",
+          "shelved_until_utc", "second", "witness"));
   EXPECT_EQ(episode["fault_name"], "Flashing or critical flow");
   EXPECT_EQ(episode["fault"], "f7");
   EXPECT_EQ(episode["detected_utc"], "2026-11-20T14:56:11.000Z");
@@ -476,7 +477,7 @@ TEST_F(FdiStoreHistoryTest, DoctorFindsASoundDirectorySound) {
   EXPECT_EQ(report["sound"], true);
   ASSERT_EQ(report["databases"].size(), 3U);
   EXPECT_EQ(report["databases"][0]["present"], false);
-  EXPECT_EQ(report["databases"][2]["version"], 18);
+  EXPECT_EQ(report["databases"][2]["version"], 19);
   EXPECT_EQ(report["databases"][2]["figures"]["open_episodes"], 1);
   EXPECT_EQ(report["databases"][2]["figures"]["unsent_events"], 2);
 }

@@ -34,7 +34,7 @@ function facts({episode: row, model_hash: hash}) {
     ['Valve', valveLink(row.valve)],
     ['Fault', h('span', {class: 'with-sign'},
         prioritySign(priorityOf(row), members(row.fault).length > 0),
-        [rowTitle(row) + moreText(row), layerText(row.layer)]
+        [rowTitle(row) + moreText(row), row.witness]
             .filter(Boolean).join(', '))],
     ['Priority', priorityNames[priorityOf(row)]],
     ['State', [`${stateWord(row.state)}; ${groupName(row).toLowerCase()}`,
