@@ -1,6 +1,7 @@
 // Routes that read the history: alarms, episodes with their evidence,
 // statistics, shelves.
 #include <algorithm>
+#include <filesystem>
 #include <iterator>
 #include <limits>
 #include <sstream>
@@ -12,6 +13,7 @@
 #include "base/time_units.h"
 #include "console/api.h"
 #include "diagnosis/model/fault_catalogue.h"
+#include "diagnosis/records/valve_glob.h"
 #include "import/csv.h"
 #include "report/plot/episode_figure.h"
 #include "report/plot/episode_text.h"
@@ -21,6 +23,7 @@
 #include "storage/history/foreign_history.h"
 #include "storage/history/history_reader.h"
 #include "storage/history/strength.h"
+#include "storage/models/models.h"
 
 namespace fdi::console {
 namespace {
@@ -210,6 +213,25 @@ Json MarksOf(const std::vector<storage::HistoryEntry>& events) {
   return marks;
 }
 
+// What was done to the valve while it was recorded.
+void AddRepairs(const Api& api, const storage::Episode& episode,
+                const std::vector<TracePoint>& points, Json& marks) {
+  if (points.empty() || api.sources.plant_history ||
+      !std::filesystem::exists(api.sources.models)) {
+    return;
+  }
+  for (const auto& [valves, event] :
+       storage::ModelStore(api.sources.models).Repairs()) {
+    if (GlobMatches(valves, episode.valve_id) &&
+        event.at_ns >= points.front().sample.stamp_ns &&
+        event.at_ns <= points.back().sample.stamp_ns) {
+      marks.push_back({{"t_ms", Ms(event.at_ns)},
+                       {"kind", storage::ValveEventKindName(event.kind)},
+                       {"text", event.order}});
+    }
+  }
+}
+
 Json GapsOf(storage::History& history, const storage::Episode& episode,
             const std::vector<TracePoint>& points) {
   Json gaps = Json::array();
@@ -313,6 +335,7 @@ Json Episode(const Api& api, const httplib::Request& request) {
   Json trace = TrendJson(models.get(), episode.valve_id, points);
   trace["gaps"] = GapsOf(*reader, episode, points);
   trace["marks"] = MarksOf(events);
+  AddRepairs(api, episode, points, trace["marks"]);
   trace["words"] =
       api.Words(models.get(), MostInformativePoint(episode, points));
   Json list = Json::array();

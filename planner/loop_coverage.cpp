@@ -168,7 +168,9 @@ std::vector<Repair> RepairsOf(const std::filesystem::path& models) {
   if (std::filesystem::exists(models)) {
     for (const auto& [valves, event] : storage::ModelStore(models).Repairs()) {
       repairs.push_back({valves, event.at_ns, event.who,
-                         std::string(ValveEventKindName(event.kind))});
+                         std::string(ValveEventKindName(event.kind)),
+                         event.kind == storage::ValveEventKind::kOrdered,
+                         event.order, event.expected_ns});
     }
   }
   return repairs;

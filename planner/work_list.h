@@ -26,12 +26,15 @@ struct PlannedLoop {
   std::string finding{};       ///< Why its record could not be used, if known.
 };
 
-/// Something was done about a finding.
+/// Something was done about a finding, or was ordered.
 struct Repair {
   std::string valves{};  ///< Id or glob.
   std::int64_t at_ns{0};
   std::string who{};
-  std::string what{};  ///< "recalibrated", "labelled f19"
+  std::string what{};   ///< "recalibrated", "labelled f19"
+  bool ordered{false};  ///< In work: not done yet.
+  std::string order{};  ///< Its number.
+  std::optional<std::int64_t> expected_ns{};  ///< When the valve is to be back.
 };
 
 /// The question that a list answers. The history has episodes, shelves, health

@@ -182,6 +182,7 @@ class RowReader {
   void AddHealth(const std::string& valve, const std::vector<HealthHour>& hours,
                  std::map<std::string, ValveLife>& lives);
   void AddAudits();
+  void AddOrders();
   std::vector<WorkRow> Ranked() &&;
   std::vector<DoneFinding> TakeDone() { return std::move(done_); }
 
@@ -216,7 +217,7 @@ void RowReader::FindDone(SameFault& same, storage::History& history) const {
   for (const Repair& repair : query_.repairs) {
     // One that was noted for later is not done yet; one before the first of
     // these was about something else.
-    if (repair.at_ns <= query_.now_ns &&
+    if (!repair.ordered && repair.at_ns <= query_.now_ns &&
         repair.at_ns >= same.episodes.front()->detected_ns &&
         GlobMatches(repair.valves, same.episodes.front()->valve_id)) {
       add(repair);
@@ -518,6 +519,39 @@ void RowReader::AddAudits() {
   }
 }
 
+// "in work since 3 days, order 4711, expected back in 2 days"
+std::string OrderText(const Repair& order, std::int64_t now_ns) {
+  std::string text = "in work since " + SpanText(now_ns - order.at_ns);
+  if (!order.order.empty()) {
+    text += ", order " + order.order;
+  }
+  if (order.expected_ns) {
+    text += *order.expected_ns < now_ns
+                ? ", was expected back " +
+                      SpanText(now_ns - *order.expected_ns) + " ago"
+                : ", expected back in " + SpanText(*order.expected_ns - now_ns);
+  }
+  return text;
+}
+
+// An order is for whatever its valve has, and ends with what is noted as done.
+void RowReader::AddOrders() {
+  for (WorkRow& row : rows_) {
+    std::optional<Repair> newest;
+    for (const Repair& repair : query_.repairs) {
+      if (repair.at_ns <= query_.now_ns &&
+          (!newest || repair.at_ns >= newest->at_ns) &&
+          GlobMatches(repair.valves, row.finding.valve_id)) {
+        newest = repair;
+      }
+    }
+    if (newest && newest->ordered) {
+      row.why += "; " + OrderText(*newest, query_.now_ns);
+      row.in_work = std::move(newest);
+    }
+  }
+}
+
 std::vector<WorkRow> RowReader::Ranked() && {
   if (!query_.discipline.empty()) {
     std::erase_if(rows_, [this](const WorkRow& row) {
@@ -563,6 +597,7 @@ std::vector<WorkRow> ReadRows(storage::History* history,
     }
   }
   rows.AddAudits();
+  rows.AddOrders();
   done = rows.TakeDone();
   return std::move(rows).Ranked();
 }

@@ -22,6 +22,8 @@ struct WorkRow {
   std::string shares{};  ///< "cause: air west", "period: 42 s"
   /// It was done then, and has come back or stands still.
   std::optional<std::int64_t> done_ns{};
+  /// What was ordered for its valve, with nothing done since.
+  std::optional<Repair> in_work{};
 };
 
 /// A finding that is done, and has not come back.

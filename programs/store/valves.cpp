@@ -90,7 +90,9 @@ Json ValveEventJson(const ValveEvent& event) {
           {"kind", ValveEventKindName(event.kind)},
           {"at_utc", TimeJson(event.at_ns)},
           {"who", event.who},
-          {"note", event.note}};
+          {"note", event.note},
+          {"order", event.order.empty() ? Json() : Json(event.order)},
+          {"expected_utc", TimeJson(event.expected_ns)}};
 }
 
 Json BaselineJson(const BaselineRecord& record) {
@@ -405,8 +407,22 @@ struct RepairedOptions {
   std::string pattern;
   std::string kind;
   std::string at;
+  std::string order;
+  std::string expected;
   NoteOptions note;
 };
+
+// "FV-101: in work, order 4711, expected back 2026-12-03T06:00:00Z; it stays on
+// the work list until it is noted as repaired"
+std::string OrderedText(const RepairedOptions& options, const ValveEvent& event,
+                        const Context& context) {
+  return options.pattern + ": in work" +
+         (event.order.empty() ? "" : ", order " + event.order) +
+         (event.expected_ns
+              ? ", expected back " + TimeText(event.expected_ns, context)
+              : "") +
+         "; it stays on the work list until it is noted what was done";
+}
 
 // A replaced valve is a different one to models of its own. One that was
 // repacked or recalibrated is again what they were made for.
@@ -416,6 +432,15 @@ Report Repaired(const RepairedOptions& options, const Context& context) {
   event.note = options.note.comment;
   event.at_ns = options.at.empty() ? NowNs() : ParseTime(options.at, true);
   event.who = options.note.who;
+  event.order = options.order;
+  if (!options.expected.empty()) {
+    event.expected_ns = ParseTime(options.expected, context.options.utc);
+  }
+  const bool ordered = event.kind == ValveEventKind::kOrdered;
+  if (!ordered && (!event.order.empty() || event.expected_ns)) {
+    throw ConfigError("--order and --expected are of `ordered`, not of " +
+                      options.kind);
+  }
   const auto entry =
       WritableModels(context).AddValveEvent(options.pattern, event);
   event.epoch = entry ? entry->epoch : 0;
@@ -423,8 +448,10 @@ Report Repaired(const RepairedOptions& options, const Context& context) {
   report.document = {{"valve", options.pattern},
                      {"event", ValveEventJson(event)},
                      {"entry", entry ? EntryJson(*entry) : Json()}};
-  report.Line(options.pattern + ": " + options.kind +
-              " is noted; what comes back after it is told as that");
+  report.Line(ordered ? OrderedText(options, event, context)
+                      : options.pattern + ": " + options.kind +
+                            " is noted; what comes back after it is told as "
+                            "that");
   if (entry && event.kind == ValveEventKind::kReplaced) {
     report.Line("epoch " + std::to_string(entry->epoch) +
                 " begins: no fault is named until the valve is onboarded "
@@ -565,13 +592,20 @@ void AddRepaired(report::Program& program, CLI::App& group) {
   auto [verb, options] = AddVerb(
       program, group, "repaired",
       "Note what was done to a valve: its findings leave the work list until "
-      "they come back. A replaced valve has to be onboarded again",
+      "they come back. A replaced valve has to be onboarded again. `ordered` "
+      "notes that it is in work",
       Repaired);
   verb.add_option("valve", options.pattern, "Id or glob")->required();
-  verb.add_option("what", options.kind, "replaced, repacked, recalibrated")
+  verb.add_option("what", options.kind,
+                  "replaced, repacked, recalibrated; ordered")
       ->required();
   verb.add_option("--at", options.at, "When, RFC 3339 in UTC (default: now)")
       ->type_name("UTC");
+  verb.add_option("--order", options.order, "Of `ordered`: number of the order")
+      ->type_name("NUMBER");
+  verb.add_option("--expected", options.expected,
+                  "Of `ordered`: when the valve is to be back, 2026-12-03")
+      ->type_name("TIME");
   options.note.AddTo(verb);
 }
 

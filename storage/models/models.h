@@ -117,7 +117,8 @@ struct BaselineRecord {
 enum class ValveEventKind : std::uint8_t {
   kReplaced,
   kRepacked,
-  kRecalibrated
+  kRecalibrated,
+  kOrdered  ///< In work: nothing is done yet.
 };
 std::string_view ValveEventKindName(ValveEventKind kind);  ///< "replaced", ...
 /// @throws ConfigError naming the accepted names.
@@ -130,6 +131,9 @@ struct ValveEvent {
   std::string note{};
   std::int64_t at_ns{0};  ///< UTC.
   std::string who{};
+  /// Of kOrdered: the number of the order, and when the valve is to be back.
+  std::string order{};
+  std::optional<std::int64_t> expected_ns{};
 };
 
 /// The effects of faults on a type of valve, independent of any valve's
@@ -233,7 +237,8 @@ class ModelStore {
   /// Ordered by epoch, then time.
   std::vector<BaselineRecord> Baselines(std::string_view pattern);
 
-  /// Notes maintenance of a valve, with or without an entry. A replacement
+  /// Notes maintenance of a valve, with or without an entry. What is ordered
+  /// changes nothing until something else is noted. A replacement
   /// opens the next epoch of an entry, which makes its baseline provisional;
   /// after the others the valve is again what its models were made for.
   /// @returns the entry after the change, if there is one.

@@ -83,13 +83,16 @@ SELECT value ->> 'name', CAST(value ->> 'rmse' AS REAL),
   CAST(value ->> 'bias' AS REAL), CAST(value ->> 'vaf' AS REAL)
 FROM json_each(?)
 -- name: insert_valve_event
-INSERT INTO valve_event (valve, epoch, kind, note, at_ns, who)
-VALUES (?, ?, ?, ?, ?, ?)
+INSERT INTO valve_event (valve, epoch, kind, note, at_ns, who, order_number,
+  expected_ns)
+VALUES (?, ?, ?, ?, ?, ?, ?, ?)
 -- name: valve_events
-SELECT epoch, kind, note, at_ns, who FROM valve_event WHERE valve = ?
+SELECT epoch, kind, note, at_ns, who, order_number, expected_ns
+FROM valve_event WHERE valve = ?
 ORDER BY epoch, valve_event_id
 -- name: all_valve_events
-SELECT valve, epoch, kind, note, at_ns, who FROM valve_event
+SELECT valve, epoch, kind, note, at_ns, who, order_number, expected_ns
+FROM valve_event
 ORDER BY at_ns, valve_event_id
 -- name: put_valve_type
 INSERT INTO valve_type (name, created_ns, bytes, summary) VALUES (?, ?, ?, ?)

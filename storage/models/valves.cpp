@@ -17,7 +17,7 @@ namespace fdi::storage {
 template <>
 struct EnumText<ValveEventKind> {
   static constexpr auto name = ValveEventKindName;
-  static constexpr auto last = ValveEventKind::kRecalibrated;
+  static constexpr auto last = ValveEventKind::kOrdered;
 };
 
 namespace sql = models_sql;
@@ -56,8 +56,8 @@ std::optional<int> VersionOf(const std::optional<ModelReference>& set) {
 
 constexpr std::array<std::string_view, 3> kStateNames = {"none", "provisional",
                                                          "valid"};
-constexpr std::array<std::string_view, 3> kKindNames = {"replaced", "repacked",
-                                                        "recalibrated"};
+constexpr std::array<std::string_view, 4> kKindNames = {
+    "replaced", "repacked", "recalibrated", "ordered"};
 
 // The figures of a baseline are JSON in two columns, so that SQL can read them
 // (queries.sql, json_numbers). storage/ has no library for JSON, and these few
@@ -109,7 +109,8 @@ void InsertBaseline(Database& database, std::string_view pattern,
 void InsertEvent(Database& database, std::string_view pattern,
                  const ValveEvent& event) {
   database.Run(sql::insert_valve_event, pattern, event.epoch, event.kind,
-               event.note, event.at_ns, event.who);
+               event.note, event.at_ns, event.who, event.order,
+               event.expected_ns);
 }
 
 double NumberOf(const Statement& row, int column) {
@@ -367,7 +368,8 @@ ValveEventKind ParseValveEventKind(std::string_view name) {
     }
   }
   throw ConfigError("unknown kind of event '" + std::string(name) +
-                    "': expected replaced, repacked or recalibrated");
+                    "': expected ordered, replaced, repacked or "
+                    "recalibrated");
 }
 
 void ModelStore::SetBaseline(std::string_view pattern,
@@ -439,7 +441,7 @@ std::vector<std::pair<std::string, ValveEvent>> ModelStore::Repairs() {
   while (rows.Step()) {
     auto& [valves, event] = repairs.emplace_back();
     rows.Read(0, valves, event.epoch, event.kind, event.note, event.at_ns,
-              event.who);
+              event.who, event.order, event.expected_ns);
   }
   return repairs;
 }
@@ -450,7 +452,8 @@ std::vector<ValveEvent> ModelStore::ValveEvents(std::string_view pattern) {
   rows.Bind(pattern);
   while (rows.Step()) {
     ValveEvent& event = events.emplace_back();
-    rows.Read(0, event.epoch, event.kind, event.note, event.at_ns, event.who);
+    rows.Read(0, event.epoch, event.kind, event.note, event.at_ns, event.who,
+              event.order, event.expected_ns);
   }
   return events;
 }

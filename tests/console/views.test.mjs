@@ -663,16 +663,21 @@ const kWork = {rank: 1, valve_id: kLongId, kind: 'episode', fault: 'f6',
   why: 'Plug worn: stands for 3 days, and it grows by 2 % a day',
   check: 'Look at it, and at what stands beside it; then compare it with ' +
     'another one of its kind.', discipline: 'mechanical|instrument',
-  acked_by: 'anna', label: null, episode_id: '0000000000000001'};
+  acked_by: 'anna', label: null, episode_id: '0000000000000001',
+  in_work_utc: null, order: null, expected_utc: null};
 
 const kList = {
   as_of_utc: '2026-11-25T12:00:00Z', since_utc: '2026-08-27T12:00:00Z',
   coverage: {loops: 3, named_faults: 1, audit: 1, nothing: 1},
-  rows: [kWork, {...kWork, rank: 2, valve_id: 'W', open: false}],
+  rows: [kWork, {...kWork, rank: 2, valve_id: 'W', open: false,
+    in_work_utc: '2026-11-24T12:00:00Z', order: '4711',
+    expected_utc: '2026-11-26T12:00:00Z'}],
   shared: [{shares: 'cause', group: 'air header', faults: ['f6'],
     since_utc: '2026-11-25T11:00:00Z', ended_utc: null,
     valve_ids: ['V', 'W']}],
   unjudged: [{valve_id: 'X', judged_share: 0.25, reason: 'no data came'}],
+  done: [{valve_id: 'Y', fault: 'f19', name: 'Flow transmitter wrong',
+    done_utc: '2026-11-24T12:00:00Z', who: 'bo', what: 'recalibrated'}],
   shelved: []};
 
 test('the work list has the order of its document, factors, and what nobody ' +
@@ -685,7 +690,9 @@ test('the work list has the order of its document, factors, and what nobody ' +
   const text = await page.locator('main').innerText();
   for (const part of ['As of ', '2 of 3 loops are watched', 'high · 4',
     '1 · 2.0', 'likely · 0.75', '6.00', 'shares cause: air header',
-    'no data came', '25.0 %', 'mechanical or instrument', 'ended']) {
+    'no data came', '25.0 %', 'mechanical or instrument', 'ended',
+    'stands; acknowledged', 'in work, order 4711, expected back 2026-11-26',
+    'Done, and watched for their return', 'recalibrated']) {
     assert.ok(text.includes(part), part);
   }
   assert.deepEqual(await page.getByRole('table', {name: 'Work list'})

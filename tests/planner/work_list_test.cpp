@@ -255,6 +255,38 @@ TEST_F(WorkListTest, ARepairIsDoneUntilTheFaultComesBack) {
   EXPECT_TRUE(list["done"].empty());
 }
 
+TEST_F(WorkListTest, WhatIsInWorkStaysWithItsOrderUntilItIsDone) {
+  RecordOpen("V1", 0b100);
+  AddHealth("V1", 60);
+  query_.since_ns = kDetected - 90 * kDay;
+  Repair order{"V1", kDetected + 3600 * kSecond, "bo", "ordered"};
+  order.ordered = true;
+  order.order = "4711";
+  order.expected_ns = kDetected + 3 * kDay;
+  query_.repairs = {order};
+  Json rows = Rows();
+  ASSERT_EQ(rows.size(), 3u);  // Its fault, a trend and a drift.
+  for (const Json& row : rows) {
+    EXPECT_EQ(row["order"], "4711");
+    EXPECT_EQ(row["in_work_utc"], "2026-11-20T15:56:11Z");
+    EXPECT_EQ(row["expected_utc"], "2026-11-23T14:56:11Z");
+    EXPECT_EQ(row["done_utc"], nullptr);
+    EXPECT_THAT(
+        row["why"].get<std::string>(),
+        HasSubstr("; in work since 23 h, order 4711, expected back in 2 days"));
+  }
+  query_.now_ns = kDetected + 5 * kDay;
+  EXPECT_THAT(Rows()[0]["why"].get<std::string>(),
+              HasSubstr("was expected back 2 days ago"));
+  query_.repairs.push_back({"V*", kDetected + 4 * kDay, "bo", "recalibrated"});
+  rows = Rows();
+  ASSERT_EQ(rows.size(), 3u);
+  for (const Json& row : rows) {
+    EXPECT_EQ(row["order"], nullptr);
+    EXPECT_EQ(row["done_utc"].is_string(), row["kind"] == "episode");
+  }
+}
+
 // A repair before the first episode was about something else.
 TEST_F(WorkListTest, AnAlarmWhoseDataEndedIsDoneByARepairAfterThat) {
   RecordOpen("V4", 4);

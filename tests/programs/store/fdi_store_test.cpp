@@ -411,6 +411,12 @@ TEST_F(FdiStoreTest, ValvesAreDescribedAndTheirEpochCounts) {
   EXPECT_EQ(Store("valves repaired 'LV-*' painted").code, 2);
   // The work restores the valve of which the models were made: names stay.
   EXPECT_EQ(Store("valves repaired 'LV-*' repacked").code, 0);
+  EXPECT_THAT(Store("--utc valves repaired 'LV-*' ordered --order 4711 "
+                    "--expected 2026-12-03T06:00:00Z")
+                  .out,
+              HasSubstr("in work, order 4711, expected back 2026-12-03"));
+  EXPECT_THAT(Store("valves repaired 'LV-*' repacked --order 4711").err,
+              HasSubstr("are of `ordered`"));
   // A valve of the default set has no entry.
   EXPECT_THAT(Store("valves repaired OTHER recalibrated").out,
               HasSubstr("OTHER: recalibrated is noted"));
@@ -423,7 +429,7 @@ TEST_F(FdiStoreTest, ValvesAreDescribedAndTheirEpochCounts) {
   EXPECT_EQ(valve["epoch"], 1);
   EXPECT_EQ(valve["baseline"], "provisional");
   EXPECT_TRUE(valve["diagnosed_with"].is_null());
-  ASSERT_EQ(valve["events"].size(), 2U);
+  ASSERT_EQ(valve["events"].size(), 3U);
   EXPECT_EQ(valve["events"][1]["kind"], "repacked");
   EXPECT_EQ(valve["events"][1]["epoch"], 1);
   EXPECT_EQ(valve["events"][0]["kind"], "replaced");

@@ -20,8 +20,13 @@ function findingCell({name, fault, episode_id: id}) {
   return id ? h('a', {href: link('episode', id)}, text) : text;
 }
 
-const stateText = ({open, unconfirmed_utc: since}) => !open ? 'ended' :
-  since ? `not confirmed since ${utcText(since)}` : 'stands';
+const workText = ({in_work_utc: since, order, expected_utc: back}) => !since ?
+  null : ['in work', order && `order ${order}`,
+    back && `expected back ${utcText(back)}`].filter(Boolean).join(', ');
+
+const stateText = (row) => [!row.open ? 'ended' : row.unconfirmed_utc ?
+  `not confirmed since ${utcText(row.unconfirmed_utc)}` : 'stands',
+row.acked_by && 'acknowledged', workText(row)].filter(Boolean).join('; ');
 
 const kRows = [
   {text: 'Rank', class: 'num', cell: (row) => String(row.rank)},
@@ -58,6 +63,14 @@ const kUnjudged = [
   {text: 'Judged', class: 'num', cell: (row) =>
     `${number(100 * row.judged_share, 1)} %`},
   {text: 'Mostly because', class: 'remark', cell: (row) => row.reason},
+];
+
+const kDone = [
+  {text: 'Valve', header: true, cell: (row) => valveLink(row.valve_id)},
+  {text: 'Finding', cell: (row) => row.name},
+  {text: 'Done', cell: (row) => utcCell(row.done_utc)},
+  {text: 'By', cell: (row) => row.who ?? '–'},
+  {text: 'What', class: 'remark', cell: (row) => row.what},
 ];
 
 const kShelved = [
@@ -110,6 +123,7 @@ class Worklist extends View {
               {layout: 'cards'}),
         part('Loops that share a cause', kShared, list.shared),
         part('What could not be judged, and why', kUnjudged, list.unjudged),
+        part('Done, and watched for their return', kDone, list.done),
         part('Shelved, and therefore not in the list', kShelved,
             list.shelved));
   }
