@@ -95,7 +95,11 @@ void ReadOption(std::string_view text, std::string_view option,
 FaultSchedule ParseFaultSchedule(std::string_view text) {
   FaultSchedule schedule;
   std::string_view rest = text;
-  schedule.fault = RequireFault(CutAt(rest, ':'));
+  const std::string_view name = CutAt(rest, ':');
+  if (name.find('@') != std::string_view::npos) {
+    Refuse(text, "the profile is missing before '@'");
+  }
+  schedule.fault = RequireFault(name);
   if (rest.empty()) {
     Refuse(text, "the profile is missing");
   }

@@ -13,6 +13,7 @@
 #include "programs/simulator/delivery.h"
 #include "programs/simulator/verbs.h"
 #include "report/help.h"
+#include "report/text_table.h"
 #include "simulator/scenario/scenario_toml.h"
 
 namespace fdi::simulator {
@@ -36,6 +37,17 @@ struct RunOptions {
   std::filesystem::path export_file;
   DeliveryOptions delivery;
 };
+
+// A fault that never begins is a slip: the run would be called healthy.
+void RequireFaultsWithin(const ValveSimulationConfig& config) {
+  for (const FaultSchedule& fault : config.faults) {
+    if (fault.start_s >= config.duration_s) {
+      throw ConfigError("fault " + ToText(fault) +
+                        " begins after the end of the run (--duration " +
+                        report::FormatNumber(config.duration_s, 0) + ")");
+    }
+  }
+}
 
 // Applies the scenario file, then the options, then --set.
 Scenario BaseScenario(const RunOptions& options, double speed) {
@@ -64,6 +76,7 @@ Scenario BaseScenario(const RunOptions& options, double speed) {
   for (const std::string& setting : options.settings) {
     ApplySetting(setting, scenario);
   }
+  RequireFaultsWithin(config);
   if (config.start_ns == 0 || !options.delivery.start.empty()) {
     config.start_ns = StartOf(options.delivery, config.duration_s, speed);
   }

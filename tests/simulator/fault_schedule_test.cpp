@@ -73,6 +73,8 @@ TEST(FaultScheduleTest, TextReadsBackAsTheSameSchedule) {
 TEST(FaultScheduleTest, MessagesNameTheReasonAndTheAcceptedForm) {
   EXPECT_THAT(MessageFor("f99:abrupt@50"), HasSubstr("f1..f19"));
   EXPECT_THAT(MessageFor("f1"), HasSubstr("profile is missing"));
+  EXPECT_THAT(MessageFor("f19@100"),
+              HasSubstr("profile is missing before '@'"));
   EXPECT_THAT(MessageFor("f1:sudden@50"), HasSubstr("'sudden'"));
   EXPECT_THAT(MessageFor("f1:abrupt"), HasSubstr("start time"));
   EXPECT_THAT(MessageFor("f1:abrupt@x"), HasSubstr("'x' is not a number"));

@@ -141,6 +141,11 @@ TEST_F(AppRunTest, WhatItRefusesItNamesWithWhatIsAccepted) {
   const std::vector<Refusal> refusals = {
       {{"run", "--no-publish", "--fault", "f99:abrupt@3"}, 2, {"f1..f19"}},
       {{"run", "--no-publish", "--fault", "f1:sudden@3"}, 2, {"abrupt"}},
+      {{"run", "--no-publish", "--fault", "f19@100"}, 2, {"profile"}},
+      {{"run", "--no-publish", "--duration", "100", "--fault",
+        "f19:abrupt@100"},
+       2,
+       {"f19:abrupt@100", "after the end of the run"}},
       {{"run", "--no-publish", "--excitation", "x"}, 2, {"level-loop"}},
       {{"run", "--no-publish", "--excitation", "csv:" + text}, 3, {"P1_kPa"}},
       {{"run", "--no-publish", "--parameters", "x"}, 2, {"lublin-actuator-3"}},
