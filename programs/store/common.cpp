@@ -52,6 +52,14 @@ void PlantOptions::AddTo(CLI::App& verb) {
       ->type_name("NAME");
 }
 
+bool PlantOptions::asked() const {
+  if (url.empty() && !monitor.empty()) {
+    throw ConfigError("--monitor " + monitor +
+                      ": of the history of a plant, which --db names");
+  }
+  return !url.empty();
+}
+
 std::unique_ptr<History> OpenHistory(const PlantOptions& plant,
                                      const Context& context) {
   if (plant.asked()) {

@@ -95,7 +95,8 @@ struct PlantOptions {
   std::string url;
   std::string monitor;
 
-  bool asked() const { return !url.empty(); }
+  /// @throws ConfigError for a monitor without a plant.
+  bool asked() const;
   void AddTo(CLI::App& verb);
 };
 

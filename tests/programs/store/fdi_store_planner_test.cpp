@@ -94,6 +94,9 @@ TEST_F(FdiStorePlannerTest, WorkListOfAnEmptyHistoryIsEmpty) {
   EXPECT_TRUE(StoreJson("worklist")["rows"].empty());
   EXPECT_THAT(Store("worklist").out, HasSubstr("Nothing to do.\n"));
   EXPECT_EQ(Store("worklist --discipline plumber").code, 2);
+  const Outcome ignored = Store("worklist --monitor x");
+  EXPECT_EQ(ignored.code, 2);
+  EXPECT_THAT(ignored.err, HasSubstr("--db"));
   const Outcome report = Store("report --output .");
   EXPECT_EQ(report.code, 2);
   EXPECT_THAT(report.err, HasSubstr("report is gone: fdi-store worklist"));
