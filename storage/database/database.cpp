@@ -207,9 +207,14 @@ std::vector<std::string> SplitNames(std::string_view joined) {
   return names;
 }
 
+// Of a lack of room nobody has to know a number.
 SqliteError::SqliteError(int code, const std::string& message)
-    : std::runtime_error("SQLite error " + std::to_string(code) + ": " +
-                         message),
+    : std::runtime_error(
+          (code & 0xFF) == SQLITE_FULL
+              ? "the disk of the databases is full, or a limit on the size of "
+                "files is reached; make room (SQLite: " +
+                    message + ")"
+              : "SQLite error " + std::to_string(code) + ": " + message),
       code_(code) {}
 
 bool SqliteError::IsBusy() const {
