@@ -424,6 +424,13 @@ void Service::Diagnose() {
 }
 
 void Service::Serve(report::StopSignals& signals) {
+  if (assignment_->DefaultName() == "none" && assignment_->assigned() == 0) {
+    context_.log(
+        LogLevel::kWarning,
+        EventLine(
+            "no_model_set",
+            {{"judged", options_.pipeline.loop_audit ? "loops" : "nothing"}}));
+  }
   // Not written through the log: scripts wait for this line at every log level.
   const std::string ready =
       "monitor_ready model_set=" + assignment_->DefaultName() +

@@ -50,6 +50,19 @@ TEST_F(MonitorSystemTest, AFaultOnTheBusIsOnTheBusAndInTheHistory) {
   EXPECT_TRUE(history.Sessions().at(0).clean);
 }
 
+TEST_F(MonitorSystemTest, WithoutModelsItSaysWhatIsJudged) {
+  for (const auto& [option, judged] :
+       {std::pair<std::vector<std::string>, const char*>{{}, "loops"},
+        {{"--no-loop-audit"}, "nothing"}}) {
+    const auto monitor = StartMonitor(option);
+    EXPECT_THAT(
+        monitor->errors(),
+        testing::HasSubstr(std::string("no_model_set judged=") + judged));
+    monitor->Signal(SIGTERM);
+    EXPECT_EQ(monitor->AwaitExit(), 0);
+  }
+}
+
 TEST_F(MonitorSystemTest, KilledInAnEpisodeItGoesOnWithItAndNotesTheOutage) {
   StoreModels(directory_.path(), LinearModels());
   auto monitor = StartMonitor();
