@@ -500,14 +500,30 @@ test('what looks the same is named where there is room, and covers nothing',
       }
     });
 
-test('a monitor that is degraded says so on any screen', async () => {
+test('a sign that flashes shows its number in both phases', async () => {
+  monitor.reset([], [alarm('0000000000000001', 'V', 'f19')]);
+  const page = await openShared(browser, address, '#/alarms');
+  const sign = page.locator('tr.group-UNACK .sign').first();
+  await sign.waitFor();
+  const changes = await sign.evaluate((node) => node.getAnimations().flatMap(
+      (animation) => animation.effect.getKeyframes()).flatMap(Object.keys));
+  assert.ok(changes.includes('outlineColor'), 'it flashes');
+  assert.ok(!changes.includes('opacity'), 'it fades');
+  await close(page);
+});
+
+test('how the monitor is, and what time it has, is on any screen', async () => {
   monitor.reset();
-  monitor.answers.status.health = 'DEGRADED';
-  for (const width of [1400, 390]) {
-    const page = await openShared(browser, address, '#/',
-        {viewport: {width, height: 800}});
-    await page.getByText('Monitor degraded').waitFor();
-    await close(page);
+  for (const [health, text] of [['OK', 'Monitor OK'],
+    ['DEGRADED', 'Monitor degraded']]) {
+    monitor.answers.status.health = health;
+    for (const width of [1400, 390]) {
+      const page = await openShared(browser, address, '#/',
+          {viewport: {width, height: 800}});
+      await page.getByText(text).waitFor();
+      await page.locator('.tools .clock').waitFor();
+      await close(page);
+    }
   }
 });
 

@@ -53,10 +53,11 @@ function stateLine(tile) {
   ];
 }
 
-function judged({residual, low, high, away}) {
+function judged({residual, low, high, away, blind}) {
   if (away) return 'not judged now';
   if (residual === null || residual === undefined) return 'abstains';
-  return residual > high ? 'above' : residual < low ? 'below' : 'within';
+  return residual > high ? 'above' : residual < low ? 'below' :
+    blind ? 'within, but the limits are too wide to see a fault' : 'within';
 }
 
 const kServices = {F: 'flow', P: 'pressure', L: 'level', T: 'temperature',
@@ -121,14 +122,15 @@ function explanations({faults, T}, state, d0, d, partly) {
 /**
  * Residuals against their thresholds, and what explains them.
  * @param away Nobody judges the valve now: these are its last ones.
+ * @param blind Its limits are too wide to see a fault.
  */
-function nowTables(data, partly, away) {
+function nowTables(data, partly, away, blind) {
   const {channels, faults, windows} = data.meta;
   const last = (name) => data.columns[name].at(-1);
   // Behind a channel its windows that are beyond their limits: they raise the
   // alarms of slow and small faults.
   const residuals = channels.flatMap((channel, c) => [
-    {...channel, away, residual: last(`r${c}`)},
+    {...channel, away, blind, residual: last(`r${c}`)},
     ...(windows ?? []).filter((window) => window.channel === channel.name)
         .map(({samples, of, value, low, high}) => ({...channel,
           over: `, ${of} over ${samples} samples`, residual: value, low,
@@ -326,7 +328,8 @@ class ValvePage extends View {
     setText(this.#words, away || unitText(this.#data.words) +
       (partly && this.#data.words ? ', as far as it is judged' : ''));
     if (this.#data.size > 0) {
-      replace(this.#now, nowTables(this.#data, partly, away !== ''));
+      replace(this.#now, nowTables(this.#data, partly, away !== '',
+          tile?.blind));
     }
   }
 
