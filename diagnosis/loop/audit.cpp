@@ -38,6 +38,7 @@ constexpr double kHalf = 0.5;     // G of a play between OP and X.
 constexpr double kMoves = 1.0;    // Of OP, which calls for an answer [%].
 constexpr double kWindsUp = 5.0;  // The same, whatever the noise of it [%].
 constexpr double kOftenAtLimit = 0.05;
+constexpr double kOtherHalf = 50.0;  // Of the travel, from where OP is [%].
 // Samples further apart than the lag of a rod are alike by chance.
 constexpr double kFast_s = 2.0;
 constexpr std::size_t kOftenStands = 5;  // Of X: so often,
@@ -122,14 +123,39 @@ bool IsExchanged(const Window& window, double controller) {
   return FitController(other).r2 > controller;
 }
 
+bool IsAtLimit(double op) {
+  return op <= 0.5 || op >= 99.5;
+}
+
 // Of an OP that is no percentage, the ends are not known.
 double ShareAtLimit(std::span<const double> op) {
   if (!IsPercent(op)) {
     return 0.0;
   }
-  const auto at =
-      std::ranges::count_if(op, [](double u) { return u <= 0.5 || u >= 99.5; });
+  const auto at = std::ranges::count_if(op, IsAtLimit);
   return static_cast<double>(at) / static_cast<double>(op.size());
+}
+
+// Of an X that follows the other way round nothing is said: it is read in the
+// other sense.
+double DistanceAtLimit(const Window& window) {
+  if (window.x.empty() || !IsPercent(window.op)) {
+    return 0.0;
+  }
+  double distance = 0.0;
+  std::size_t samples = 0;
+  CorrelationSums others;
+  for (std::size_t k = 0; k < window.op.size(); ++k) {
+    if (IsAtLimit(window.op[k])) {
+      distance += std::abs(window.x[k] - window.op[k]);
+      ++samples;
+    } else {
+      others.Add(window.op[k], window.x[k]);
+    }
+  }
+  return samples == 0 || others.Correlation() < -kHalf
+             ? 0.0
+             : distance / static_cast<double>(samples);
 }
 
 // The longest run of equal readings in which OP moves by 1 % or more.
@@ -255,6 +281,11 @@ Finding JudgePosition(const Evidence& e) {
   if ((e.distinct_answer == 1 && e.op_range >= kMoves) ||
       (e.unrelated && e.op_range >= kWindsUp)) {
     return {Verdict::kNoResponse, true, "OP moves and the position stands"};
+  }
+  // Before the play, which holds as long as the rod followed.
+  if (e.at_limit > kOftenAtLimit && e.off_limit > kOtherHalf) {
+    return {Verdict::kNoResponse, true,
+            "OP is at an end of its range and the position in the other half"};
   }
   if (e.fit && e.fit->band >= kGoodBand && e.fit->explained() > kHalf) {
     return {Verdict::kStiction, true, "the position follows OP through a play"};
@@ -428,6 +459,7 @@ Evidence EvidenceOf(const Window& window) {
   }
   e.op_range = RangeOf(window.op);
   e.at_limit = ShareAtLimit(window.op);
+  e.off_limit = DistanceAtLimit(window);
   e.sp_moves = MovingShare(window.sp);
   e.longest_repeat = LongestRepeat(window);
   e.unanswered = window.sp.empty() ? 0.0 : UnansweredRun(window);

@@ -60,9 +60,10 @@ struct Evidence {
   int gain_sign{0};
   /// r² of dOP on de and e: that OP is the output of the controller of PV.
   double controller{0.0};
-  double op_range{0.0};  ///< Largest − smallest OP [%].
-  double at_limit{0.0};  ///< Share with OP within 0.5 % of 0 or 100 %.
-  double sp_moves{0.0};  ///< Share in which SP changes: a cascade above 0.5.
+  double op_range{0.0};   ///< Largest − smallest OP [%].
+  double at_limit{0.0};   ///< Share with OP within 0.5 % of 0 or 100 %.
+  double off_limit{0.0};  ///< Mean distance of X from OP in those samples [%].
+  double sp_moves{0.0};   ///< Share in which SP changes: a cascade above 0.5.
   std::size_t distinct_answer{0};  ///< Values of X, else of PV.
   std::size_t longest_repeat{0};   ///< Equal readings of PV while OP moves.
   double unanswered{0.0};  ///< Longest one-way run of OP without answer [%].

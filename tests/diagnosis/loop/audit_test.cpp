@@ -5,6 +5,7 @@
 #include <limits>
 #include <numbers>
 #include <random>
+#include <tuple>
 #include <utility>
 
 #include <gtest/gtest.h>
@@ -175,15 +176,28 @@ TEST(AuditTest, SeesAPositionThatStandsAgainAndAgain) {
   EXPECT_EQ(AuditWindow(held).evidence.standing.times, 0U);
 }
 
-// A blocked valve leaves its controller at the end of its range.
+// A blocked valve leaves its controller at the end of its range: the command
+// lacks an answer there, and not room.
 TEST(AuditTest, SeesThatOpStaysAtAnEndThoughThePositionFollowed) {
   ClosedLoop loop;
   Window window = Simulate(loop, 3);
   window.x = window.op;
   const auto late = static_cast<std::ptrdiff_t>(window.op.size() / 2);
-  std::fill(window.op.begin() + late, window.op.end(), 100.0);
-  std::fill(window.x.begin() + late, window.x.end(), window.x[0]);
-  EXPECT_EQ(AuditWindow(window).verdict, Verdict::kSaturated);
+  for (const auto& [end, x, verdict] :
+       {std::tuple{100.0, 90.0, Verdict::kSaturated},
+        {100.0, 0.0, Verdict::kNoResponse},
+        {0.0, 10.0, Verdict::kSaturated},
+        {0.0, 80.0, Verdict::kNoResponse}}) {
+    std::fill(window.op.begin() + late, window.op.end(), end);
+    std::fill(window.x.begin() + late, window.x.end(), x);
+    EXPECT_EQ(AuditWindow(window).verdict, verdict) << end << ' ' << x;
+  }
+  // One that is read in the other sense is where OP is.
+  std::fill(window.x.begin() + late, window.x.end(), 0.0);
+  for (double& position : window.x) {
+    position = 100.0 - position;
+  }
+  EXPECT_NE(AuditWindow(window).verdict, Verdict::kNoResponse);
 }
 
 Window Ramp() {
