@@ -96,4 +96,23 @@ ModelSet WithoutChannels(ModelSet models,
   return models;
 }
 
+ModelSet WithoutParts(ModelSet models, const std::vector<std::string>& parts) {
+  for (const std::string& part : parts) {
+    if (part == "looks") {
+      models.physics.clear();
+    } else if (part == "floor") {
+      models.faults.resize(models.faults.size() -
+                           static_cast<std::size_t>(FindingCount(models)));
+      models.floor.reset();
+    } else if (part == "windows") {
+      for (ChannelSpec& channel : models.channels) {
+        channel.windows.clear();
+      }
+    } else {
+      models.decision.early_error = 0.0;
+    }
+  }
+  return models;
+}
+
 }  // namespace fdi::trainer::study

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <string>
 #include <vector>
 
@@ -23,5 +24,16 @@ ModelSet WithoutFaults(ModelSet models, const std::vector<int>& faults);
 ///   that it has, or if none would be left.
 ModelSet WithoutChannels(ModelSet models,
                          const std::vector<std::string>& names);
+
+/// The parts that WithoutParts() can leave out.
+inline constexpr std::array<const char*, 4> kParts{"looks", "floor", "windows",
+                                                   "early"};
+
+/// The set without the named parts: `looks` by the fitted physics, the `floor`
+/// with its findings, the limits on `windows`, or the `early` test, which names
+/// a fault before t_k.
+///
+/// @param parts each one of kParts.
+ModelSet WithoutParts(ModelSet models, const std::vector<std::string>& parts);
 
 }  // namespace fdi::trainer::study

@@ -199,6 +199,7 @@ struct ReduceOptions {
   std::string name;
   std::vector<std::string> faults;
   std::vector<std::string> channels;
+  std::vector<std::string> parts;
 };
 
 report::Report Reduce(const ReduceOptions& options,
@@ -209,8 +210,10 @@ report::Report Reduce(const ReduceOptions& options,
   for (const std::string& name : options.faults) {
     faults.push_back(RequireFault(name));
   }
-  ModelSet models = WithoutChannels(
-      WithoutFaults(store.Load(options.model_set), faults), options.channels);
+  ModelSet models = WithoutParts(
+      WithoutChannels(WithoutFaults(store.Load(options.model_set), faults),
+                      options.channels),
+      options.parts);
   models.name = options.name;
   models = store.Save(models, storage::Activation::kAlways);
   report::Report report;
@@ -262,7 +265,7 @@ void AddReduceVerb(report::Program& program) {
   CLI::App& verb = program.AddVerb(
       "reduce",
       "Store a model set as if it had never been told of some faults, or did "
-      "not have some residual channels",
+      "not have some residual channels or parts",
       [options](const report::Context& context) {
         return Reduce(*options, context);
       });
@@ -279,6 +282,14 @@ void AddReduceVerb(report::Program& program) {
   verb.add_option("--without-channels", options->channels, "These channels")
       ->delimiter(',')
       ->type_name("CHANNEL,...");
+  verb.add_option(
+          "--without-parts", options->parts,
+          "Looks by the physics, floor, limits on windows, or the early "
+          "test of a name")
+      ->delimiter(',')
+      ->check(
+          CLI::IsMember(std::vector<std::string>(kParts.begin(), kParts.end())))
+      ->type_name("PART,...");
 }
 
 }  // namespace fdi::trainer::study

@@ -49,6 +49,26 @@ TEST(ModelReductionTest, LeftOutChannelTakesItsModelsAlong) {
   }
 }
 
+TEST(ModelReductionTest, LeftOutPartsActNoMore) {
+  ModelSet models = Set();
+  models.floor = FloorLimits{};
+  AddFindings(models);
+  ASSERT_GT(models.faults.size(), 3U);
+  models.physics = {{"parameters.trim.kv_m3_h", 118.0}};
+  models.decision.early_error = 1e-3;
+  for (ChannelSpec& channel : models.channels) {
+    channel.windows.resize(1);
+  }
+
+  EXPECT_TRUE(WithoutParts(models, {"looks"}).physics.empty());
+  EXPECT_EQ(WithoutParts(models, {"early"}).decision.early_error, 0.0);
+  EXPECT_TRUE(WithoutParts(models, {"windows"}).channels[1].windows.empty());
+  const ModelSet without_floor = WithoutParts(models, {"floor"});
+  EXPECT_FALSE(without_floor.floor.has_value());
+  EXPECT_THAT(without_floor.faults, ElementsAre(3, 6, 18));
+  EXPECT_FALSE(without_floor.physics.empty());
+}
+
 TEST(ModelReductionTest, WhatTheSetDoesNotHaveIsNamedWithWhatItHas) {
   try {
     WithoutFaults(Set(), {7});
