@@ -1,0 +1,271 @@
+#!/usr/bin/env bash
+# Scores all methods on all data and writes docs/results/table.md and table.csv:
+# what each layer of ours buys, and what well-known detectors find with limits
+# for the same rate of false alarms, from the same healthy hours. benchmark, loop
+# and the hours of their sets need FDI_REFERENCE_DATA. The trees and PCA (bench/baselines.py) take Debian's
+# python3-sklearn and python3-numpy; without them their rows are skipped by name.
+#
+# DIR keeps what is made, and a run that was stopped goes on there. It belongs to
+# one commit. One process at a time.
+#
+#     bench/table.sh [--quick] [-o FILE.md] build/release/bin DIR [DATA...]
+#
+# --quick: without ramps of a day and with a tenth of the healthy hours.
+# DATA: some of paper benchmark untrained loop own loop-hours own-hours
+# open-hours. METHODS="ours pca": these alone.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+days=10
+quick=""
+page=docs/results/table.md
+while [[ ${1:-} == -* ]]; do
+  case $1 in
+    --quick) quick=1 days=1 ;;
+    -o) page=$2; shift ;;
+    *) echo "table: no option $1" >&2; exit 2 ;;
+  esac
+  shift
+done
+bin=$(realpath "$1")
+mkdir -p "$2"
+dir=$(realpath "$2")
+all=(paper benchmark untrained loop own loop-hours own-hours open-hours)
+wanted=("${@:3}")
+[ ${#wanted[@]} -gt 0 ] || wanted=("${all[@]}")
+for name in "${wanted[@]}"; do
+  [[ " ${all[*]} " == *" $name "* ]] || {
+    echo "table: no data $name; there are ${all[*]}" >&2
+    exit 2
+  }
+  case $name in
+    benchmark | loop* | open-hours)
+      : "${FDI_REFERENCE_DATA:?names the folder with closed-loop/}"
+      ;;
+  esac
+done
+data=${FDI_REFERENCE_DATA:-}
+export FDI_DATA=$dir/data OMP_NUM_THREADS=1
+mkdir -p "$dir"/{runs,models,parts,verdicts}
+
+version="$("$bin/fdi-study" --version | head -n 1)${quick:+, quick}"
+[ -f "$dir/version" ] || echo "$version" >"$dir/version"
+[ "$(cat "$dir/version")" = "$version" ] || {
+  echo "table: $dir is of $(cat "$dir/version"): name another folder" >&2
+  exit 2
+}
+
+
+TIMEFORMAT="%U %S"
+
+# Runs a command once, and notes its CPU time. With exit code 77 there will be no
+# such thing; why is the last line of its output.
+once() {  # NAME COMMAND...
+  [ -f "$dir/$1" ] && return
+  local code=0
+  { time "${@:2}" >"$dir/out" 2>"$dir/log"; } 2>"$dir/time" || code=$?
+  [ $code -eq 0 ] || [ $code -eq 77 ] || {
+    cat "$dir/out" "$dir/log" >&2
+    echo "table: ${*:2}: exit code $code" >&2
+    exit 1
+  }
+  tail -n 1 "$dir/time" >"$dir/$1.cpu"
+  if [ $code -eq 77 ]; then
+    tail -n 1 "$dir/out" >"$dir/$1.skipped"
+    return
+  fi
+  rm -f "$dir/$1.skipped"
+  cp "$dir/out" "$dir/$1.tmp"
+  mv "$dir/$1.tmp" "$dir/$1"
+}
+
+quietly() { "$@" >"$dir/out" 2>"$dir/log" || { cat "$dir/log" >&2; exit 1; }; }
+
+simulate() {  # NAME SEED SECONDS OPTION...
+  [ -f "$dir/runs/$1.csv" ] && return
+  mkdir -p "$(dirname "$dir/runs/$1")"
+  quietly "$bin/fdi-simulator" run --no-publish --seed "$2" --duration "$3" \
+    -o "$dir/runs/$1.tmp" "${@:4}"
+  mv "$dir/runs/$1.tmp" "$dir/runs/$1.csv"
+}
+
+paper=(--parameters paper-operating-point --excitation operating-point
+  --set excitation.amplitude_pct=12 --set excitation.period_s=60)
+open=(--parameters lublin-actuator-3 --excitation sine
+  --set continuous_inputs=true --set cold_start=true)
+level=(--parameters lublin-actuator-3 --excitation level-loop)
+
+# The set of ours that a method takes, into `model`; none: it does not exist for
+# the data. What onboarding fits has no switch for its rules.
+make_variant() {  # METHOD
+  model=$set_name-$1
+  case $1 in
+    ours) model=$set_name ;;
+    linear)
+      [ -f "campaigns/$set_name.toml" ] || { model="" && return; }
+      awk '{ print } /^\[training\]/ { print one; done = 1 }
+        END { if (!done) print "[training]\n" one }' \
+        one=$'min_rules = 1\nmax_rules = 1\nsearch_rules = 1' \
+        "campaigns/$set_name.toml" >"$dir/$model.toml"
+      once "models/$model" "$bin/fdi-trainer" train \
+        --campaign "$dir/$model.toml" --name "$model"
+      ;;
+    *)
+      once "models/$model" "$bin/fdi-study" reduce "$set_name" --as "$model" \
+        --without-parts "${1/observers/looks,floor}"
+      ;;
+  esac
+}
+
+make_set() {  # SET
+  case $1 in
+    paper | benchmark)
+      once "models/$1" "$bin/fdi-trainer" train --campaign "campaigns/$1.toml"
+      ;;
+    loop)
+      once models/loop "$bin/fdi-trainer" onboard --valve loop --no-coverage \
+        --file "$data/closed-loop/healthy_onboard.csv"
+      ;;
+    own)
+      simulate own-healthy 11 7200 "${level[@]}"
+      once models/own "$bin/fdi-trainer" onboard --valve own --no-coverage \
+        --file "$dir/runs/own-healthy.csv"
+      ;;
+  esac
+}
+
+# What a set was trained on, into `training`.
+training_of() {  # SET
+  case $1 in
+    paper)
+      mkdir -p "$dir/runs/paper-training"
+      if [ ! -f "$dir/runs/paper-training/made" ]; then
+        for id in $("$bin/fdi-store" runs list --valve PAPER --json |
+          sed -n 's/.*"run_id": "\(.*\)".*/\1/p'); do
+          quietly "$bin/fdi-store" runs export "$id" \
+            -o "$dir/runs/paper-training/$id.csv"
+        done
+        touch "$dir/runs/paper-training/made"
+      fi
+      training=("$dir"/runs/paper-training/*.csv)
+      ;;
+    benchmark) training=("$data"/valve-reference/sine_*.csv) ;;
+    loop) training=("$data/closed-loop/healthy_onboard.csv") ;;
+    own) training=("$dir/runs/own-healthy.csv") ;;
+  esac
+}
+
+# The runs of each data set, into `files`; and the set that scores them.
+hours() {  # DATA SEED OPTION...
+  local n
+  for n in $(seq "$days"); do
+    simulate "$1/$n" $(($2 + n)) $((quick ? 28800 : 86400)) "${@:3}"
+  done
+  files=("$dir/runs/$1"/*.csv)
+}
+make_runs() {  # DATA
+  local seed fault strength
+  case $1 in
+    paper)
+      set_name=paper seed=90000
+      for fault in f1:abrupt@50:strength=.5 f3:abrupt@50:strength=.5 \
+        f6:abrupt@50:strength=.6 f7:abrupt@50:strength=.5 \
+        f19:abrupt@50:strength=.5 f1:incipient@500+1200:from=.26:strength=.6 \
+        f{3,6}:incipient@50+1650:strength=1 f7:incipient@50+210:strength=1 \
+        f19:incipient@50+850:strength=1; do
+        seed=$((seed + 1))
+        simulate "paper/$fault" $seed 2000 "${paper[@]}" --fault "$fault"
+      done
+      ;;
+    benchmark)
+      set_name=benchmark seed=7000
+      for fault in f{1,7,8,10,13,16,18}={.25,.5,.75} \
+        f{12,14,19}=-{.25,.5,.75} f{2,11,15,17}=.75; do
+        seed=$((seed + 1))
+        simulate "benchmark/$fault" $seed 1501 "${open[@]}" \
+          --fault "${fault%=*}:abrupt@900:strength=${fault#*=}"
+      done
+      for fault in f13+900 f{4,17}+3600 f{2,3,5,6,9,11,18}+86400; do
+        seed=$((seed + 1))
+        [ -z "$quick" ] || [ "${fault#*+}" -lt 86400 ] || continue
+        case ${fault#*+} in
+          900) seconds=2401 ;; 3600) seconds=5101 ;; *) seconds=85501 ;;
+        esac
+        simulate "benchmark/$fault" $seed $seconds "${open[@]}" \
+          --fault "${fault%+*}:incipient@900+${fault#*+}:strength=1"
+      done
+      ;;
+    untrained)
+      set_name=paper seed=95200
+      for fault in f{2,4,5,9,10,11,12,13,15,16,17,18}={.3,.6} \
+        f{12,13,17,19}=-{.3,.6} {t1,p1,p2}={.3,-.3,.6,-.6}; do
+        seed=$((seed + 1))
+        simulate "untrained/$fault" $seed 600 "${paper[@]}" \
+          --fault "${fault%=*}:abrupt@200:strength=${fault#*=}"
+      done
+      ;;
+    own)
+      set_name=own seed=97400
+      for fault in f{1,2,3,4,6,7,10,11,12,13,16,17,18,19}={.35,.7} \
+        f12=-{.35,.7}; do
+        seed=$((seed + 1))
+        simulate "own/$fault" $seed 2400 "${level[@]}" \
+          --fault "${fault%=*}:abrupt@1200:strength=${fault#*=}"
+      done
+      ;;
+    loop) set_name=loop files=("$data"/closed-loop/loop_*.csv); return ;;
+    loop-hours)
+      set_name=loop files=("$data"/closed-loop/healthy_4h_*.csv)
+      return
+      ;;
+    own-hours) set_name=own; hours own-hours 98000 "${level[@]}"; return ;;
+    open-hours) set_name=benchmark; hours open-hours 98500 "${open[@]}"; return ;;
+  esac
+  files=("$dir/runs/$1"/*.csv)
+}
+
+score() {  # DATA METHOD
+  local name=$set_name-$2 runs=() rate=1e-3 file
+  for file in "${files[@]}"; do runs+=(--file "$file"); done
+  [ "$set_name" != paper ] || rate=1e-4
+  case $2 in
+    ours | observers | early | floor | looks | windows | linear)
+      make_variant "$2"
+      [ -z "$model" ] ||
+        once "parts/$1/$2.csv" "$bin/fdi-study" evaluate --assume-normal --csv \
+          --model-set "$model" "${runs[@]}"
+      ;;
+    arx-cusum | signature-table)
+      once "parts/$1/$2.csv" "$bin/fdi-study" baseline "$2" --assume-normal \
+        --csv "${training[@]/#/--train-file=}" "${runs[@]}"
+      ;;
+    *)
+      once "models/$name" bench/baselines.py fit "$2" --per-hour $rate \
+        -o "$dir/models/$name.pickle" "${training[@]}"
+      if [ -f "$dir/models/$name.skipped" ]; then
+        cp "$dir/models/$name.skipped" "$dir/parts/$1/$2.csv.skipped"
+        return
+      fi
+      once "verdicts/$1-$2" bench/baselines.py score \
+        "$dir/models/$name.pickle" -o "$dir/verdicts/$1/$2" "${files[@]}"
+      once "parts/$1/$2.csv" "$bin/fdi-study" verdicts --assume-normal --csv \
+        "$(for file in "${files[@]}"; do
+          echo "$dir/verdicts/$1/$2/$(basename "$file")"
+        done | paste -sd,)" "${runs[@]}"
+      ;;
+  esac
+}
+
+read -ra methods <<<"${METHODS:-ours observers early floor looks windows linear \
+  position pca forest boosted arx-cusum signature-table}"
+for name in "${wanted[@]}"; do
+  mkdir -p "$dir/parts/$name"
+  make_runs "$name"
+  make_set "$set_name"
+  training_of "$set_name"
+  cat "${files[@]}" | wc -l >"$dir/parts/$name/rows"
+  for method in "${methods[@]}"; do
+    score "$name" "$method"
+    echo "$name $method"
+  done
+done
+bench/table.py "$dir" "$page"
