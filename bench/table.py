@@ -19,7 +19,7 @@ METHODS = {
     "ours": "ours",
     "observers": "observers only",
     "looks": "without looks",
-    "floor": "without the floor",
+    "floor": "without floor and drift",
     "windows": "without windows",
     "early": "without the early test",
     "linear": "one linear rule instead of fuzzy",
@@ -146,10 +146,6 @@ class Table:
 
     def read(self, data):
         folder = os.path.join(self.folder, "parts", data)
-        if not os.path.isdir(folder):
-            return
-        with open(os.path.join(folder, "rows"), encoding="ascii") as file:
-            self.hours[data] = int(file.read()) / 3600
         for method in METHODS:
             path = os.path.join(folder, method + ".csv")
             if os.path.exists(path):
@@ -159,6 +155,9 @@ class Table:
             elif os.path.exists(path + ".skipped"):
                 with open(path + ".skipped", encoding="utf-8") as file:
                     self.skipped[data, method] = file.read().strip()
+        if any(of == data for of, _ in self.answers):
+            with open(os.path.join(folder, "rows"), encoding="ascii") as file:
+                self.hours[data] = int(file.read()) / 3600
 
     def note(self, data, method, figure, value, low="", high=""):
         self.figures.append((data, method, figure, value, low, high))
@@ -166,8 +165,7 @@ class Table:
     def count(self, data, method, figure, count, total):
         low, high = wilson(count, total)
         self.note(data, method, figure, count, f"{low:.3f}", f"{high:.3f}")
-        return (f"{count} ({100 * low:.0f} to {100 * high:.0f} %)" if total
-                else "-")
+        return f"{count} ({100 * low:.0f} to {100 * high:.0f} %)"
 
     def seconds(self, data, method, figure, values):
         found = median([v for v in values if v >= 0])
@@ -240,7 +238,9 @@ class Table:
                 p = mcnemar(list(map(test, ours)), list(map(test, runs)))
                 self.note(data, method, key, f"{p:.4f}")
                 cells.append(f"{p:.2g}")
-            self.row(name, *cells)
+            same = method != "ours" and ours and (
+                list(map(vars, runs)) == list(map(vars, ours)))
+            self.row(name, *(["the same answers"] if same else cells))
 
     def false_alarms(self):
         hours = [d for d in DATA if d.endswith("-hours") and d in self.hours]
@@ -297,10 +297,10 @@ class Table:
             cells = []
             for word in WORDS:
                 said = [r for r in runs if r.certainty == word]
-                cells.append(f"{sum(map(Answer.holds, said))} of {len(said)}: "
-                             + self.count("all", method, word,
-                                          sum(map(Answer.holds, said)),
-                                          len(said)) if said else "-")
+                cells.append(self.count(
+                    "all", method, word, sum(map(Answer.holds, said)),
+                    len(said)).replace(" ", f" of {len(said)} ", 1)
+                    if said else "-")
             self.row(METHODS[method], *cells)
 
     def page(self, name):

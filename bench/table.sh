@@ -2,14 +2,16 @@
 # Scores all methods on all data and writes docs/results/table.md and table.csv:
 # what each layer of ours buys, and what well-known detectors find with limits
 # for the same rate of false alarms, from the same healthy hours. benchmark, loop
-# and the hours of their sets need FDI_REFERENCE_DATA. The trees and PCA (bench/baselines.py) take Debian's
-# python3-sklearn and python3-numpy; without them their rows are skipped by name.
+# and the hours of their sets need FDI_REFERENCE_DATA. What bench/baselines.py has
+# takes Debian's python3-sklearn and python3-numpy; a row whose package is missing
+# is skipped by name.
 #
 # DIR keeps what is made, and a run that was stopped goes on there. It belongs to
 # one commit. One process at a time.
 #
-#     bench/table.sh [--quick] [-o FILE.md] build/release/bin DIR [DATA...]
+#     bench/table.sh [--quick] [--seeds N] [-o FILE.md] build/release/bin DIR [DATA...]
 #
+# --seeds: added to those of all simulated runs but the training of campaigns.
 # --quick: without ramps of a day and with a tenth of the healthy hours.
 # DATA: some of paper benchmark untrained loop own loop-hours own-hours
 # open-hours. METHODS="ours pca": these alone.
@@ -17,10 +19,12 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 days=10
 quick=""
+seeds=0
 page=docs/results/table.md
 while [[ ${1:-} == -* ]]; do
   case $1 in
     --quick) quick=1 days=1 ;;
+    --seeds) seeds=$2; shift ;;
     -o) page=$2; shift ;;
     *) echo "table: no option $1" >&2; exit 2 ;;
   esac
@@ -47,7 +51,7 @@ data=${FDI_REFERENCE_DATA:-}
 export FDI_DATA=$dir/data OMP_NUM_THREADS=1
 mkdir -p "$dir"/{runs,models,parts,verdicts}
 
-version="$("$bin/fdi-study" --version | head -n 1)${quick:+, quick}"
+version="$("$bin/fdi-study" --version | head -n 1)${quick:+, quick}, seeds +$seeds"
 [ -f "$dir/version" ] || echo "$version" >"$dir/version"
 [ "$(cat "$dir/version")" = "$version" ] || {
   echo "table: $dir is of $(cat "$dir/version"): name another folder" >&2
@@ -83,8 +87,8 @@ quietly() { "$@" >"$dir/out" 2>"$dir/log" || { cat "$dir/log" >&2; exit 1; }; }
 simulate() {  # NAME SEED SECONDS OPTION...
   [ -f "$dir/runs/$1.csv" ] && return
   mkdir -p "$(dirname "$dir/runs/$1")"
-  quietly "$bin/fdi-simulator" run --no-publish --seed "$2" --duration "$3" \
-    -o "$dir/runs/$1.tmp" "${@:4}"
+  quietly "$bin/fdi-simulator" run --no-publish --seed $(($2 + seeds)) \
+    --duration "$3" -o "$dir/runs/$1.tmp" "${@:4}"
   mv "$dir/runs/$1.tmp" "$dir/runs/$1.csv"
 }
 

@@ -101,8 +101,7 @@ ModelSet WithoutParts(ModelSet models, const std::vector<std::string>& parts) {
     if (part == "looks") {
       models.physics.clear();
     } else if (part == "floor") {
-      models.faults.resize(models.faults.size() -
-                           static_cast<std::size_t>(FindingCount(models)));
+      std::erase_if(models.faults, IsFinding);
       models.floor.reset();
     } else if (part == "windows") {
       for (ChannelSpec& channel : models.channels) {

@@ -30,8 +30,8 @@ inline constexpr std::array<const char*, 4> kParts{"looks", "floor", "windows",
                                                    "early"};
 
 /// The set without the named parts: `looks` by the fitted physics, the `floor`
-/// with its findings, the limits on `windows`, or the `early` test, which names
-/// a fault before t_k.
+/// with all findings, a drift of X among them, the limits on `windows`, or the
+/// `early` test, which names a fault before t_k.
 ///
 /// @param parts each one of kParts.
 ModelSet WithoutParts(ModelSet models, const std::vector<std::string>& parts);
