@@ -318,7 +318,9 @@ class Table:
             + (f"; left out: {', '.join(missing)}" if missing else "") + ". "
             "Seeds are those of the script. Limits of all methods are set on the "
             "same healthy hours for one false alarm in 1000 h (paper, untrained: "
-            "10 000 h). Intervals are 95 %; p is McNemar's against ours. "
+            "10 000 h), but those of trees end at the largest value of healthy "
+            "blocks; see what they cost in false episodes. Intervals are 95 %; p "
+            "is McNemar's against ours, over the runs in which the two differ. "
             "The register of data is [data](data.md), the methods are described "
             "in bench/baselines.py and [evaluation](../evaluation.md)."]
         for data in DATA:

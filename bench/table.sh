@@ -143,10 +143,12 @@ training_of() {  # SET
     paper)
       mkdir -p "$dir/runs/paper-training"
       if [ ! -f "$dir/runs/paper-training/made" ]; then
+        # By content, not by id, for trees depend on the order of the runs.
         for id in $("$bin/fdi-store" runs list --valve PAPER --json |
           sed -n 's/.*"run_id": "\(.*\)".*/\1/p'); do
-          quietly "$bin/fdi-store" runs export "$id" \
-            -o "$dir/runs/paper-training/$id.csv"
+          quietly "$bin/fdi-store" runs export "$id" -o "$dir/run.csv"
+          mv "$dir/run.csv" "$dir/runs/paper-training/$(
+            md5sum "$dir/run.csv" | cut -c1-12).csv"
         done
         touch "$dir/runs/paper-training/made"
       fi
