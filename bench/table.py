@@ -261,10 +261,10 @@ class Table:
                 count = sum(r.episodes for r in runs)
                 per = 1000 / self.hours[data]
                 low, high = (per * bound for bound in poisson(count))
-                self.note(data, method, "false_per_1000h", f"{per * count:.3g}",
-                          f"{low:.3g}", f"{high:.3g}")
-                cells.append(f"{per * count:.3g} ({low:.2g} to {high:.3g}) "
-                             f"[{count}]")
+                texts = [f"{rate:.0f}" if rate >= 100 else f"{rate:.2g}"
+                         for rate in (per * count, low, high)]
+                self.note(data, method, "false_per_1000h", *texts)
+                cells.append("{} ({} to {})".format(*texts) + f" [{count}]")
             if any(cell != "-" for cell in cells):
                 self.row(name, *cells, self.cost(method, hours))
 
@@ -286,7 +286,8 @@ class Table:
     def reliability(self):
         self.lines += ["", "## Is an answer as right as it says?", "",
                        "Answers to runs with a taught fault that hold it, by "
-                       "the word that stands with them.", ""]
+                       "the word that stands with them; over the data that the row has "
+                       "been scored on.", ""]
         self.heads("method", *WORDS)
         for method in OURS:
             runs = [r for (data, m), a in self.answers.items()

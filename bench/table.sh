@@ -2,8 +2,8 @@
 # Scores all methods on all data and writes docs/results/table.md and table.csv:
 # what each layer of ours buys, and what well-known detectors find with limits
 # for the same rate of false alarms, from the same healthy hours. benchmark, loop
-# and the hours of their sets need FDI_REFERENCE_DATA. What bench/baselines.py has
-# takes Debian's python3-sklearn and python3-numpy; a row whose package is missing
+# and the hours of their sets need FDI_REFERENCE_DATA. bench/baselines.py
+# needs Debian's python3-sklearn and python3-numpy; a row whose package is missing
 # is skipped by name.
 #
 # DIR keeps what is made, and a run that was stopped goes on there. It belongs to
