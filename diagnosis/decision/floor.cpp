@@ -25,7 +25,7 @@ double NextRodPosition(const FloorLimits::Rod& rod, double x, double command) {
 }
 
 void RodBand::Restart(double x) {
-  quick_ = slow_ = std::clamp(x, 0.0, 100.0);
+  quick_ = slow_ = lowest_ = highest_ = std::clamp(x, 0.0, 100.0);
   commands_.fill(quick_);
   resting_ = true;
   wait_ = kBreakaway;
@@ -38,7 +38,14 @@ void RodBand::Step(double command) {
   quick_ = NextRodPosition(limits_->quick, quick_, target);
   wait_ = resting_ && wait_ > 0 && std::abs(target - slow_) > kStop ? wait_ - 1
                                                                     : wait_;
-  if (!resting_ || wait_ == 0) {
+  const bool leaves = !resting_ || wait_ == 0;
+  const FloorLimits::Rod slow =
+      leaves ? limits_->slow : FloorLimits::Rod{0.0, 0.0};
+  highest_ = NextRodPosition(target > highest_ ? limits_->quick : slow,
+                             highest_, target);
+  lowest_ = NextRodPosition(target < lowest_ ? limits_->quick : slow, lowest_,
+                            target);
+  if (leaves) {
     slow_ = NextRodPosition(limits_->slow, slow_, target);
     resting_ = slow_ < kStop || slow_ > 100.0 - kStop;
     const bool left = std::abs(target - slow_) > kStop;
@@ -47,7 +54,7 @@ void RodBand::Step(double command) {
 }
 
 double RodBand::Beyond(double x) const {
-  return x - std::clamp(x, std::min(quick_, slow_), std::max(quick_, slow_));
+  return x - std::clamp(x, lowest_, highest_);
 }
 
 double FlowShapeAt(const FloorLimits& floor, double x) {

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <optional>
@@ -13,10 +12,13 @@ namespace fdi {
 /// Rod position one sample later, for a constant `command` [%].
 double NextRodPosition(const FloorLimits::Rod& rod, double x, double command);
 
-/// The range of positions that the rod of a healthy valve may have, between
-/// those of the quickest and the slowest response, x ← x + min(s |u − x|, v)
-/// sign(u − x). Before leaving a stop, and at the start, the slowest waits
-/// because a chamber has to be filled or vented first.
+/// The range of positions that the rod of a healthy valve may have. It moves by
+/// x ← x + min(s |u − x|, v) sign(u − x), with s and v from those of the
+/// quickest to those of the slowest response, which need not be the same both
+/// ways: a rod may follow a step quickly and come back slowly. So each end of
+/// the range goes outwards with the quickest response and inwards with the
+/// slowest. Before leaving a stop, and at the start, the slowest waits because
+/// a chamber has to be filled or vented first.
 class RodBand {
  public:
   /// `limits` must outlive it.
@@ -27,8 +29,8 @@ class RodBand {
 
   double quick() const { return quick_; }
   double slow() const { return slow_; }
-  double most_open() const { return std::min(quick_, slow_); }
-  double least_open() const { return std::max(quick_, slow_); }
+  double most_open() const { return lowest_; }
+  double least_open() const { return highest_; }
   /// Distance of `x` from the range [%], positive above.
   double Beyond(double x) const;
 
@@ -37,6 +39,8 @@ class RodBand {
   std::array<double, kMaxLag> commands_{};
   double quick_{0.0};
   double slow_{0.0};
+  double lowest_{0.0};
+  double highest_{0.0};
   int wait_{0};  // samples for which the slow rod stays at rest
   bool resting_{true};
 };

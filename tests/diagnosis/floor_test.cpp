@@ -129,6 +129,25 @@ TEST(FloorTest, CommandedTravelIsNoFinding) {
   }
 }
 
+// Nor is a rod that follows a step at once and comes back slowly, or the
+// reverse.
+TEST(FloorTest, ARodMayMoveFasterOneWay) {
+  for (const bool closes_fast : {false, true}) {
+    double x = 50.0;
+    EXPECT_EQ(FirstFindings([&](int k) {
+                const double cv =
+                    k % 40 < 3 ? (closes_fast ? 95.0 : 5.0) : 50.0;
+                x = NextRodPosition((cv > x) == closes_fast
+                                        ? FloorLimits::Rod{1.0, 100.0}
+                                        : FloorLimits::Rod{0.4, 8.0},
+                                    x, cv);
+                return Valve{cv, x, Passes(x)};
+              }),
+              kNothing)
+        << closes_fast;
+  }
+}
+
 // Nor is a rod that rests at its stop until its chamber is filled.
 TEST(FloorTest, BreakawayFromAStopIsNoFinding) {
   for (const int start : {0, 60}) {
