@@ -55,35 +55,51 @@ bool IsInOtherUnit(const ModelSet& models, Signal signal, double value,
          });
 }
 
-// The first reason why a signal of `required` is unusable in `sample`, or
-// kAccepted; signals that are not present are no reason. Of an open episode no
-// pressure or temperature is: it may pass any value.
-Intake CheckValues(const ModelSet& models, SignalMask required,
-                   const Sample& sample, bool episode_open, bool begins) {
-  if ((required & MaskOf(Signal::kF)) != 0 && sample.Has(Signal::kF) &&
-      sample.flow_unit != models.flow_unit) {
+// Why the reading of `signal` is unusable, or kAccepted. While an episode is
+// open, a pressure or temperature may pass any value.
+Intake CheckValue(const ModelSet& models, const Sample& sample, Signal signal,
+                  bool episode_open, bool begins) {
+  const std::size_t i = Index(signal);
+  if (signal == Signal::kF && sample.flow_unit != models.flow_unit) {
     return Intake::kUnit;
   }
+  if (sample.quality[i] == SignalQuality::kBad) {
+    return Intake::kBadQuality;
+  }
+  // Before the range, which does not contain NaN either: the reason differs.
+  if (!std::isfinite(sample.values[i])) {
+    return Intake::kNotFinite;
+  }
+  if (!IsPlausible(sample, signal)) {
+    return Intake::kRange;
+  }
+  return !episode_open &&
+                 IsInOtherUnit(models, signal, sample.values[i], begins)
+             ? Intake::kUnit
+             : Intake::kAccepted;
+}
+
+struct Checked {
+  Intake intake{Intake::kAccepted};  // the first reason
+  SignalMask unusable{0};
+};
+
+// Of the signals of `required`; those that are not present are no reason.
+Checked CheckValues(const ModelSet& models, SignalMask required,
+                    const Sample& sample, bool episode_open, bool begins) {
+  Checked checked;
   const SignalMask read = required & sample.present;
   for (unsigned left = read; left != 0; left &= left - 1) {
-    const auto i = static_cast<std::size_t>(std::countr_zero(left));
-    const auto signal = static_cast<Signal>(i);
-    if (sample.quality[i] == SignalQuality::kBad) {
-      return Intake::kBadQuality;
-    }
-    // Before the range, which does not contain NaN either: the reason differs.
-    if (!std::isfinite(sample.values[i])) {
-      return Intake::kNotFinite;
-    }
-    if (!IsPlausible(sample, signal)) {
-      return Intake::kRange;
-    }
-    if (!episode_open &&
-        IsInOtherUnit(models, signal, sample.values[i], begins)) {
-      return Intake::kUnit;
+    const auto signal = static_cast<Signal>(std::countr_zero(left));
+    const Intake intake =
+        CheckValue(models, sample, signal, episode_open, begins);
+    if (intake != Intake::kAccepted) {
+      checked.intake = checked.unusable == 0 ? intake : checked.intake;
+      checked.unusable =
+          static_cast<SignalMask>(checked.unusable | MaskOf(signal));
     }
   }
-  return Intake::kAccepted;
+  return checked;
 }
 
 // What Save() writes and Restore() reads, little endian and without padding:
@@ -163,7 +179,8 @@ class ValveEngine::Impl {
 
  private:
   void ClearVerdict();
-  Intake CheckSample(const Sample& measured, bool begins);
+  Checked CheckSample(const Sample& measured, bool begins);
+  bool Mend(const Checked& checked, bool begins, Sample& trained);
   void TakeSource(const Sample& sample);
   void Reject(Intake intake);
   void Initialise(const Sample& sample);
@@ -175,6 +192,7 @@ class ValveEngine::Impl {
 
   std::unique_ptr<Diagnosis> diagnosis_;
   SourceOrder order_;
+  Bridge bridge_;
   Verdict verdict_;
   bool isolation_held_{false};
   bool suspected_{false};
@@ -194,7 +212,7 @@ void ValveEngine::Impl::ClearVerdict() {
 }
 
 const Verdict& ValveEngine::Impl::Step(const Sample& measured) {
-  const Sample trained = diagnosis_->trained.Of(measured);
+  Sample trained = diagnosis_->trained.Of(measured);
   verdict_.stamp_ns = trained.stamp_ns;
   verdict_.source_id = trained.source_id;
   verdict_.seq = trained.seq;
@@ -215,15 +233,16 @@ const Verdict& ValveEngine::Impl::Step(const Sample& measured) {
     Reject(placement.intake);
     return verdict_;
   }
-  const Intake values =
-      CheckSample(measured, needs_initialisation_ || placement.gap);
-  if (values != Intake::kAccepted) {
-    Reject(values);
+  const bool begins = needs_initialisation_ || placement.gap;
+  const Checked checked = CheckSample(measured, begins);
+  if (!Mend(checked, begins, trained)) {
+    Reject(checked.intake);
     return verdict_;
   }
+  verdict_.intake = checked.intake;
   // The bank chooses the channels that it can evaluate when it is initialised,
   // so other signals than before need that as much as a gap does.
-  if (needs_initialisation_ || placement.gap || trained.present != present_) {
+  if (begins || trained.present != present_) {
     Initialise(trained);
   }
   const Sample& sample = diagnosis_->lone.Step(diagnosis_->bank, trained);
@@ -255,13 +274,13 @@ const Verdict& ValveEngine::Impl::Step(const Sample& measured) {
 
 // A pump that stops may leave a tenth of the pressure, as another unit would,
 // but takes the flow with it at that sample.
-Intake ValveEngine::Impl::CheckSample(const Sample& measured, bool begins) {
+Checked ValveEngine::Impl::CheckSample(const Sample& measured, bool begins) {
   const auto check = [&](bool any_pressure) {
     return CheckValues(models(), diagnosis_->plan->required(), measured,
                        any_pressure, begins);
   };
-  Intake values = check(episode_open());
-  if (values != Intake::kUnit) {
+  Checked values = check(episode_open());
+  if (values.intake != Intake::kUnit) {
     lost_pressure_ = lost_pressure_ && episode_open();
   } else if (lost_pressure_ ||
              (!begins && measured.Has(Signal::kF) &&
@@ -269,10 +288,27 @@ Intake ValveEngine::Impl::CheckSample(const Sample& measured, bool begins) {
     values = check(true);
     lost_pressure_ = true;
   }
-  if (values == Intake::kAccepted) {
+  if (values.intake == Intake::kAccepted) {
     flow_before_ = measured.Has(Signal::kF) ? measured[Signal::kF] : 0.0;
   }
   return values;
+}
+
+// @returns whether the sample can be judged; what is unusable is then bridged.
+bool ValveEngine::Impl::Mend(const Checked& checked, bool begins,
+                             Sample& trained) {
+  if (begins) {
+    bridge_.Restart();
+    return checked.unusable == 0;
+  }
+  unsigned unusable = checked.unusable;
+  if (models().position_as_command && (unusable & MaskOf(Signal::kX)) != 0) {
+    unusable = (unusable & ~MaskOf(Signal::kX)) | MaskOf(Signal::kCv);
+  }
+  unusable |= present_ & ~trained.present;
+  return bridge_.Mend(static_cast<SignalMask>(unusable),
+                      diagnosis_->lone.judged(), trained) ||
+         checked.unusable == 0;
 }
 
 // What was known of another source says nothing about this one; a snapshot

@@ -13,7 +13,9 @@
 
 namespace fdi {
 
-/// Outcome of a received sample. Only kAccepted reaches the observers.
+/// Outcome of a received sample. Only readings of accepted ones reach the
+/// observers; where a few in a row cannot be used, the last usable ones stand
+/// in for them (Bridge), and the sample is judged.
 enum class Intake : std::uint8_t {
   kAccepted,
   kRepeat,      ///< seq seen before from this source.

@@ -1,6 +1,7 @@
 #include "diagnosis/observers/intake.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstdlib>
 
@@ -73,6 +74,19 @@ SourceOrder::Placement SourceOrder::Place(const Sample& sample) {
     placement.intake = Intake::kPeriod;
   }
   return placement;
+}
+
+bool Bridge::Mend(SignalMask unusable, const Sample& past, Sample& sample) {
+  length_ = unusable == 0 ? 0 : std::min(length_ + 1, kMost + 1);
+  if (length_ > kMost) {
+    return false;
+  }
+  for (unsigned left = unusable; left != 0; left &= left - 1) {
+    const auto i = static_cast<std::size_t>(std::countr_zero(left));
+    sample.Set(static_cast<Signal>(i), past.values[i]);
+    sample.quality[i] = SignalQuality::kUncertain;
+  }
+  return true;
 }
 
 StuckReadings::StuckReadings(const ModelSet& models) {

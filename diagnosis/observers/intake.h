@@ -6,6 +6,7 @@
 
 #include "diagnosis/model/model_set.h"
 #include "diagnosis/model/sample.h"
+#include "diagnosis/model/ts_model.h"
 #include "diagnosis/model/verdict.h"
 
 namespace fdi {
@@ -47,6 +48,26 @@ class SourceOrder {
   std::int64_t off_interval_ns_{0};  // Length of the last one.
   std::array<std::uint64_t, kRemembered> superseded_{};
   int superseded_count_{0};
+};
+
+/// Bridges single samples in which a signal is missing or its reading cannot be
+/// used: the reading before stands there as UNCERTAIN, so the past of the
+/// observers stays consecutive and nothing counts the sample. After kMost
+/// samples in a row the past of the observers is made up from end to end, and
+/// the signal is missing.
+class Bridge {
+ public:
+  static constexpr int kMost = kMaxLag;
+
+  void Restart() { length_ = 0; }
+
+  /// Takes every sample in order.
+  /// @param past the sample before, as it was judged.
+  /// @returns whether nothing unusable is left in `sample`.
+  bool Mend(SignalMask unusable, const Sample& past, Sample& sample);
+
+ private:
+  int length_{0};  // samples in a row
 };
 
 /// Detects transmitters of T1, P1 and P2 that repeat one reading, to the bit,

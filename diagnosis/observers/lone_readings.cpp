@@ -4,13 +4,19 @@
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <utility>
 
+#include "base/time_units.h"
 #include "diagnosis/observers/detection.h"
 
 namespace fdi {
 namespace {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+// A wire that was loose for a moment will be so again within a day, or has been
+// mended.
+constexpr std::int64_t kDoubtNs = kNsPerDay;
 
 constexpr std::uint32_t SidesOf(std::size_t channel) {
   return std::uint32_t{3} << (2 * channel);
@@ -38,6 +44,7 @@ LoneReadings::LoneReadings(const ModelSet& models) : models_(&models) {
                                            MaskOf(model.output));
   }
   residuals_.fill(kNan);
+  doubted_until_ns_.fill(std::numeric_limits<std::int64_t>::min());
 }
 
 void LoneReadings::Restart() {
@@ -47,37 +54,71 @@ void LoneReadings::Restart() {
 }
 
 const Sample& LoneReadings::Step(ObserverBank& bank, const Sample& sample) {
-  const Sides held = held_;
-  held_ = 0;
+  const Sides held = std::exchange(held_, 0);
   residuals_.fill(kNan);
-  if (held != 0) {
-    // An UNCERTAIN past would keep the deciding reading from being judged.
-    bank.Amend(0, judged_.values, original_.uncertain());
+  // An UNCERTAIN past would keep the deciding reading from being judged.
+  for (std::size_t k = 0; held != 0 && k < held_count_; ++k) {
+    bank.Amend(static_cast<int>(k), last_held_[k].judged.values,
+               last_held_[k].original.uncertain());
   }
   bank.Step(sample);
   Read(bank);
+  Sides again = 0;
   if (held != 0) {
-    const bool real = (Beyond() & held) != 0;
-    const Sample& past = real ? original_ : judged_;
-    bank.Amend(1, past.values, past.uncertain());
-    bank.StepAgain(sample);
-    if (real) {
-      Read(bank);
-    }
+    const Sides confirmed = Confirmed(held, sample.stamp_ns);
+    const bool more =
+        held_count_ < kMostHeldOut && Doubted(confirmed, sample.stamp_ns);
+    again = more ? confirmed : 0;
+    Judge(bank, sample, confirmed != 0 && !more);
   }
   const Sides beyond = Beyond();
-  const Sides lone = TakeRare(has_past_ ? beyond & Jumped() & ~beyond_ : 0);
+  const Sides lone =
+      again | TakeRare(has_past_ ? beyond & Jumped() & ~beyond_ : 0);
   beyond_ = beyond;
   has_past_ = true;
   for (std::size_t c = 0; c < now_.size(); ++c) {
     last_[c] = std::isnan(now_[c]) ? last_[c] : now_[c];
   }
   if (lone != 0) {
-    HoldOut(bank, sample, lone);
+    HoldOut(bank, sample, lone, again);
   } else {
     judged_ = sample;
   }
   return judged_;
+}
+
+// Which of the sides that are held out the next reading confirms. Where it is
+// inside, the reading before was wrong.
+LoneReadings::Sides LoneReadings::Confirmed(Sides held, std::int64_t stamp_ns) {
+  const Sides read = held & ~Unread();
+  const Sides confirmed = Beyond() & read;
+  for (std::size_t c = 0; c < now_.size(); ++c) {
+    if ((read & ~confirmed & SidesOf(c)) != 0) {
+      doubted_until_ns_[c] = stamp_ns + kDoubtNs;
+    }
+  }
+  return confirmed;
+}
+
+bool LoneReadings::Doubted(Sides sides, std::int64_t stamp_ns) const {
+  for (std::size_t c = 0; sides != 0 && c < now_.size(); ++c) {
+    if ((sides & SidesOf(c)) != 0 && stamp_ns < doubted_until_ns_[c]) {
+      return true;
+    }
+  }
+  return false;
+}
+
+// The past gets back what was held out if the step was real.
+void LoneReadings::Judge(ObserverBank& bank, const Sample& sample, bool real) {
+  for (std::size_t k = 0; k < held_count_; ++k) {
+    const Sample& past = real ? last_held_[k].original : last_held_[k].judged;
+    bank.Amend(static_cast<int>(k) + 1, past.values, past.uncertain());
+  }
+  bank.StepAgain(sample);
+  if (real) {
+    Read(bank);
+  }
 }
 
 void LoneReadings::Read(const ObserverBank& bank) {
@@ -109,6 +150,14 @@ LoneReadings::Sides LoneReadings::Jumped() const {
   return jumped;
 }
 
+LoneReadings::Sides LoneReadings::Unread() const {
+  Sides unread = 0;
+  for (std::size_t c = 0; c < models_->channels.size(); ++c) {
+    unread |= std::isnan(now_[c]) ? SidesOf(c) : 0;
+  }
+  return unread;
+}
+
 LoneReadings::Sides LoneReadings::TakeRare(Sides lone) {
   for (std::size_t c = 0; c < models_->channels.size(); ++c) {
     load_[c] = std::max(load_[c] - kRecovery, 0.0);
@@ -124,23 +173,27 @@ LoneReadings::Sides LoneReadings::TakeRare(Sides lone) {
   return lone;
 }
 
-void LoneReadings::HoldOut(ObserverBank& bank, const Sample& sample,
-                           Sides lone) {
+void LoneReadings::HoldOut(ObserverBank& bank, const Sample& sample, Sides lone,
+                           Sides again) {
   SignalMask doubtful = 0;
   for (std::size_t c = 0; c < models_->channels.size(); ++c) {
     if ((lone & SidesOf(c)) != 0) {
-      residuals_[c] = now_[c];
+      const bool counts = (again & SidesOf(c)) != 0 ||
+                          !Doubted(lone & SidesOf(c), sample.stamp_ns);
+      residuals_[c] = counts ? now_[c] : kNan;
       doubtful = static_cast<SignalMask>(doubtful | doubtful_[c]);
     }
   }
   const std::array<double, kSignalCount> last = judged_.values;
-  original_ = sample;
   judged_ = sample;
   for (unsigned left = doubtful & sample.present; left != 0; left &= left - 1) {
     const auto i = static_cast<std::size_t>(std::countr_zero(left));
     judged_.values[i] = last[i];
     judged_.quality[i] = SignalQuality::kUncertain;
   }
+  last_held_[1] = last_held_[0];
+  last_held_[0] = {sample, judged_};
+  held_count_ = again != 0 ? held_count_ + 1 : 1;
   held_ = lone;
   bank.StepAgain(judged_);
 }

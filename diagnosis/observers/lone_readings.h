@@ -20,11 +20,16 @@ namespace fdi {
 ///  1. The next one passes that threshold, too: the step was real. The past of
 ///     the observers gets the reading back, and nothing more is held out.
 ///     Windows and evidence begin one sample later than without this class.
-///  2. It does not: the reading stays out of the past of the observers, their
-///     windows, and the floor.
+///  2. It does not, or cannot be used: the reading stays out of the past of the
+///     observers, their windows, and the floor.
 ///
 /// Detection counts the residual() of what is held out against the threshold,
 /// for n_d samples in a row, so an abrupt fault is detected as soon as ever.
+///
+/// A channel that has had a wrong reading within a day has a loose wire, which
+/// may make two in a row. There a second reading is held out, too, and the
+/// third decides; the first one does not count, so detection waits for the
+/// third.
 ///
 /// Wrong readings are taken to be rare: a channel that has had more of them of
 /// late than kBurst passes all on, as its noise is what has changed.
@@ -41,29 +46,45 @@ class LoneReadings {
   /// After the bank was initialised: there is no reading before.
   void Restart();
 
+  /// The last sample as it was judged.
+  const Sample& judged() const { return judged_; }
+
   /// Steps `bank` by `sample`, without the readings that are held out.
   /// @returns the sample as it is to be judged; valid until the next call.
   const Sample& Step(ObserverBank& bank, const Sample& sample);
 
   /// True if a reading of the last sample is held out.
   bool holds() const { return held_ != 0; }
-  /// By channel, the residual of the reading that is held out; else NaN.
+  /// By channel, the residual of the reading that is held out and counts; else
+  /// NaN.
   std::span<const double> residuals() const { return residuals_; }
 
  private:
   /// Two bits by channel: below, above.
   using Sides = std::uint32_t;
 
+  struct HeldOut {
+    Sample original;
+    Sample judged;
+  };
+  static constexpr std::size_t kMostHeldOut = 2;  // in a row
+
   void Read(const ObserverBank& bank);
   Sides Beyond() const;
   Sides Jumped() const;
+  Sides Unread() const;
+  Sides Confirmed(Sides held, std::int64_t stamp_ns);
   Sides TakeRare(Sides lone);
-  void HoldOut(ObserverBank& bank, const Sample& sample, Sides lone);
+  bool Doubted(Sides sides, std::int64_t stamp_ns) const;
+  void Judge(ObserverBank& bank, const Sample& sample, bool real);
+  void HoldOut(ObserverBank& bank, const Sample& sample, Sides lone,
+               Sides again);
 
   const ModelSet* models_;
   std::array<SignalMask, kMaxChannels> doubtful_{};  // if the channel is lone
   Sample judged_;
-  Sample original_;  // the last sample of which something was held out
+  std::array<HeldOut, kMostHeldOut> last_held_;  // newest first
+  std::size_t held_count_{0};                    // of them, in a row
   Sides beyond_{0};  // at the last reading of each channel
   Sides held_{0};
   bool has_past_{false};
@@ -71,6 +92,7 @@ class LoneReadings {
   std::array<double, kMaxChannels> now_{};   // NaN: not read
   std::array<double, kMaxChannels> last_{};  // that was read
   std::array<double, kMaxChannels> load_{};  // readings held out of late
+  std::array<std::int64_t, kMaxChannels> doubted_until_ns_;
 };
 
 }  // namespace fdi

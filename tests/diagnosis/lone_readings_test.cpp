@@ -94,6 +94,45 @@ TEST_F(LoneReadingsTest, TheSecondReadingMakesAStepReal) {
   EXPECT_NEAR(bank_.residual(0, 1), 20.0, 1e-9);
 }
 
+TEST_F(LoneReadingsTest, AfterAWrongReadingTwoInARowStayOut) {
+  for (const double change : {0.0, 0.0, 40.0, 0.0, 0.0, 40.0}) {
+    Step(Signal::kF, change);
+  }
+  EXPECT_TRUE(lone_.holds());
+  EXPECT_TRUE(std::isnan(lone_.residuals()[1])) << "counts no more";
+  Step(Signal::kF, 40.0);
+  EXPECT_TRUE(lone_.holds());
+  EXPECT_NEAR(lone_.residuals()[1], 40.0, 1e-9);
+  EXPECT_EQ(judged_[Signal::kF], Resting(0)[Signal::kF]);
+  Step(Signal::kF, 0.0);
+  EXPECT_FALSE(lone_.holds());
+  Step(Signal::kF, 0.0);
+  EXPECT_NEAR(bank_.residual(0, 1), 0.0, 1e-9);
+}
+
+TEST_F(LoneReadingsTest, AfterAWrongReadingTheThirdMakesAStepReal) {
+  for (const double change : {0.0, 0.0, 40.0, 0.0, 0.0, 40.0, 40.0}) {
+    Step(Signal::kF, change);
+  }
+  EXPECT_TRUE(lone_.holds());
+  Step(Signal::kF, 40.0);
+  EXPECT_FALSE(lone_.holds());
+  EXPECT_NEAR(bank_.residual(0, 1), 20.0, 1e-9);
+}
+
+// Of the second reading nothing is known.
+TEST_F(LoneReadingsTest, AReadingThatIsNotReadMakesNoStepReal) {
+  Step(Signal::kF, 0.0);
+  Step(Signal::kF, 40.0);
+  ASSERT_TRUE(lone_.holds());
+  Sample sample = Resting(k_++);
+  sample.quality[Index(Signal::kF)] = SignalQuality::kUncertain;
+  lone_.Step(bank_, sample);
+  Step(Signal::kF, 0.0);
+  Step(Signal::kF, 0.0);
+  EXPECT_NEAR(bank_.residual(0, 1), 0.0, 1e-9);
+}
+
 TEST_F(LoneReadingsTest, WhatIsWrongTooOftenIsHeldOutNoLonger) {
   Step(Signal::kF, 0.0);
   int held = 0;
@@ -112,6 +151,22 @@ TEST(LoneReadingsEngineTest, AWindowTakesNoLoneReading) {
     sample.values[Index(Signal::kF)] += ++k % 60 == 0 ? 40.0 : 0.0;
   });
   EXPECT_TRUE(seen.transitions.empty());
+}
+
+// The first is alone. Later ones are two in a row, or one that is impossible
+// beside one that is not.
+TEST(LoneReadingsEngineTest, TwoWrongReadingsInARowOpenNoEpisode) {
+  ValveEngine engine(std::make_shared<const ModelSet>(LinearPlant()));
+  const Seen seen = StepRange(engine, 0, 1000, [k = 0](Sample& sample) mutable {
+    ++k;
+    const bool wrong = k == 100 || (k > 101 && k % 100 < 2);
+    const bool impossible = k > 500 && k % 100 == 1;
+    sample.values[Index(Signal::kF)] += impossible ? 1e6 : wrong ? 40.0 : 0.0;
+  });
+  EXPECT_TRUE(seen.transitions.empty());
+  EXPECT_EQ(seen.last.quality, Quality::kLive);
+  const Seen fault = StepRange(engine, 1000, 1003, tests::FullF6);
+  EXPECT_EQ(fault.transitions.size(), 1U);
 }
 
 TEST(LoneReadingsEngineTest, AnAbruptFaultIsDetectedAtItsFirstSample) {

@@ -1,4 +1,5 @@
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <vector>
@@ -7,6 +8,7 @@
 
 #include "diagnosis/decision/valve_engine.h"
 #include "diagnosis/model/trained_signals.h"
+#include "diagnosis/observers/intake.h"
 #include "tests/diagnosis/engine_run.h"
 #include "tests/diagnosis/linear_plant.h"
 
@@ -62,9 +64,49 @@ TEST(ValveEngineIntakeTest, BadValuesNeverReachAnObserver) {
     sample.Set(Signal::kF, bad.value);
     const Verdict verdict = engine.Step(sample);
     EXPECT_EQ(verdict.intake, bad.intake);
-    EXPECT_EQ(verdict.quality, Quality::kBadInput);
-    EXPECT_TRUE(engine.Step(PlantSample(51)).initialised);
+    EXPECT_EQ(verdict.quality, Quality::kLive);
+    EXPECT_TRUE(std::isnan(verdict.residuals[1]));
+    EXPECT_FALSE(engine.Step(PlantSample(51)).initialised);
   }
+}
+
+// One that is missing, too. The other channel goes on as if nothing had been.
+TEST(ValveEngineIntakeTest, ASingleUnusableReadingIsBridged) {
+  const auto f = Index(Signal::kF);
+  const std::function<void(Sample&)> kinds[] = {
+      [=](Sample& sample) { sample.values[f] = -1000.0; },
+      [=](Sample& sample) { sample.quality[f] = SignalQuality::kBad; },
+      [](Sample& sample) {
+        sample.present =
+            static_cast<SignalMask>(sample.present & ~MaskOf(Signal::kF));
+      }};
+  for (const auto& spoil : kinds) {
+    ValveEngine engine(SharedPlant());
+    ValveEngine twin(SharedPlant());
+    StepRange(engine, 0, 50);
+    StepRange(twin, 0, 50);
+    const Seen bad = StepRange(engine, 50, 51, spoil);
+    const Seen good = StepRange(twin, 50, 51);
+    EXPECT_EQ(bad.last.quality, Quality::kLive);
+    EXPECT_FALSE(bad.last.initialised);
+    EXPECT_EQ(bad.last.residuals[0], good.last.residuals[0]);
+    EXPECT_TRUE(std::isnan(bad.last.residuals[1]));
+    const Seen after = StepRange(engine, 51, 60);
+    EXPECT_EQ(after.last.residuals[1],
+              StepRange(twin, 51, 60).last.residuals[1]);
+    EXPECT_TRUE(after.transitions.empty());
+  }
+}
+
+TEST(ValveEngineIntakeTest, WhatIsUnusableForLongIsMissing) {
+  ValveEngine engine(SharedPlant());
+  StepRange(engine, 0, 50);
+  const auto spoil = [](Sample& sample) { sample.Set(Signal::kF, -1000.0); };
+  const int end = 50 + Bridge::kMost;
+  EXPECT_EQ(StepRange(engine, 50, end, spoil).last.quality, Quality::kLive);
+  EXPECT_EQ(StepRange(engine, end, end + 1, spoil).last.quality,
+            Quality::kBadInput);
+  EXPECT_TRUE(StepRange(engine, end + 1, end + 2).last.initialised);
 }
 
 TEST(ValveEngineIntakeTest, BadQualityIsRefused) {
@@ -126,13 +168,14 @@ TEST(ValveEngineIntakeTest, ThePositionAsCommandIsCheckedLikeACommand) {
       Intake::kBadQuality);
   EXPECT_EQ(judge([&](Sample& s) { s.values[x] = std::nan(""); }).intake,
             Intake::kNotFinite);
-  // The command neither counts where it is bad nor stands in where X is not.
+  // The command neither counts where it is bad nor stands in where X is not: it
+  // is bridged.
   EXPECT_EQ(judge([](Sample& s) {
               s.quality[Index(Signal::kCv)] = SignalQuality::kBad;
             }).quality,
             Quality::kLive);
-  EXPECT_EQ(judge([](Sample& s) { s.present ^= MaskOf(Signal::kX); }).quality,
-            Quality::kBadInput);
+  EXPECT_TRUE(std::isnan(
+      judge([](Sample& s) { s.present ^= MaskOf(Signal::kX); }).residuals[0]));
 }
 
 TEST(ValveEngineIntakeTest, PositionAsCommandLeavesTheOtherReadings) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <utility>
 
 #include "base/error.h"
 #include "diagnosis/model/trained_signals.h"
@@ -59,9 +60,10 @@ class Reader {
     }
     if (verdict.intake != Intake::kAccepted) {
       data_->left_out.Add(Quality::kBadInput);
+      rejected_ = true;
       return Finish();
     }
-    if (verdict.initialised) {
+    if (verdict.initialised || std::exchange(rejected_, false)) {
       bank_.Initialise(sample);
       coverage_.StartSettling(sample.stamp_ns);
     }
@@ -104,6 +106,7 @@ class Reader {
   std::shared_ptr<const ModelSet> models_;
   std::string run_;
   HealthyResiduals* data_;
+  bool rejected_{false};  // The past of the bank lacks a sample.
   ObserverBank bank_;
   Coverage coverage_;
   ResidualStretch stretch_;
