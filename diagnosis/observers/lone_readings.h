@@ -83,8 +83,7 @@ class LoneReadings {
   const ModelSet* models_;
   std::array<SignalMask, kMaxChannels> doubtful_{};  // if the channel is lone
   Sample judged_;
-  std::array<HeldOut, kMostHeldOut> last_held_;  // newest first
-  std::size_t held_count_{0};                    // of them, in a row
+  std::size_t held_count_{0};  // of last_held_, in a row
   Sides beyond_{0};  // at the last reading of each channel
   Sides held_{0};
   bool has_past_{false};
@@ -93,6 +92,8 @@ class LoneReadings {
   std::array<double, kMaxChannels> last_{};  // that was read
   std::array<double, kMaxChannels> load_{};  // readings held out of late
   std::array<std::int64_t, kMaxChannels> doubted_until_ns_;
+  // Newest first. Last, since other members are read at each sample.
+  std::array<HeldOut, kMostHeldOut> last_held_;
 };
 
 }  // namespace fdi
