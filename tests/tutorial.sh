@@ -3,18 +3,28 @@
 # there, in an empty directory: blocks `sh` one after the other, a block
 # `sh service` in the background until the end, `sh long` with
 # FDI_TUTORIAL_LONG=1, not `sh admin`. Every command has to succeed, and the
-# story has to come out as told.
+# story has to come out as told. 77 without the packages that connect.md takes.
 # Usage: tutorial.sh BIN_DIRECTORY [tutorial|plant|README]
+#        tutorial.sh BIN_DIRECTORY connect NODE_MODULES
 set -euo pipefail
 bin=$(cd "$1" && pwd)
 page=${2:-tutorial}
 tree=$(cd "$(dirname "$0")/.." && pwd)
 text=$tree/docs/$page.md
 [ "$page" != README ] || text=$tree/README.md
+modules=$(realpath -m "${3:-.}")
+[ "$page" != connect ] || [ -d "$modules/node-opcua-server" ] || {
+  echo "connect: skipped, npm has not fetched node-opcua"
+  exit 77
+}
 source "$tree/tests/domain.sh"
+# Neither ephemeral ones, nor those of a test's domain.
+port=$((15000 + domain)) plant_port=$((16000 + domain))
 out=$(mktemp -d)
+services=
 finish() {
-  kill "${service:-}" 2>/dev/null || true
+  exec 2>/dev/null
+  for each in $services; do kill -- "-$each" || true; done
   rm -rf "$out"
 }
 trap finish EXIT
@@ -30,8 +40,48 @@ adapt() {
   sed -e "s#/usr/share/fdi/campaigns#$out/campaigns#g" \
     -e 's#=127\.0\.0\.1:8080#=127.0.0.1:0#' \
     -e 's#--console$#--console=127.0.0.1:0#' \
-    -e "s#^\(fdi-monitor\|fdi-simulator\) #&--domain $domain #"
+    -e "s#opc.tcp://HOST:4840#opc.tcp://127.0.0.1:$plant_port#" \
+    -e "s#^node server.mjs\(.*\) -- #node server.mjs --port $port\1 -- --domain $domain #" \
+    -e "s#node alarm_client.mjs#& --endpoint opc.tcp://127.0.0.1:$port#" \
+    -e "s#\(^\|| \)\(fdi-monitor\|fdi-simulator\|fdi-gateway\) #&--domain $domain #"
 }
+await() {  # SECONDS COMMAND...
+  for _ in $(seq $((5 * $1))); do
+    ! "${@:2}" || return 0
+    sleep 0.2
+  done
+  fail "not within $1 s: ${*:2}"
+}
+# A plant of 20 valves; the flow transmitter of the first one fails. Models of a
+# campaign stand in for those that `sh long` makes of 25 minutes of data.
+prepare_connect() {
+  local minutes=${FDI_TUTORIAL_LONG:+40}
+  cp "$tree"/gateway/opcua/*.mjs "$tree/tests/gateway/plant_server.mjs" .
+  ln -s "$modules" node_modules
+  for fault in "" "--fault f19:abrupt@${FDI_TUTORIAL_LONG:+2}200:strength=0.5"; do
+    fdi-simulator run --no-publish --parameters paper-operating-point --seed 7 \
+      --set excitation.amplitude_pct=8 --set excitation.period_s=80 \
+      --duration "${minutes:-20}m" $fault -o "$out/plant${fault:+-fault}.csv" >/dev/null
+  done
+  if [ -z "$minutes" ]; then
+    fdi-trainer train --campaign "$tree/tests/survival/quick.toml" >"$out/train.log" 2>&1
+    fdi-store valves assign FV-101 quick >/dev/null
+  fi
+}
+# What a reader waits for.
+before_connect() {
+  case $(<"$1") in
+  *"client.mjs plant.toml"*)
+    node plant_server.mjs $plant_port 20 20 "$out"/plant{-fault,}.csv 2>"$out/plant.log" &
+    services="$! $services"
+    await 60 grep -sq ready "$out/plant.log"
+    ;;
+  *onboard*) await 200 has_samples ;;
+  *"alarm_client.mjs list"*) await 60 has_alarm ;;
+  esac
+}
+has_samples() { fdi-store runs list --valve FV-101 | awk 'END { exit $4 < 1700 }'; }
+has_alarm() { fdi-store history list | grep >/dev/null 'FV-101.*f19'; }
 # A file for each block, in order: 01.sh, 02.service, 03.admin, ...
 awk -v out="$out" '/^```sh/ {kind = $2 == "" ? "sh" : $2; ++n; next}
   /^```/ {kind = ""} kind != "" {print > sprintf("%s/%02d.%s", out, n, kind)}' \
@@ -43,9 +93,12 @@ mkdir "$out/home"
 ln -s "$tree/campaigns" "$out/campaigns"  # A path without blanks.
 ln -s "$tree/campaigns" "$out/home/campaigns"
 cd "$out/home"
+! declare -F "prepare_$page" >/dev/null || "prepare_$page"
+set -m  # A service is a group of processes.
 for block in "$out"/[0-9][0-9].*; do
   adapt <"$block" >"$out/block"
   [[ $block != *.long || -n ${FDI_TUTORIAL_LONG:-} ]] || continue
+  ! declare -F "before_$page" >/dev/null || "before_$page" "$block"
   case $block in
   *.sh | *.long)
     # One shell's directory is the next one's, as in a terminal.
@@ -55,28 +108,32 @@ for block in "$out"/[0-9][0-9].*; do
     cd "$(cat "$out/directory")"
     ;;
   *.service)
-    sed -i '1s/^/exec /' "$out/block"
-    bash "$out/block" >"$out/service.log" 2>&1 &
-    service=$!
-    for _ in $(seq 200); do
-      ! grep -q monitor_ready "$out/service.log" || break
-      kill -0 $service 2>/dev/null || fail "the service has ended"
-      sleep 0.1
-    done
+    log=${block%.service}-service.log
+    grep -q '|' "$out/block" || sed -i '1s/^/exec /' "$out/block"
+    bash "$out/block" &>"$log" &
+    services="$! $services"
+    await 60 grep -sqE 'monitor_ready|server: ready|of [0-9]+ tags' "$log"
     ;;
   esac
 done
 
 # The page of the service answers.
-port=$(sed -n 's/.*console_listening address=127.0.0.1:\([0-9]*\).*/\1/p' \
-  "$out/service.log")
-exec 3<>"/dev/tcp/127.0.0.1/${port:?}"
-printf 'GET / HTTP/1.0\r\nHost: 127.0.0.1:%s\r\n\r\n' "$port" >&3
-head -n 1 <&3 | grep >/dev/null ' 200 ' || fail "the page does not answer"
-
-kill -TERM "$service"
-wait "$service" || fail "the monitor ended with $?"
-service=
+if [ "$page" != connect ]; then
+  port=$(sed -n 's/.*console_listening address=127.0.0.1:\([0-9]*\).*/\1/p' \
+    "$out"/*-service.log)
+  exec 3<>"/dev/tcp/127.0.0.1/${port:?}"
+  printf 'GET / HTTP/1.0\r\nHost: 127.0.0.1:%s\r\n\r\n' "$port" >&3
+  head -n 1 <&3 | grep >/dev/null ' 200 ' || fail "the page does not answer"
+fi
+for each in $services; do
+  kill -- "-$each"
+  status=0
+  wait "$each" || status=$?
+  # The shell of a pipe ends by the signal.
+  [ $status -eq 0 ] || [ "$page $status" = "connect 143" ] ||
+    fail "a service ended with $status"
+done
+services=
 # Checks the output that README shows.
 check_README() {
   fdi-store history list | grep >/dev/null 'f19 *Flow transmitter wrong *sure' ||
@@ -100,6 +157,14 @@ check_plant() {
   worst=$(fdi-store worklist --audit-windows 3 --csv | sed -n 2p)
   grep -q 'FIC103.*no_response' <<<"$worst" || fail "not the worst: $worst"
   [ -s FIC103.png ] && [ -s worklist.html ] || fail "no picture or no page"
+}
+check_connect() {
+  grep -q '^FV-120.FT$' "$out/commands.log" || fail "not the tags of all valves"
+  grep -q '120 of 120 tags' "$out"/*-service.log || fail "not all tags are read"
+  grep -q '^FV-101.*Active/Unacknowledged' "$out/commands.log" || fail "no alarm"
+  found=$(fdi-store history list --json)
+  grep -q '"acked_by": "anna"' <<<"$found" || fail "not acknowledged: $found"
+  grep -q '"ack_comment": "fitter is on the way"' <<<"$found" || fail "$found"
 }
 "check_$page"
 echo "$page: $(ls "$out"/*.sh | wc -l) blocks in $SECONDS s"
