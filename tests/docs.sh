@@ -3,8 +3,9 @@
 # and every event that warns stands in docs/troubleshooting.md, and no id there
 # is one that nothing logs. Links between documents lead somewhere, each page is
 # in one part of docs/README.md, README.md and docs/results.md keep their
-# lengths, docs/method.md has a row for every rule of the decision, and
-# docs/faults.md and docs/json.md are up to date.
+# lengths, docs/method.md has a row for every rule of the decision,
+# docs/openapi.yaml has the routes of the page, and docs/faults.md and docs/json.md
+# are up to date.
 set -u
 cd "$(dirname "$0")/.."
 failed=0
@@ -76,6 +77,23 @@ lines=$(wc -l <docs/results.md)
 [ "$lines" -le 120 ] || complain "docs/results.md has $lines lines, at most 120"
 tests/faults_page.sh --check || failed=1
 tests/json_page.sh --check || failed=1
+
+# docs/openapi.yaml has the routes that the page answers, and no others.
+routes=$(git ls-files 'console/*_routes.cpp' 'planner/page/*_routes.cpp' | xargs perl -0ne '
+  my $method = $ARGV =~ /action/ ? "post" : "get";
+  while (m![{(]"/api/v1(/[^"]*)"!g) {
+    my $path = $1;
+    my @kinds = $path =~ s/\((svg\|png)\)$// ? split(/\|/, $1) : "";
+    $path =~ s/\([^)]*\)/{}/g;
+    $path =~ s/\\//g;
+    print "$method $path$_\n" for @kinds;
+  }' | sort)
+described=$(perl -ne '$path = $1 if m{^  (/.*):$};
+  print "$1 ", $path =~ s/\{\w+\}/{}/gr, "\n" if /^    (get|post):$/' \
+  docs/openapi.yaml | sort)
+[ "$(wc -l <<<"$routes")" -gt 20 ] || complain "found few routes in the sources"
+diff <(echo "$routes") <(echo "$described") ||
+  complain "docs/openapi.yaml has other routes (>) than the page (<)"
 
 # docs/method.md explains every rule that can be left out, in the order in which
 # they act.
