@@ -141,6 +141,21 @@ check_README() {
   fdi-store worklist | grep >/dev/null '^1. FV-101 ' ||
     fail "the work list is not as README shows it"
 }
+# The cells of docs/notebook.md, on the data of the tutorial.
+check_notebook() {
+  local python=/usr/bin/python3 answer
+  $python -c 'import pandas, matplotlib' 2>/dev/null || {
+    echo "notebook: skipped (Debian: apt install python3-pandas python3-matplotlib)"
+    return
+  }
+  sed -n '/^```python/,/^```$/{/^```/!p}' "$tree/docs/notebook.md" |
+    sed "s#/usr/lib/fdi#$bin/../lib#" >"$out/notebook.py"
+  answer=$($python "$out/notebook.py" 2>>"$out/notebook.log") || fail "the notebook"
+  for line in ' FV-102 Flow transmitter wrong .* f19 ' '^0\.\(49\|5[0-2]\) of the flow'; do
+    grep -q "$line" <<<"$answer" || fail "the notebook prints $answer"
+  done
+  [ -s samples.png ] || fail "no picture of the notebook"
+}
 check_tutorial() {
   found=$(fdi-store history list --json)
   grep -q '"fault": "f19"' <<<"$found" || fail "no f19 in the history: $found"
@@ -148,6 +163,7 @@ check_tutorial() {
   [ "$(grep -c '"episode_id"' <<<"$found")" -eq 1 ] || fail "not one episode: $found"
   [ -s episode.png ] || fail "no picture"
   fdi-store models list | grep >/dev/null '^paper@2 *yes' || fail "paper@2 is not active"
+  check_notebook
 }
 check_plant() {
   local list worst
