@@ -1,16 +1,22 @@
 #!/usr/bin/env bash
-# Measures the cost of fdi-gateway in: 300 valves of 6 tags by lines, each tag once a
-# second, then 10 000 readings a second; and where it ends, as fast as a pipe
-# gives them. Beside a monitor that records nothing and has no models.
-# Usage: gateway.sh FOLDER-OF-PROGRAMS [SECONDS]
+# Measures the cost of fdi-gateway in for 300 valves of 6 tags: by lines, each tag
+# once a second, then 10 000 readings a second, and as fast as a pipe gives them;
+# by MQTT, where mosquitto is; and, with NODE_MODULES, by OPC UA, from a server
+# with 1800 nodes through client.mjs. Beside a monitor that records nothing and
+# has no models. With a WAY, only that one.
+# Usage: gateway.sh FOLDER-OF-PROGRAMS [SECONDS [NODE_MODULES [lines|mqtt|opcua]]]
 set -euo pipefail
+PATH=$PATH:/usr/sbin
 seconds=${2:-30}
+modules=${3:+$(realpath "$3")}
 valves=300
+tree=$(cd "$(dirname "$0")/.." && pwd)
 source "$(dirname "$0")/../tests/system/programs.sh" "$1"
-gateway=
+gateway= client= server= broker=
+port=$((16000 + domain))
 finish() {
   exec 2>/dev/null
-  kill -9 ${gateway:-} ${monitor:-} || true
+  kill -9 $gateway $client $server $broker ${monitor:-} || true
   rm -rf "$work"
 }
 trap finish EXIT
@@ -18,16 +24,31 @@ trap finish EXIT
 {
   printf '[defaults]\nop = "{loop}.OP"\nx = "{loop}.ZT"\nf = "{loop}.FT"\n'
   printf 'f_unit = "m3/h"\np1 = "{loop}.P1"\np2 = "{loop}.P2"\nt1 = "{loop}.T1"\n'
-  for i in $(seq $valves); do printf '[[loop]]\nname = "V%d"\n' "$i"; done
+  printf 'topic = "plant/{loop}"\nvalue = "{signal}"\n'
+  for i in $(seq $valves); do printf '[[loop]]\nname = "FV-%d"\n' $((100 + i)); done
 } >plant.toml
 # READINGS a second for SECONDS; 0: as fast as they are taken, stamps a second
-# apart for 1800 readings.
+# apart for 1800 readings. With a PORT to the broker there, a message for each
+# valve, else lines.
 cat >feed.pl <<'END'
 use strict;
+use IO::Socket::INET;
 use Time::HiRes qw(time sleep);
-my ($rate, $seconds, $valves) = @ARGV;
-$| = 1;
-my @tags = map { my $v = $_; map { "V$v.$_" } qw(OP ZT FT P1 P2 T1) } 1 .. $valves;
+my ($rate, $seconds, $valves, $port) = @ARGV;
+my $out = \*STDOUT;
+# A packet of MQTT 3.1.1: type, length in groups of 7 bits, body.
+sub packet {
+  my ($type, $body) = @_;
+  my ($n, $length) = (length $body, "");
+  do { $length .= chr($n % 128 | ($n > 127 ? 128 : 0)); $n >>= 7 } while $n;
+  return chr($type) . $length . $body;
+}
+if ($port) {
+  $out = IO::Socket::INET->new("127.0.0.1:$port") or die "no broker";
+  print $out packet(0x10, pack("n/a*CCn n/a*", "MQTT", 4, 2, 0, "feed"));
+}
+$out->autoflush(1);
+my @tags = map { my $v = 100 + $_; map { "FV-$v.$_" } qw(OP ZT FT P1 P2 T1) } 1 .. $valves;
 my $begin = time;
 my $start = int($begin) - ($rate ? 0 : 86400);
 my $total = ($rate || 20000) * $seconds;
@@ -36,42 +57,117 @@ for (my $n = 0; $n < $total;) {
   my $part = $rate ? $rate / 20 : 1800;
   for (my $i = 0; $i < $part; ++$i, ++$n) {
     my $t = $rate ? time : $start + int($n / 1800);
+    if ($port) {
+      my $v = 50 + $n % 37;
+      $text .= packet(0x30, pack("n/a*", "plant/FV-" . (101 + $n / 6 % $valves)) .
+        sprintf('{"op":%d,"x":%d,"f":%d,"p1":%d,"p2":%d,"t1":%d,"t":%.3f}', ($v) x 6, $t));
+      $n += 5, $i += 5;
+      next;
+    }
     $text .= sprintf("{\"tag\":\"%s\",\"t\":%.3f,\"v\":%.3f,\"q\":\"good\"}\n",
       $tags[$n % @tags], $t, 50 + $n % 37);
   }
-  print $text;
+  print $out $text;
   if ($rate) {
     my $ahead = $begin + $n / $rate - time;
     sleep($ahead) if $ahead > 0;
   }
 }
 END
-measure() {  # READINGS a second
-  start
-  mkfifo -m 600 pipe
-  "$bin/fdi-gateway" --domain "$domain" in --plant plant.toml --lines pipe \
-    --json >totals.json 2>gateway.log &
+ticks() { awk '{ print $14 + $15 }' "/proc/$1/stat"; }
+peak_mb() { awk '/VmHWM/ { print int($2 / 1024) }' "/proc/$1/status"; }
+share() {  # TICKS BEGIN END: % of a core
+  awk -v t="$1" -v hz="$(getconf CLK_TCK)" -v s="$2" -v e="$3" \
+    'BEGIN { printf "%.1f %% of a core", 100 * t / hz / (e - s) }'
+}
+await() { timeout 60 sh -c 'until grep -q "$0" "$1"; do sleep 0.1; done' "$1" "$2" || fail "no $1"; }
+begin_gateway() {  # OPTIONS
+  "$bin/fdi-gateway" --domain "$domain" in --plant plant.toml "$@" --json \
+    >totals.json 2>gateway.log &
   gateway=$!
-  exec 3>pipe
-  local begin end ticks hwm
-  begin=$(date +%s.%N)
-  perl feed.pl "$1" "$seconds" $valves >&3
-  sleep 0.2
-  ticks=$(awk '{ print $14 + $15 }' "/proc/$gateway/stat")
-  hwm=$(awk '/VmHWM/ { print int($2 / 1024) }' "/proc/$gateway/status")
-  end=$(date +%s.%N)
+}
+# Ends the gateway, and says what came of WHAT from $begin to $end.
+report() {  # WHAT
+  local used hwm
+  used=$(($(ticks $gateway) - before))
+  hwm=$(peak_mb $gateway)
   exec 3>&-
-  wait "$gateway"
+  [[ $1 != MQTT* ]] || kill $gateway
+  wait $gateway
   gateway=
   stop
-  rm pipe
-  awk -v rate="$1" -v ticks="$ticks" -v hz="$(getconf CLK_TCK)" -v b="$begin" \
-    -v e="$end" -v hwm="$hwm" '
-    { gsub(/[",:]/, " ") } $1 ~ /^(readings|samples|late|not_sent)$/ { n[$1] = $2 }
-    END { s = e - b
-      printf "%s readings/s asked: %d in %.1f s, %.1f %% of a core, %d MB, " \
-        "%d samples, %d late, %d not sent\n", rate ? rate : "all", n["readings"],
-        s, 100 * ticks / hz / s, hwm, n["samples"], n["late"], n["not_sent"] }
-  ' totals.json
+  echo "$1: $(awk '{ gsub(/[",:]/, " ") }
+    $1 ~ /^(readings|samples|late|not_sent)$/ { printf "%s %d, ", $1, $2 }' totals.json
+  )gateway $(share $used $begin $end), $hwm MB"
 }
-for rate in 1800 10000 0; do measure $rate; done
+by_lines() {  # READINGS a second
+  start
+  mkfifo -m 600 pipe
+  begin_gateway --lines pipe
+  exec 3>pipe
+  before=0 begin=$(date +%s.%N)
+  perl feed.pl "$1" "$seconds" $valves >&3
+  sleep 0.2
+  end=$(date +%s.%N)
+  report "lines, ${1/#0/as many as go} readings/s for $(awk "BEGIN { printf \"%.1f\", $end - $begin }") s"
+  rm pipe
+}
+by_mqtt() {  # READINGS a second
+  printf 'listener %s 127.0.0.1\nallow_anonymous true\nuser %s\nmax_queued_messages 0\n' \
+    $port "$(id -un)" >broker.conf
+  mosquitto -c broker.conf >mosquitto.log 2>&1 &
+  broker=$!
+  start
+  begin_gateway --mqtt "mqtt://127.0.0.1:$port"
+  await broker_connected gateway.log
+  before=$(ticks $gateway) begin=$(date +%s.%N)
+  perl feed.pl "$1" "$seconds" $valves $port
+  sleep 1
+  end=$(date +%s.%N)
+  report "MQTT, $1 readings/s for $seconds s"
+  kill $broker
+  wait $broker || true
+  broker=
+}
+by_opcua() {
+  local used lag
+  cp "$tree/gateway/opcua/client.mjs" "$tree/tests/gateway/plant_server.mjs" .
+  ln -s "$modules" node_modules
+  "$bin/fdi-simulator" run --no-publish --duration $((seconds + 120)) -o plant.csv \
+    --log-level error >/dev/null
+  node plant_server.mjs $port $valves 1 plant.csv 2>server.log &
+  server=$!
+  await ready server.log
+  start
+  mkfifo -m 600 pipe copy
+  begin_gateway --lines pipe
+  # How old a reading is when the client prints it.
+  perl -MTime::HiRes=time -MTime::Local -ne '
+    next unless /"t":"(\d+)-(\d+)-(\d+)T(\d+):(\d+):([\d.]+)Z","v"/ && $. > 3600;
+    my $lag = time - timegm(0, $5, $4, $3, $2 - 1, $1) - $6;
+    $sum += $lag; ++$n; $most = $lag if $lag > $most;
+    END { printf "%.2f s, at most %.2f s", $sum / $n, $most }' <copy >lag.txt &
+  lag=$!
+  FDI_GATEWAY=$bin/fdi-gateway node client.mjs plant.toml \
+    --endpoint "opc.tcp://127.0.0.1:$port" 2>client.log > >(exec tee copy >pipe) &
+  client=$!
+  await "$((6 * valves)) of" client.log
+  before=$(ticks $gateway) used=$(ticks $client) begin=$(date +%s.%N)
+  sleep "$seconds"
+  end=$(date +%s.%N)
+  used="$(share $(($(ticks $client) - used)) "$begin" "$end"), $(peak_mb $client) MB"
+  kill $client
+  wait $client || true
+  client=
+  wait $lag || true
+  report "OPC UA, $((6 * valves)) nodes at 1 Hz for $seconds s"
+  echo "  client $used; a reading is printed after $(cat lag.txt)"
+  kill $server
+  server=
+}
+way=${4:-}
+case ${way:-lines} in lines) for rate in 1800 10000 0; do by_lines $rate; done ;; esac
+case ${way:-mqtt} in
+mqtt) ! command -v mosquitto >/dev/null || for rate in 1800 10000; do by_mqtt $rate; done ;;
+esac
+[ -z "$modules" ] || case ${way:-opcua} in opcua) by_opcua ;; esac
