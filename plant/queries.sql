@@ -59,7 +59,8 @@ SELECT e.episode_id, e.valve_id, e.source_id, e.detected_ns, e.isolated_ns,
   e.cleared_ns, e.ended_ns, e.end_reason, e.fault, e.fault_bits, e.peak_factor,
   e.strength, e.unknown_kind, e.layer, e.model_set, e.model_hash, e.flow_unit,
   e.channels, e.faults, e.label, e.acked_by, e.acked_ns, e.session_id,
-  e.lowest, e.highest, e.priority, e.worst_strength, e.unconfirmed_ns, e.known
+  e.lowest, e.highest, e.priority, e.worst_strength, e.unconfirmed_ns, e.known,
+  e.certainty, e.look_alikes
 FROM (SELECT DISTINCT key FROM batch
       WHERE item IN ('episode', 'trace', 'strength')) c
   CROSS JOIN episode e ON e.episode_id = c.key
@@ -132,7 +133,7 @@ FROM batch c CROSS JOIN common_cause_member s ON s.cause_id = c.key
 WHERE c.item = 'cause'
 -- All of them, with every batch: they are few, and change with a session.
 -- name: fault_name
-SELECT fault, name FROM fault_name
+SELECT fault, name, description FROM fault_name
 -- Episodes that went to another monitor with their valve, and when.
 -- name: moved
 SELECT key, part FROM batch WHERE item = 'moved'
@@ -296,16 +297,14 @@ SELECT * FROM (
     e.highest, e.worst_strength,
     e.priority, e.unconfirmed_ns, plain_name(e.monitor_id, e.fault),
     ack_comment(e.monitor_id, e.episode_id, e.acked_by, e.acked_ns),
-    (SELECT nullif(s.value, 'none') FROM episode_event s
-     WHERE (s.episode_id, s.monitor_id) = (e.episode_id, e.monitor_id)
-       AND s.kind = 'SECOND'
-     ORDER BY s.stamp_ns DESC LIMIT 1),
+    second(e.monitor_id, e.episode_id),
     (SELECT CASE WHEN a.layer = 'audit' AND a.end_reason = 'superseded'
        THEN a.fault END
      FROM episode a
      WHERE (a.valve_id, a.monitor_id) = (e.valve_id, e.monitor_id)
        AND a.detected_ns < e.detected_ns
      ORDER BY a.detected_ns DESC LIMIT 1), l.rival, l.times, l.observers,
+    description(e.monitor_id, e.fault),
     e.host, e.monitor
   FROM episode e LEFT JOIN episode_look l
     ON (l.episode_id, l.monitor_id) = (e.episode_id, e.monitor_id)

@@ -60,6 +60,8 @@ CREATE TABLE fdi.episode (
   channels text COLLATE "C" NOT NULL,
   faults text COLLATE "C" NOT NULL,
   known text COLLATE "C" NOT NULL,
+  certainty text COLLATE "C" NOT NULL DEFAULT 'not yet',
+  look_alikes text COLLATE "C",
   label text COLLATE "C",
   acked_by text COLLATE "C",
   acked_ns bigint,
@@ -196,6 +198,7 @@ CREATE TABLE fdi.fault_name (
   monitor_id bigint NOT NULL,
   fault text COLLATE "C" NOT NULL,
   name text COLLATE "C" NOT NULL,
+  description text COLLATE "C",
   PRIMARY KEY (monitor_id, fault)
 );
 CREATE TABLE fdi.common_cause (
@@ -357,6 +360,23 @@ LANGUAGE sql STABLE AS $$
   WHERE n.monitor_id = $1 AND strpos('|' || $2 || '|', '|' || n.fault || '|') > 0
 $$;
 
+-- Likewise their technical names.
+CREATE FUNCTION fdi.description(monitor bigint, fault text) RETURNS text
+LANGUAGE sql STABLE AS $$
+  SELECT string_agg(n.description, ' or '
+    ORDER BY strpos('|' || $2 || '|', '|' || n.fault || '|'))
+  FROM fdi.fault_name n
+  WHERE n.monitor_id = $1 AND strpos('|' || $2 || '|', '|' || n.fault || '|') > 0
+$$;
+
+-- What came on top of the fault of an episode and is not over.
+CREATE FUNCTION fdi.second(monitor bigint, episode text) RETURNS text
+LANGUAGE sql STABLE AS $$
+  SELECT nullif(s.value, 'none') FROM fdi.episode_event s
+  WHERE s.monitor_id = $1 AND s.episode_id = $2 AND s.kind = 'SECOND'
+  ORDER BY s.stamp_ns DESC LIMIT 1
+$$;
+
 -- The comment of the acknowledgement by `who` at `acked_ns`.
 CREATE FUNCTION fdi.ack_comment(monitor bigint, episode text, who text,
                                 acked_ns bigint) RETURNS text
@@ -413,7 +433,10 @@ SELECT e.episode_id, e.valve_id, fdi.utc(e.detected_ns) AS detected_utc,
     ELSE 'NORMAL'
   END AS alarm_state,
   fdi.utc(fdi.shelved_until(e.monitor_id, e.valve_id, e.fault))
-    AS shelved_until_utc
+    AS shelved_until_utc,
+  fdi.utc(e.ended_ns) AS ended_utc, e.certainty, e.look_alikes,
+  fdi.second(e.monitor_id, e.episode_id) AS second,
+  fdi.description(e.monitor_id, e.fault) AS description
 FROM fdi.episode e;
 
 -- A day that is no date does not end the view.
@@ -423,6 +446,14 @@ SELECT c.valve_id,
     THEN date '1970-01-01' + c.day::integer END AS day_utc, c.quality,
   c.samples, c.seconds / 3600 AS hours, m.host, m.monitor
 FROM fdi.coverage_day c JOIN fdi.monitor m USING (monitor_id);
+
+-- An hour that is no time is left out.
+CREATE VIEW fdi.judged_hours AS
+SELECT h.valve_id, fdi.utc(h.hour * 3600000000000) AS hour_utc,
+  sum(h.live_ms) / 3600000.0 AS hours, m.host, m.monitor
+FROM fdi.health_hour h JOIN fdi.monitor m USING (monitor_id)
+WHERE h.hour BETWEEN -613608 AND 1577832
+GROUP BY h.valve_id, h.hour, m.host, m.monitor;
 
 CREATE VIEW fdi.model_summary AS
 SELECT s.model_set, s.version, fdi.utc(s.created_ns) AS created_utc,

@@ -203,7 +203,8 @@ Json EpisodeJson(const Alarm& alarm) {
       {"alarm_state", AlarmStateName(alarm.state)},
       {"shelved_until_utc",
        alarm.shelf ? TimeJson(alarm.shelf->until_ns) : Json()},
-      {"second", TextJson(episode.second)}};
+      {"second", TextJson(episode.second)},
+      {"description", TextJson(episode.description)}};
 }
 
 Json ShelfJson(const Shelf& shelf) {

@@ -3,7 +3,13 @@
 #include <cmath>
 #include <cstdio>
 
+#include "base/text.h"
+#include "storage/history/sql.h"
+
 namespace fdi::storage {
+
+namespace sql = history_sql;
+
 namespace {
 
 // "f6 or f18"
@@ -76,6 +82,23 @@ std::vector<std::string> LookAlikesOf(const Episode& episode) {
   return LookAlikesBeside(episode.fault.value_or(""),
                           ParseLayer(episode.layer.value_or("")),
                           episode.strength, episode.known);
+}
+
+void StoreCertainty(Database& database, const std::string& episode_id) {
+  Episode episode;
+  Statement& row = database.Cached(sql::what_is_certain).Bind(episode_id);
+  if (!row.Step()) {
+    return;
+  }
+  row.Read(0, episode.fault, episode.unknown_kind, episode.layer,
+           episode.peak_factor, episode.strength, episode.known, episode.audit);
+  row.Reset();
+  const std::string look_alikes = JoinText(LookAlikesOf(episode), "|");
+  database.Cached(sql::set_certainty)
+      .Bind(CertaintyName(CertaintyOf(episode)),
+            look_alikes.empty() ? std::nullopt : std::optional(look_alikes),
+            episode_id)
+      .Run();
 }
 
 std::string_view NoNameText(const Episode& episode) {

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "diagnosis/decision/certainty.h"
+#include "storage/database/database.h"
 #include "storage/history/episode.h"
 
 namespace fdi::storage {
@@ -20,6 +21,9 @@ std::vector<std::string> LookAlikesOf(const Episode& episode);
 /// explains it 40 times better than f19, the observers are undecided; the audit
 /// of its loop says: the valve sticks". Empty where the observers alone speak.
 std::string WitnessText(const Episode& episode);
+/// Stores both for the view fault_history, after a change of what they depend
+/// on.
+void StoreCertainty(Database& database, const std::string& episode_id);
 
 /// What stands in the place of a name, as in the view fault_history; empty for
 /// an episode that has a name or is unlike any known fault.

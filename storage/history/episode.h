@@ -95,6 +95,8 @@ struct Episode {
   std::optional<std::string> rival;
   std::optional<double> rival_times;
   std::optional<std::string> observers;
+  /// The technical name of the fault, as the paper has it; likewise.
+  std::optional<std::string> description;
 };
 
 /// Whether its faults have a name, and with it a strength.
@@ -165,7 +167,7 @@ FDI_FIELDS(fdi::storage::Episode, episode_id, valve_id, detected_utc,
            strength, unknown_kind, layer, flow_unit, channels, faults, known,
            lowest, highest, worst_strength, priority, unconfirmed_ns,
            fault_name, ack_comment, second, audit, rival, rival_times,
-           observers)
+           observers, description)
 
 FDI_FIELDS(fdi::storage::MonitorSession, session_id, start_ns, alive_ns,
            stop_ns, clean, software, config)

@@ -12,6 +12,7 @@
 #include "diagnosis/decision/certainty.h"
 #include "diagnosis/model/fault_catalogue.h"
 #include "storage/database/record.h"
+#include "storage/history/certainty.h"
 #include "storage/history/episode.h"
 #include "storage/history/health.h"
 #include "storage/history/history_database.h"
@@ -174,6 +175,12 @@ FaultCandidate ParseCandidate(const std::string& text) {
   return candidate;
 }
 
+// As the catalogue of faults has it; a finding of the floor has none.
+std::optional<std::string_view> DescriptionOf(std::string_view name) {
+  const std::optional<int> fault = ParseFault(name);
+  return fault ? std::optional(FaultFactsOf(*fault).description) : std::nullopt;
+}
+
 // To be published again as it is published now, should nobody acknowledge it.
 void StoreUnsent(Database& database, const FaultEvent& event) {
   std::vector<std::string> candidates;
@@ -240,6 +247,7 @@ bool StoreEvent(Database& database, const Entry& entry,
               entry.id)
         .Run();
   }
+  StoreCertainty(database, entry.id);
   return true;
 }
 
@@ -398,7 +406,8 @@ SessionStart HistoryWriter::BeginSession(
   start.session_id = database_.LastInsertRowid();
   for (const auto& [fault, name] : fault_names) {
     database_.Cached(sql::put_fault_name)
-        .Bind(ParseFinding(fault).value_or(0), fault, name)
+        .Bind(ParseFinding(fault).value_or(0), fault, name,
+              DescriptionOf(fault))
         .Run();
   }
   transaction.Commit();

@@ -12,14 +12,12 @@ SELECT v.episode_id, v.valve_id, v.detected_utc, v.isolated_utc,
    WHERE t.episode_id = e.episode_id), e.session_id, e.fault_bits, e.strength,
   e.unknown_kind, e.layer, e.flow_unit, e.channels, e.faults,
   e.known, e.lowest, e.highest, e.worst_strength,
-  e.priority, e.unconfirmed_ns, v.fault_name, v.ack_comment,
-  (SELECT nullif(s.value, 'none') FROM episode_event s
-   WHERE s.episode_id = e.episode_id AND s.kind = 'SECOND'
-   ORDER BY s.stamp_ns DESC LIMIT 1),
+  e.priority, e.unconfirmed_ns, v.fault_name, v.ack_comment, v.second,
   (SELECT CASE WHEN a.layer = 'audit' AND a.end_reason = 'superseded'
      THEN a.fault END
    FROM episode a WHERE a.valve_id = e.valve_id AND a.detected_ns < e.detected_ns
-   ORDER BY a.detected_ns DESC LIMIT 1), l.rival, l.times, l.observers
+   ORDER BY a.detected_ns DESC LIMIT 1), l.rival, l.times, l.observers,
+  v.description
 FROM episode e CROSS JOIN fault_history v USING (episode_id)
   LEFT JOIN episode_look l ON l.episode_id = e.episode_id
 WHERE
@@ -145,6 +143,16 @@ WHERE valve_id = ?2 AND unconfirmed_ns IS NOT NULL
 -- name: end_by_hand
 UPDATE episode SET unconfirmed_ns = NULL
 WHERE episode_id = ?1 AND unconfirmed_ns IS NOT NULL
+-- name: what_is_certain
+SELECT e.fault, e.unknown_kind, e.layer, e.peak_factor, e.strength, e.known,
+  (SELECT CASE WHEN a.layer = 'audit' AND a.end_reason = 'superseded'
+     THEN a.fault END
+   FROM episode a WHERE a.valve_id = e.valve_id AND a.detected_ns < e.detected_ns
+   ORDER BY a.detected_ns DESC LIMIT 1)
+FROM episode e WHERE e.episode_id = ?
+-- name: set_certainty
+UPDATE episode SET certainty = ?1, look_alikes = ?2
+WHERE episode_id = ?3 AND (certainty, look_alikes) IS NOT (?1, ?2)
 -- name: raise_peak
 UPDATE episode SET peak_factor = max(peak_factor, ?1)
 WHERE episode_id = ?2 AND peak_factor < ?1
@@ -261,8 +269,9 @@ UPDATE monitor_session SET stop_ns = alive_ns, clean = 0 WHERE stop_ns IS NULL
 INSERT INTO monitor_session (start_ns, alive_ns, software, config)
 VALUES (?1, ?1, ?2, ?3)
 -- name: put_fault_name
-INSERT INTO fault_name (number, fault, name) VALUES (?, ?, ?)
-ON CONFLICT (number) DO UPDATE SET fault = excluded.fault, name = excluded.name
+INSERT INTO fault_name (number, fault, name, description) VALUES (?, ?, ?, ?)
+ON CONFLICT (number) DO UPDATE SET fault = excluded.fault, name = excluded.name,
+  description = excluded.description
 -- name: insert_next_session
 INSERT INTO monitor_session (start_ns, alive_ns, software, config)
 SELECT ?1, ?1, software, config FROM monitor_session WHERE session_id = ?2

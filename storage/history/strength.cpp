@@ -5,6 +5,7 @@
 
 #include "base/error.h"
 #include "diagnosis/model/fault_catalogue.h"
+#include "storage/history/certainty.h"
 #include "storage/history/history_reader.h"
 #include "storage/history/history_writer.h"
 #include "storage/history/sql.h"
@@ -36,6 +37,7 @@ void HistoryWriter::StoreStrength(const StrengthPoint& point) {
       StoreStrengthNow(database_, id,
                        {point.strength, point.lowest, point.highest},
                        point.severity);
+      StoreCertainty(database_, id);
     }
   });
 }

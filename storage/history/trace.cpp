@@ -7,6 +7,7 @@
 
 #include "base/error.h"
 #include "storage/database/bytes.h"
+#include "storage/history/certainty.h"
 #include "storage/history/episode.h"
 #include "storage/history/history_database.h"
 #include "storage/history/sql.h"
@@ -296,6 +297,9 @@ void TraceWriter::StoreBuffer(std::uint64_t episode_id, const Buffer& buffer) {
   // The peak in the file only rises here, because the instants of full chunks
   // are no longer in the buffer.
   database_.Cached(sql::raise_peak).Bind(Peak(buffer), id).Run();
+  if (database_.Changes() > 0) {
+    StoreCertainty(database_, id);
+  }
 }
 
 void TraceWriter::DiscardCommitted() {

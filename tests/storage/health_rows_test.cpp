@@ -116,6 +116,11 @@ TEST_F(HealthRowsTest, MinutesOfAnHourAddUpExactly) {
   }
 
   EXPECT_EQ(Stored(), std::vector<HealthHour>{whole});
+  Statement view =
+      writer_.database().Prepare("SELECT hour_utc, hours FROM judged_hours");
+  ASSERT_TRUE(view.Step());
+  EXPECT_EQ(view.Text(0), "1970-01-01T07:00:00Z");
+  EXPECT_DOUBLE_EQ(view.Double(1), static_cast<double>(whole.live_ms) / 3.6e6);
 }
 
 TEST_F(HealthRowsTest, HoursComeByTimeWithinTheWindow) {

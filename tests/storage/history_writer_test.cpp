@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 
 #include "base/error.h"
+#include "base/text.h"
 #include "storage/history/certainty.h"
 #include "tests/storage/history_fixture.h"
 
@@ -42,13 +43,41 @@ TEST_F(HistoryWriterTest, ViewHasTheColumnsOfTheContractInOrder) {
     columns.push_back(row.ColumnName(c));
   }
 
-  EXPECT_THAT(columns,
-              ElementsAre("episode_id", "valve_id", "detected_utc",
-                          "isolated_utc", "cleared_utc", "fault", "peak_factor",
-                          "model_set", "end_reason", "label", "acked_by",
-                          "strength", "worst_strength", "severity", "priority",
-                          "unconfirmed_utc", "fault_name", "acked_utc",
-                          "ack_comment", "alarm_state", "shelved_until_utc"));
+  EXPECT_THAT(
+      columns,
+      ElementsAre("episode_id", "valve_id", "detected_utc", "isolated_utc",
+                  "cleared_utc", "fault", "peak_factor", "model_set",
+                  "end_reason", "label", "acked_by", "strength",
+                  "worst_strength", "severity", "priority", "unconfirmed_utc",
+                  "fault_name", "acked_utc", "ack_comment", "alarm_state",
+                  "shelved_until_utc", "ended_utc", "certainty", "look_alikes",
+                  "second", "description"));
+}
+
+TEST_F(HistoryWriterTest, ViewSaysHowCertainANameIsAndWhenItEnded) {
+  const std::string certain =
+      "SELECT certainty || ' ' || ifnull(look_alikes, '-') || ' ' ||"
+      " ifnull(second, '-') || ' ' || ifnull(ended_utc, '-')"
+      " FROM fault_history";
+  HistoryWriter writer(path_);
+  writer.Record(Event(Kind::kDetected, 0, 0, 0.3), kDetected);
+  EXPECT_EQ(Sql(certain), "not yet - - -");
+  FaultEvent outside = Event(Kind::kReisolated, 10, 0, 0.3);
+  outside.transition.unknown = Unknown::kOutsideKnown;
+  writer.Record(outside, kDetected);
+  EXPECT_EQ(Sql(certain), "not known - - -");
+  writer.Record(Event(Kind::kIsolated, 20, 0b101, 0.8), kDetected);
+  EXPECT_EQ(Sql(certain), "one of - - -");
+  writer.Record(Event(Kind::kReisolated, 30, 0b100, 0.8), kDetected);
+  const Episode episode = HistoryReader(path_).Show("last");
+  EXPECT_EQ(Sql("SELECT certainty FROM fault_history"),
+            CertaintyName(CertaintyOf(episode)));
+  EXPECT_EQ(Sql("SELECT ifnull(look_alikes, '') FROM fault_history"),
+            JoinText(LookAlikesOf(episode), "|"));
+  writer.Record(Event(Kind::kClosed, 40, 0b100, 0.1, EndReason::kCleared),
+                kDetected);
+  EXPECT_EQ(Sql("SELECT ended_utc FROM fault_history"),
+            "2026-11-20T14:56:51.000Z");
 }
 
 TEST_F(HistoryWriterTest, ViewHasTheNamesOfTheMonitorThatStartedLast) {
@@ -58,6 +87,9 @@ TEST_F(HistoryWriterTest, ViewHasTheNamesOfTheMonitorThatStartedLast) {
   RecordEpisode(writer, 0b101);
   EXPECT_EQ(Sql("SELECT fault || ': ' || fault_name FROM fault_history"),
             "f1|f19: Blocked or Flow wrong");
+
+  EXPECT_EQ(Sql("SELECT description FROM fault_history"),
+            "valve clogging or flow sensor fault");
 
   writer.BeginSession(kDetected, "test", "", {{"f1", "Travel blocked"}});
   EXPECT_EQ(Sql("SELECT fault_name FROM fault_history"),

@@ -147,9 +147,8 @@ class PlantFixture : public HistoryFixture {
                "episode_id, valve_id, source_id, detected_ns, isolated_ns, "
                "cleared_ns, ended_ns, end_reason, fault, fault_bits, "
                "peak_factor, strength, unknown_kind, layer, model_set, "
-               "model_hash, flow_unit, channels, faults, known, label, "
-               "acked_by, "
-               "acked_ns, session_id",
+               "model_hash, flow_unit, channels, faults, known, certainty, "
+               "look_alikes, label, acked_by, acked_ns, session_id",
                "episode_id"},
           {"episode_fault",
            "episode_id, fault, fault_bit, first_ns, held, detected_ns",
@@ -193,7 +192,7 @@ class PlantFixture : public HistoryFixture {
           {"common_cause_member",
            "cause_id, episode_id, valve_id, fault, isolated_ns",
            "cause_id, episode_id"},
-          {"fault_name", "fault, name", "fault"}}) {
+          {"fault_name", "fault, name, description", "fault"}}) {
       std::string there(pair.columns);
       for (std::size_t at = 0; (at = there.find("HEX(", at)) != there.npos;) {
         const std::size_t end = there.find(')', at);
@@ -224,7 +223,8 @@ class PlantFixture : public HistoryFixture {
                     "priority, " +
                     utc("unconfirmed_utc") + ", fault_name, " +
                     utc("acked_utc") + ", ack_comment, alarm_state, " +
-                    utc("shelved_until_utc") +
+                    utc("shelved_until_utc") + ", " + utc("ended_utc") +
+                    ", certainty, look_alikes, second, description" +
                     " FROM fdi.fault_history WHERE "
                     "monitor = '" +
                     monitor + "' ORDER BY episode_id"));

@@ -13,7 +13,21 @@ CREATE INDEX episode_returned ON episode (detected_ns, valve_id)
          (end_reason NOT IN ('stream_ended', 'stale_timeout', 'unknown')
           AND NOT (end_reason = 'superseded'
                    AND coalesce(layer, '') = 'audit')));
-DROP VIEW fault_history;
+-- How certain the name of an episode is, and what looks the same, as
+-- CertaintyOf() and LookAlikesOf() of certainty.h say; what faults are called
+-- technically. Episodes of before have no look-alikes.
+ALTER TABLE episode ADD COLUMN certainty TEXT NOT NULL DEFAULT 'not yet';
+ALTER TABLE episode ADD COLUMN look_alikes TEXT;  -- Joined by |; NULL: none.
+ALTER TABLE fault_name ADD COLUMN description TEXT;  -- NULL: no fault.
+UPDATE episode SET certainty = CASE
+  WHEN fault IS NULL OR fault = 'unknown'
+    THEN iif(unknown_kind = 'outside_known', 'not known', 'not yet')
+  WHEN instr(fault, '|') > 0 THEN 'one of'
+  WHEN fault GLOB '[fp][1-9]*'
+    AND peak_factor >= iif(layer = 'physics', 0.5, 0.9) THEN 'sure'
+  ELSE 'likely' END;
+
+DROP VIEW IF EXISTS fault_history;
 CREATE VIEW fault_history AS
 SELECT
   e.episode_id,
@@ -72,6 +86,23 @@ SELECT
    WHERE s.valve_id = e.valve_id AND s.until_ns > now.ns
      AND s.ended_ns IS NULL
      AND (s.planned_ns IS NULL OR s.from_ns <= now.ns)
-     AND (s.fault IS NULL OR s.fault = e.fault)) AS shelved_until_utc
+     AND (s.fault IS NULL OR s.fault = e.fault)) AS shelved_until_utc,
+  strftime('%Y-%m-%dT%H:%M:%S', e.ended_ns / 1000000000, 'unixepoch')
+    || printf('.%03dZ', e.ended_ns / 1000000 % 1000) AS ended_utc,
+  e.certainty,
+  e.look_alikes,
+  -- What came on top of the fault and is not over.
+  (SELECT nullif(s.value, 'none') FROM episode_event s
+   WHERE s.episode_id = e.episode_id AND s.kind = 'SECOND'
+   ORDER BY s.stamp_ns DESC LIMIT 1) AS second,
+  (SELECT group_concat(n.description, ' or ') FROM fault_name n NOT INDEXED
+   WHERE instr('|' || e.fault || '|', '|' || n.fault || '|') > 0)
+    AS description
 FROM episode e
 ORDER BY detected_utc, valve_id;
+
+-- The hours in which a valve was judged, with whatever models.
+CREATE VIEW judged_hours AS
+SELECT valve_id, strftime('%Y-%m-%dT%H:00:00Z', hour * 3600, 'unixepoch')
+    AS hour_utc, sum(live_ms) / 3600000.0 AS hours
+FROM health_hour GROUP BY valve_id, hour;

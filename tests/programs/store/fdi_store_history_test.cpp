@@ -60,7 +60,7 @@ TEST_F(FdiStoreHistoryTest, ListedEpisodesHaveTheColumnsOfTheView) {
           "end_reason", "label", "acked_by", "strength", "worst_strength",
           "severity", "priority", "unconfirmed_utc", "certainty", "look_alikes",
           "fault_name", "acked_utc", "ack_comment", "alarm_state",
-          "shelved_until_utc", "second", "witness"));
+          "shelved_until_utc", "second", "description", "witness"));
   EXPECT_EQ(episode["fault_name"], "Flashing or critical flow");
   EXPECT_EQ(episode["fault"], "f7");
   EXPECT_EQ(episode["detected_utc"], "2026-11-20T14:56:11.000Z");
