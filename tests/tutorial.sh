@@ -52,6 +52,10 @@ await() {  # SECONDS COMMAND...
   done
   fail "not within $1 s: ${*:2}"
 }
+is_up() {  # LOG of the service that was started last.
+  kill -0 "${services%% *}" || fail "a service has ended"
+  grep -sqE 'monitor_ready|server: ready|of [0-9]+ tags' "$1"
+}
 # A plant of 20 valves; the flow transmitter of the first one fails. Models of a
 # campaign stand in for those that `sh long` makes of 25 minutes of data.
 prepare_connect() {
@@ -112,7 +116,7 @@ for block in "$out"/[0-9][0-9].*; do
     grep -q '|' "$out/block" || sed -i '1s/^/exec /' "$out/block"
     bash "$out/block" &>"$log" &
     services="$! $services"
-    await 60 grep -sqE 'monitor_ready|server: ready|of [0-9]+ tags' "$log"
+    await 60 is_up "$log"
     ;;
   esac
 done
