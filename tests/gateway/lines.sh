@@ -12,11 +12,6 @@ finish() {
   rm -rf "$work"
 }
 trap finish EXIT
-await() {  # SECONDS COMMAND...
-  timeout "$1" bash -c 'until "$@"; do sleep 0.1; done' await "${@:2}" ||
-    fail "not within $1 s: ${*:2}"
-}
-export -f history
 valves="V1 V2 V3"
 
 "$bin/fdi-trainer" train --campaign "$tests/survival/quick.toml" \

@@ -19,17 +19,11 @@ finish() {
   rm -rf "$work"
 }
 trap finish EXIT
-await() {  # SECONDS COMMAND...
-  timeout "$1" bash -c 'until "$@" >/dev/null; do sleep 0.1; done' await "${@:2}" ||
-    fail "not within $1 s: ${*:2}"
-}
 port=$((15000 + domain)) # No ephemeral one, nor one of a test's domain.
 export FDI_GATEWAY=$bin/fdi-gateway FDI_STORE=$bin/fdi-store
 cp "$tests"/../gateway/opcua/*.mjs "$tests/gateway/opcua.mjs" .
 ln -s "$modules" node_modules
 shows() { node alarm_client.mjs --endpoint "opc.tcp://127.0.0.1:$port" list 2>/dev/null | grep "$1"; }
-export -f shows
-export port
 client() { node opcua.mjs $port "$@" 2>client.log; }
 alarms() { node alarm_client.mjs --endpoint "opc.tcp://127.0.0.1:$port" "$@" 2>client.log; }
 serve() {  # OPTIONS
@@ -64,6 +58,7 @@ V1/Fault BadNoData
 END
 client follow V2/DeviceHealth 600 >health.txt &
 listener=$!
+await 60 test -s health.txt
 
 start --model-set quick
 run() {  # VALVE OPTIONS

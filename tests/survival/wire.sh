@@ -34,13 +34,6 @@ finish() {
   rm -rf "$work"
 }
 trap finish EXIT
-await() {  # SECONDS COMMAND...
-  for _ in $(seq $((5 * $1))); do
-    ! "${@:2}" >/dev/null 2>&1 || return 0
-    sleep 0.2
-  done
-  fail "not within $1 s: ${*:2}"
-}
 set -m
 launch() {  # NAME: a group of processes that write NAME.log.
   "run_$1" >>"$1.log" 2>&1 &

@@ -16,6 +16,13 @@ fail() {
   cat ./*.log >&2
   exit 1
 }
+await() {  # SECONDS COMMAND...
+  for _ in $(seq $((5 * $1))); do
+    ! "${@:2}" >/dev/null 2>&1 || return 0
+    sleep 0.2
+  done
+  fail "not within $1 s: ${*:2}"
+}
 history() { sqlite3 -readonly "$FDI_DATA/history.db" "$1"; }
 start() {  # OPTIONS
   : >monitor.log
