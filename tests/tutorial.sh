@@ -46,11 +46,11 @@ adapt() {
     -e "s#\(^\|| \)\(fdi-monitor\|fdi-simulator\|fdi-gateway\) #&--domain $domain #"
 }
 await() {  # SECONDS COMMAND...
-  for _ in $(seq $((5 * $1))); do
-    ! "${@:2}" || return 0
+  local end=$((SECONDS + $1))
+  until "${@:2}"; do
+    [ $SECONDS -lt $end ] || fail "not within $1 s: ${*:2}"
     sleep 0.2
   done
-  fail "not within $1 s: ${*:2}"
 }
 is_up() {  # LOG of the service that was started last.
   kill -0 "${services%% *}" || fail "a service has ended"

@@ -17,11 +17,11 @@ fail() {
   exit 1
 }
 await() {  # SECONDS COMMAND...
-  for _ in $(seq $((5 * $1))); do
-    ! "${@:2}" >/dev/null 2>&1 || return 0
+  local end=$((SECONDS + $1))
+  until "${@:2}" >/dev/null 2>&1; do
+    [ $SECONDS -lt $end ] || fail "not within $1 s: ${*:2}"
     sleep 0.2
   done
-  fail "not within $1 s: ${*:2}"
 }
 history() { sqlite3 -readonly "$FDI_DATA/history.db" "$1"; }
 start() {  # OPTIONS
