@@ -206,7 +206,7 @@ class Trees:
             print("its training data have no faults to learn from")
             sys.exit(77)
         self.model = self.make().fit(rows, names)
-        # What it says of healthy blocks that it was not grown on.
+        # Its answers on healthy blocks that it was not grown on.
         healthy = names == "f0"
         odds = np.zeros(len(names))
         folds = np.unique(blocks, return_inverse=True)[1] % 5
@@ -286,7 +286,7 @@ def fit(options):
     model.limits = np.array([limit(one, options.per_hour / len(series))
                              for one in series])
     if isinstance(model, Trees):
-        # What their probabilities cannot reach would be no limit.
+        # A limit that their probabilities cannot reach is none.
         model.limits = np.minimum(model.limits, max(map(max, series[0])))
     hours = sum(len(one) for one in series[0]) / 3600
     print(f"{options.method}: limits {model.limits} from {hours:.2f} h")

@@ -137,7 +137,7 @@ make_set() {  # SET
   esac
 }
 
-# What a set was trained on, into `training`.
+# Writes the runs on which a set was trained into `training`.
 training_of() {  # SET
   case $1 in
     paper)

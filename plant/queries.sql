@@ -303,7 +303,8 @@ SELECT * FROM (
      FROM episode a
      WHERE (a.valve_id, a.monitor_id) = (e.valve_id, e.monitor_id)
        AND a.detected_ns < e.detected_ns
-     ORDER BY a.detected_ns DESC LIMIT 1), l.rival, l.times, l.observers,
+       AND utc(a.detected_ns) <= utc(e.detected_ns)
+     ORDER BY utc(a.detected_ns) DESC, a.detected_ns DESC LIMIT 1), l.rival, l.times, l.observers,
     description(e.monitor_id, e.fault),
     e.host, e.monitor
   FROM episode e LEFT JOIN episode_look l

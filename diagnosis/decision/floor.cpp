@@ -39,12 +39,15 @@ void RodBand::Step(double command) {
   wait_ = resting_ && wait_ > 0 && std::abs(target - slow_) > kStop ? wait_ - 1
                                                                     : wait_;
   const bool leaves = !resting_ || wait_ == 0;
-  const FloorLimits::Rod slow =
-      leaves ? limits_->slow : FloorLimits::Rod{0.0, 0.0};
-  highest_ = NextRodPosition(target > highest_ ? limits_->quick : slow,
-                             highest_, target);
-  lowest_ = NextRodPosition(target < lowest_ ? limits_->quick : slow, lowest_,
-                            target);
+  // An end of the range stands with the rod only where the rod rests.
+  const auto inwards = [&](double end) {
+    return leaves || std::abs(end - slow_) > kStop ? limits_->slow
+                                                   : FloorLimits::Rod{0.0, 0.0};
+  };
+  highest_ = NextRodPosition(
+      target > highest_ ? limits_->quick : inwards(highest_), highest_, target);
+  lowest_ = NextRodPosition(
+      target < lowest_ ? limits_->quick : inwards(lowest_), lowest_, target);
   if (leaves) {
     slow_ = NextRodPosition(limits_->slow, slow_, target);
     resting_ = slow_ < kStop || slow_ > 100.0 - kStop;
@@ -54,7 +57,7 @@ void RodBand::Step(double command) {
 }
 
 double RodBand::Beyond(double x) const {
-  return x - std::clamp(x, lowest_, highest_);
+  return x - std::max(std::min(x, highest_), std::min(lowest_, highest_));
 }
 
 double FlowShapeAt(const FloorLimits& floor, double x) {

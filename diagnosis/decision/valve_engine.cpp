@@ -305,7 +305,10 @@ bool ValveEngine::Impl::Mend(const Checked& checked, bool begins,
   if (models().position_as_command && (unusable & MaskOf(Signal::kX)) != 0) {
     unusable = (unusable & ~MaskOf(Signal::kX)) | MaskOf(Signal::kCv);
   }
-  unusable |= present_ & ~trained.present;
+  // A signal that the last sample did not have has no reading to be held.
+  trained.present =
+      static_cast<SignalMask>(trained.present & ~(unusable & ~present_));
+  unusable = (unusable & present_) | (present_ & ~trained.present);
   return bridge_.Mend(static_cast<SignalMask>(unusable),
                       diagnosis_->lone.judged(), trained) ||
          checked.unusable == 0;

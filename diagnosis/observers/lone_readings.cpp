@@ -102,7 +102,8 @@ LoneReadings::Sides LoneReadings::Confirmed(Sides held, std::int64_t stamp_ns) {
 
 bool LoneReadings::Doubted(Sides sides, std::int64_t stamp_ns) const {
   for (std::size_t c = 0; sides != 0 && c < now_.size(); ++c) {
-    if ((sides & SidesOf(c)) != 0 && stamp_ns < doubted_until_ns_[c]) {
+    if ((sides & SidesOf(c)) != 0 && stamp_ns < doubted_until_ns_[c] &&
+        doubted_until_ns_[c] - kDoubtNs <= stamp_ns) {
       return true;
     }
   }

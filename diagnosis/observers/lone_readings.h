@@ -84,7 +84,7 @@ class LoneReadings {
   std::array<SignalMask, kMaxChannels> doubtful_{};  // if the channel is lone
   Sample judged_;
   std::size_t held_count_{0};  // of last_held_, in a row
-  Sides beyond_{0};  // at the last reading of each channel
+  Sides beyond_{0};            // at the last reading of each channel
   Sides held_{0};
   bool has_past_{false};
   std::array<double, kMaxChannels> residuals_;

@@ -148,6 +148,15 @@ TEST(FloorTest, ARodMayMoveFasterOneWay) {
   }
 }
 
+// A step that is taken back does not excuse where the rod is long after it.
+TEST(FloorTest, TheRangeAfterAStepThatIsTakenBackEnds) {
+  EXPECT_NE(FirstFindings([](int k) {
+              const double x = k < 23 ? 50.0 : 90.0;
+              return Valve{k >= 20 && k < 23 ? 90.0 : 50.0, x, Passes(x)};
+            }),
+            kNothing);
+}
+
 // Nor is a rod that rests at its stop until its chamber is filled.
 TEST(FloorTest, BreakawayFromAStopIsNoFinding) {
   for (const int start : {0, 60}) {

@@ -98,6 +98,22 @@ TEST(ValveEngineIntakeTest, ASingleUnusableReadingIsBridged) {
   }
 }
 
+// The place of an absent signal may hold anything.
+TEST(ValveEngineIntakeTest, AnUnusableFirstReadingIsNotBridged) {
+  ValveEngine engine(SharedPlant());
+  StepRange(engine, 0, 50, [](Sample& sample) {
+    sample.Set(Signal::kF, std::numeric_limits<double>::quiet_NaN());
+    sample.present =
+        static_cast<SignalMask>(sample.present & ~MaskOf(Signal::kF));
+  });
+  StepRange(engine, 50, 51, [](Sample& sample) {
+    sample.quality[Index(Signal::kF)] = SignalQuality::kBad;
+  });
+  const Seen first = StepRange(engine, 51, 52);
+  EXPECT_TRUE(first.last.initialised);
+  EXPECT_TRUE(std::isfinite(first.last.residuals[1]));
+}
+
 TEST(ValveEngineIntakeTest, WhatIsUnusableForLongIsMissing) {
   ValveEngine engine(SharedPlant());
   StepRange(engine, 0, 50);

@@ -166,13 +166,13 @@ TEST_F(DatabaseTest, FailedMigrationLeavesTheOldVersion) {
   EXPECT_EQ(after.QueryInt64("SELECT id FROM t"), 4);
 }
 
-// The first script of a schema makes its baseline, whatever its number.
 TEST_F(DatabaseTest, AFullDiskIsNoNumber) {
   const SqliteError full(13, "database or disk is full in: COMMIT");
   EXPECT_THAT(full.what(), HasSubstr("the disk of the databases is full"));
   EXPECT_EQ(std::string(full.what()).find("13"), std::string::npos);
 }
 
+// The first script of a schema makes its baseline, whatever its number.
 TEST_F(DatabaseTest, VersionsBeforeTheBaselineAreRefusedAndLeftAlone) {
   { const Database old(file_, SchemaOf(1), Access::kWriter); }
   Schema schema{

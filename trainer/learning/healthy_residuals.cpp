@@ -63,7 +63,10 @@ class Reader {
       rejected_ = true;
       return Finish();
     }
-    if (verdict.initialised || std::exchange(rejected_, false)) {
+    // The engine bridges a signal that is missing once; this bank does not.
+    const bool other =
+        std::exchange(present_, sample.present) != sample.present;
+    if (verdict.initialised || other || std::exchange(rejected_, false)) {
       bank_.Initialise(sample);
       coverage_.StartSettling(sample.stamp_ns);
     }
@@ -106,7 +109,9 @@ class Reader {
   std::shared_ptr<const ModelSet> models_;
   std::string run_;
   HealthyResiduals* data_;
-  bool rejected_{false};  // The past of the bank lacks a sample.
+  bool rejected_{false};
+  SignalMask present_{
+      0};  // of the last sample taken  // The past of the bank lacks a sample.
   ObserverBank bank_;
   Coverage coverage_;
   ResidualStretch stretch_;

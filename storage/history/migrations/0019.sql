@@ -23,7 +23,7 @@ UPDATE episode SET certainty = CASE
   WHEN fault IS NULL OR fault = 'unknown'
     THEN iif(unknown_kind = 'outside_known', 'not known', 'not yet')
   WHEN instr(fault, '|') > 0 THEN 'one of'
-  WHEN fault GLOB '[fp][1-9]*'
+  WHEN (fault GLOB '[fp][1-9]*' OR fault IN ('stiction', 'no_response'))
     AND peak_factor >= iif(layer = 'physics', 0.5, 0.9) THEN 'sure'
   ELSE 'likely' END;
 
