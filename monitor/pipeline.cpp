@@ -49,6 +49,23 @@ std::string SignalNames(SignalMask signals) {
   return names;
 }
 
+// The valve that is not judged for longest stands for all.
+void CountUnjudged(const ValveMonitor& monitor, ValveCensus& census) {
+  const std::optional<std::int64_t> since_ns = monitor.unjudged_since_ns();
+  if (!since_ns) {
+    return;
+  }
+  if (census.unjudged++ > 0 && *since_ns >= census.unjudged_ns) {
+    return;
+  }
+  const Verdict& verdict = monitor.verdict();
+  const std::string reasons = CoverageReasonsName(verdict.uncovered);
+  census.unjudged_valve = monitor.id();
+  census.unjudged_ns = *since_ns;
+  census.unjudged_reason = QualityName(verdict.quality);
+  census.unjudged_reason += reasons.empty() ? "" : " " + reasons;
+}
+
 }  // namespace
 
 LookReport LookReportOf(const MonitorContext& context) {
@@ -547,6 +564,7 @@ void Pipeline::UpdateCensus(TimePoint now) {
     census.ended += monitor.ended() ? 1 : 0;
     census.open_episodes += monitor.episode_open() ? 1 : 0;
     census.trace_bytes += monitor.trace_bytes();
+    CountUnjudged(monitor, census);
     if (monitor.Contested(now) && census.contested++ == 0) {
       census.contested_valve = monitor.id();
     }

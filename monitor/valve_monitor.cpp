@@ -5,6 +5,8 @@
 #include <span>
 #include <utility>
 
+#include "base/time_units.h"
+
 namespace fdi::monitor {
 namespace {
 
@@ -15,6 +17,8 @@ constexpr double kStalePeriods = 3.0;
 // is stale, whichever is later.
 constexpr int kRivalSamples = 4;
 constexpr std::chrono::seconds kSourcePatience{60};
+// A valve that works settles, and is back where it was taught, within minutes.
+constexpr std::int64_t kUnjudgedPatienceNs = 10 * kNsPerMinute;
 constexpr double kTokensPerSample = 0.5;
 constexpr double kTokensPerSecond = 5.0;
 // Bounds of the period of a valve without a model set, measured from its
@@ -127,6 +131,7 @@ ValveOutcome ValveMonitor::Step(const Sample& sample, std::uint64_t writer,
   pending_.Request(decision_->TakeDue(), decision_->simulation());
   tracker_.Advance(sample, verdict, *models_, outlet);
   if (CountsAsTime(verdict)) {
+    RecordJudged(verdict);
     RecordPosition(sample);
     coverage_.Add(sample.stamp_ns, verdict.quality, 1,
                   verdict.intake == Intake::kAccepted);
@@ -255,6 +260,35 @@ void ValveMonitor::MeasurePeriod(std::int64_t stamp_ns) {
   unassigned_interval_ns_ = interval_ns;
 }
 
+// Ten minutes, or twice what settling and rearming take at a slow period.
+std::int64_t ValveMonitor::UnjudgedPatienceNs() const {
+  const int samples =
+      models_->decision.settling_samples + models_->validity.rearm_samples;
+  return std::max<std::int64_t>(
+      kUnjudgedPatienceNs,
+      std::llround(2e9 * samples * models_->sample_period_s));
+}
+
+// Before RecordPosition(): stamp_ns_ is that of the sample before. Somebody has
+// chosen another mode than AUTO. Behind a long silence, or a clock that was set
+// back, time begins anew.
+void ValveMonitor::RecordJudged(const Verdict& verdict) {
+  const std::int64_t moved = verdict.stamp_ns - stamp_ns_;
+  if (judged_ns_ == 0 || verdict.quality == Quality::kLive ||
+      verdict.quality == Quality::kInhibited || moved < 0 ||
+      moved > UnjudgedPatienceNs()) {
+    judged_ns_ = verdict.stamp_ns;
+  }
+}
+
+std::optional<std::int64_t> ValveMonitor::unjudged_since_ns() const {
+  if (!decision_ || judged_ns_ == 0 || stale_ || ended_ ||
+      stamp_ns_ - judged_ns_ <= UnjudgedPatienceNs()) {
+    return std::nullopt;
+  }
+  return judged_ns_;
+}
+
 // An alarm whose data ended stays until the valve is seen to be normal: for as
 // many samples as end an episode, once after each start or end of the stream.
 // What the audit found, the audit alone finds normal.
@@ -344,6 +378,7 @@ bool ValveMonitor::Adopt(const std::optional<EngineParts>& parts,
     unassigned_interval_ns_.reset();
     stamp_ns_ = 0;
   }
+  judged_ns_ = 0;
   pending_.Clear();
   required_ = parts ? parts->plan->required() : SignalMask{0};
   swapped_ = true;

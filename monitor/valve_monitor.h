@@ -112,6 +112,10 @@ class ValveMonitor {
   const Verdict& verdict() const {
     return decision_ ? decision_->verdict() : judge_.watch().verdict();
   }
+  /// Stamp of the last sample that was judged, or of the first one, of a valve
+  /// that sends, in AUTO, and is not judged for longer than its models need to
+  /// settle. Nothing: it is judged, or falls silent, or nothing judges it.
+  std::optional<std::int64_t> unjudged_since_ns() const;
   bool stale() const { return stale_; }
   bool ended() const { return ended_; }
   /// Its episode, if it had one, was closed for want of samples, and no sample
@@ -140,6 +144,8 @@ class ValveMonitor {
   TimePoint::duration SourcePatience() const;
   bool RestartsEngine(const Sample& sample) const;
   void RecordPosition(const Sample& sample);
+  void RecordJudged(const Verdict& verdict);
+  std::int64_t UnjudgedPatienceNs() const;
   void MeasurePeriod(std::int64_t stamp_ns);
   void Close(EndReason reason, EpisodeOutlet& outlet);
   void CloseAudit(EndReason reason, EpisodeOutlet& outlet);
@@ -163,7 +169,8 @@ class ValveMonitor {
   int rival_samples_{0};    // Of superseded sources, so many,
   TimePoint rival_at_;      // the last one then.
   std::uint64_t source_id_{0};
-  std::int64_t stamp_ns_{0};  // Of the last sample in order.
+  std::int64_t stamp_ns_{0};   // Of the last sample in order.
+  std::int64_t judged_ns_{0};  // Of the last one that was judged; 0: none yet.
   bool isolation_held_{false};
   // Normal samples since nothing was open here, up to what a valve needs to be
   // normal again.

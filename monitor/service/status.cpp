@@ -18,6 +18,7 @@
 
 #include "base/printable.h"
 #include "base/text.h"
+#include "base/time_text.h"
 
 namespace fdi::monitor {
 namespace {
@@ -221,6 +222,9 @@ std::vector<Measure> MeasuresOf(const StatusFacts& facts) {
        "by", "monitor", facts.contested.count},
       {"valves_two_publishers", "fdi_valves_contested", kGauge, "", "by",
        "publisher", census.contested},
+      {"", "fdi_valves_unjudged", kGauge,
+       "Valves that send in AUTO and have not been judged for ten minutes", "",
+       "", census.unjudged},
       {"open_episodes", "fdi_open_episodes", kGauge, "Fault episodes now", "",
        "", census.open_episodes},
       {"trace_bytes", "fdi_trace_bytes", kGauge,
@@ -270,6 +274,16 @@ idl::MonitorStatusMessage StatusOf(const StatusFacts& facts) {
       status.text +=
           " and " + std::to_string(facts.census.contested - 1) + " more valves";
     }
+  }
+  // Here and there one is outside of what it was taught.
+  if (10 * facts.census.unjudged > facts.census.valves) {
+    status.text += status.text.empty() ? "" : "; ";
+    status.text += "not judged: " + std::to_string(facts.census.unjudged) +
+                   " of " + std::to_string(facts.census.valves) +
+                   " valves, for longest " +
+                   Printable(facts.census.unjudged_valve) + " since " +
+                   FormatTime(facts.census.unjudged_ns, true) + " (" +
+                   facts.census.unjudged_reason + ")";
   }
   status.health =
       status.text.empty() ? idl::Health::kOk : idl::Health::kDegraded;

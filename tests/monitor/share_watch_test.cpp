@@ -88,17 +88,38 @@ TEST(MonitorNameTest, InContainersOfOneHostNameItIsUnique) {
   EXPECT_EQ(Contested({first, "V*", ""}, {second, "V*", ""}), 2U);
 }
 
+StatusFacts NoFacts(const Counters& counters) {
+  return {.counters = counters,
+          .census = {},
+          .samples = {},
+          .datagrams = {},
+          .refused_participants = 0,
+          .refused_permissions = 0,
+          .decisions = {},
+          .journal = {}};
+}
+
+// A service that runs and judges nothing is not OK.
+TEST(StatusTest, ATenthOfTheValvesMayBeUnjudged) {
+  const Counters counters;
+  StatusFacts facts = NoFacts(counters);
+  facts.census.valves = 20;
+  facts.census.unjudged = 2;
+  facts.census.unjudged_valve = "V3";
+  facts.census.unjudged_ns = 60'000'000'000;
+  facts.census.unjudged_reason = "UNCOVERED cv";
+  EXPECT_EQ(StatusOf(facts).health, idl::Health::kOk);
+  facts.census.unjudged = 3;
+  EXPECT_EQ(StatusOf(facts).health, idl::Health::kDegraded);
+  EXPECT_EQ(StatusOf(facts).text,
+            "not judged: 3 of 20 valves, for longest V3 since "
+            "1970-01-01T00:01:00Z (UNCOVERED cv)");
+}
+
 // Whatever others call themselves, the status goes out.
 TEST(ContestedStatusTest, LongAndStrangeNamesFitTheWire) {
   const Counters counters;
-  StatusFacts facts{.counters = counters,
-                    .census = {},
-                    .samples = {},
-                    .datagrams = {},
-                    .refused_participants = 0,
-                    .refused_permissions = 0,
-                    .decisions = {},
-                    .journal = {}};
+  StatusFacts facts = NoFacts(counters);
   EXPECT_EQ(StatusOf(facts).health, idl::Health::kOk);
   facts.contested = {2, "V1", "host:2"};
   EXPECT_EQ(StatusOf(facts).health, idl::Health::kDegraded);

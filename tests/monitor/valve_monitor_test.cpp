@@ -425,6 +425,27 @@ TEST_F(ValveMonitorTest, ASilentValveGivesItsOpenEpisodeUp) {
   EXPECT_EQ(notebook_.gaps[0].to_ns, now_ns);
 }
 
+// As by values that come when they change: two of each twelve are missing, and
+// the observers never settle.
+TEST_F(ValveMonitorTest, AValveThatIsNotJudgedForLongSaysSinceWhen) {
+  Feed(0, 100);
+  ASSERT_EQ(valve_.verdict().quality, Quality::kLive);
+  for (std::uint64_t k = 102; k < 690; k += 12) {
+    Feed(k, k + 10);
+    EXPECT_FALSE(valve_.unjudged_since_ns()) << k;
+  }
+  for (std::uint64_t k = 690; k < 740; k += 12) {
+    Feed(k, k + 10);
+  }
+  ASSERT_EQ(valve_.verdict().quality, Quality::kSettling);
+  EXPECT_EQ(valve_.unjudged_since_ns(), PlantSample(99).stamp_ns);
+  Feed(740, 800);
+  EXPECT_FALSE(valve_.unjudged_since_ns());
+  // Of what was not there nothing could be judged.
+  Feed(90'000, 90'010);
+  EXPECT_FALSE(valve_.unjudged_since_ns());
+}
+
 TEST_F(ValveMonitorTest, MissingAndUnusableSamplesAreGaps) {
   Feed(0, 50);
   Feed(60, 80);
