@@ -309,6 +309,9 @@ bool ValveEngine::Impl::Mend(const Checked& checked, bool begins,
   trained.present =
       static_cast<SignalMask>(trained.present & ~(unusable & ~present_));
   unusable = (unusable & present_) | (present_ & ~trained.present);
+  if (unusable == present_) {
+    return checked.unusable == 0;  // Nothing is left that would support it.
+  }
   return bridge_.Mend(static_cast<SignalMask>(unusable),
                       diagnosis_->lone.judged(), trained) ||
          checked.unusable == 0;
