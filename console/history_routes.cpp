@@ -213,7 +213,7 @@ Json MarksOf(const std::vector<storage::HistoryEntry>& events) {
   return marks;
 }
 
-// What was done to the valve while it was recorded.
+// Adds the repairs of the valve that fall into the recorded trace.
 void AddRepairs(const Api& api, const storage::Episode& episode,
                 const std::vector<TracePoint>& points, Json& marks) {
   if (points.empty() || api.sources.plant_history ||

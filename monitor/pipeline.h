@@ -65,9 +65,9 @@ struct ValveCensus {
   std::uint64_t ended{0};
   std::uint64_t open_episodes{0};
   std::uint64_t trace_bytes{0};
-  /// ValveMonitor::unjudged_since_ns();
+  /// Valves with a ValveMonitor::unjudged_since_ns(),
   std::uint64_t unjudged{0};
-  std::string unjudged_valve;   ///< the one that is so for longest,
+  std::string unjudged_valve;   ///< the one of them for longest,
   std::int64_t unjudged_ns{0};  ///< since then,
   std::string unjudged_reason;  ///< and why: "UNCOVERED cv".
   std::uint64_t contested{0};   ///< ValveMonitor::Contested();

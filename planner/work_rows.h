@@ -22,7 +22,7 @@ struct WorkRow {
   std::string shares{};  ///< "cause: air west", "period: 42 s"
   /// It was done then, and has come back or stands still.
   std::optional<std::int64_t> done_ns{};
-  /// What was ordered for its valve, with nothing done since.
+  /// The newest order for its valve, if nothing was done since.
   std::optional<Repair> in_work{};
 };
 

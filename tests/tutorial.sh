@@ -72,7 +72,7 @@ prepare_connect() {
     fdi-store valves assign FV-101 quick >/dev/null
   fi
 }
-# What a reader waits for.
+# The lines for which a reader waits.
 before_connect() {
   case $(<"$1") in
   *"client.mjs plant.toml"*)

@@ -11,8 +11,10 @@ namespace {
 // Smaller changes of a strength are not worth a row of the history.
 constexpr double kMinMove = 0.02;
 
-// A distance is in twice the log-likelihood of errors as large as those of the
-// best explanation (SecondLook), so that it tells the mean square of its own.
+// The distance of an explanation is the difference in −2 ln likelihood from the
+// best one, with the errors of that one, or those of the models where these are
+// larger (SecondLook). Over the number of readings it is the difference of
+// their mean square errors.
 std::optional<LookRival> RivalOf(const LookAnswer& answer) {
   for (const Explanation& e : answer.others) {
     if (!Explains(answer.faults, e.fault) && answer.misfit > 0.0 &&

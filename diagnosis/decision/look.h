@@ -143,7 +143,7 @@ struct LookAnswer {
   /// Those beyond the margin by no more than the errors of a simulation that
   /// lacks X or a pressure; none where it has them.
   std::vector<Explanation> beside{};
-  /// What is not in `faults`, each fault at its best, best first.
+  /// The other faults, each with its best explanation, best first.
   std::vector<Explanation> others{};
   double misfit{0.0};
   double readings{0.0};  ///< As in SecondLook.

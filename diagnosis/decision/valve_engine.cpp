@@ -84,7 +84,7 @@ struct Checked {
   SignalMask unusable{0};
 };
 
-// Of the signals of `required`; those that are not present are no reason.
+// Checks the signals of `required` that are present.
 Checked CheckValues(const ModelSet& models, SignalMask required,
                     const Sample& sample, bool episode_open, bool begins) {
   Checked checked;

@@ -136,8 +136,8 @@ double ShareAtLimit(std::span<const double> op) {
   return static_cast<double>(at) / static_cast<double>(op.size());
 }
 
-// Of an X that follows the other way round nothing is said: it is read in the
-// other sense.
+// The mean distance of X from OP where OP is at an end. An X that follows the
+// other way round is read in the other sense, and gives 0.
 double DistanceAtLimit(const Window& window) {
   if (window.x.empty() || !IsPercent(window.op)) {
     return 0.0;

@@ -6,11 +6,11 @@ import opcua from 'node-opcua-client';
 import {store} from './programs.mjs';
 import {dateOf, severities} from './valves.mjs';
 
-const {DataType, StatusCodes} = opcua;
+const {StatusCodes} = opcua;
 
 const types = {FAILURE: 'FailureAlarm', CHECK_FUNCTION: 'CheckFunctionAlarm',
   OFF_SPEC: 'OffSpecAlarm', MAINTENANCE_REQUIRED: 'MaintenanceRequiredAlarm'};
-const eventsKept = 16;            // Of an episode, by which it can be acknowledged.
+const eventsKept = 16;  // A client may acknowledge an episode by any of its last events.
 const longestShelfMs = 90 * 86_400_000;  // As `fdi-store history shelve` has it.
 const hourMs = 3_600_000;
 

@@ -63,8 +63,6 @@ export class Valves {
     this.conditions = new Alarms(space, operator);
   }
 
-  get size() { return this.#valves.size; }
-
   show(state) {
     this.#reason = null;
     let valve = this.#valves.get(state.valve_id);

@@ -49,7 +49,7 @@ class BusValveStates : public ValveListener {
  private:
   struct Valve {
     std::optional<findings::Finding> alarm;
-    // What the audit had found until the alarm took over (Episode::audit).
+    // The finding of the audit that the alarm took over (Episode::audit).
     std::optional<std::string> audit;
     bool left{false};                 // No data confirm the alarm.
     std::int64_t normal_ns{0};        // The valve was found normal then.

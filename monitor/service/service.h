@@ -123,7 +123,7 @@ class Service {
   std::unique_ptr<EventHook> hook_;  // Null: no event hook.
   // Of the step "on_event", one event at a time; null: not open.
   std::unique_ptr<storage::HistoryReader> shelf_reader_;
-  // Of the thread of Run(); null: not open.
+  // The thread of Run() alone uses it; null: not open.
   std::unique_ptr<storage::HistoryReader> alarm_reader_;
   idl::Participant participant_;
   idl::Participant intake_participant_;  // See idl::Overflow.

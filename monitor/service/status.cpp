@@ -223,8 +223,8 @@ std::vector<Measure> MeasuresOf(const StatusFacts& facts) {
       {"valves_two_publishers", "fdi_valves_contested", kGauge, "", "by",
        "publisher", census.contested},
       {"", "fdi_valves_unjudged", kGauge,
-       "Valves that send in AUTO and have not been judged for ten minutes", "",
-       "", census.unjudged},
+       "Valves that send in AUTO and are not judged for ten minutes or more",
+       "", "", census.unjudged},
       {"open_episodes", "fdi_open_episodes", kGauge, "Fault episodes now", "",
        "", census.open_episodes},
       {"trace_bytes", "fdi_trace_bytes", kGauge,
@@ -275,7 +275,7 @@ idl::MonitorStatusMessage StatusOf(const StatusFacts& facts) {
           " and " + std::to_string(facts.census.contested - 1) + " more valves";
     }
   }
-  // Here and there one is outside of what it was taught.
+  // A plant always has a few valves outside of what they were taught.
   if (10 * facts.census.unjudged > facts.census.valves) {
     status.text += status.text.empty() ? "" : "; ";
     status.text += "not judged: " + std::to_string(facts.census.unjudged) +

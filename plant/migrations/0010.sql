@@ -369,7 +369,7 @@ LANGUAGE sql STABLE AS $$
   WHERE n.monitor_id = $1 AND strpos('|' || $2 || '|', '|' || n.fault || '|') > 0
 $$;
 
--- What came on top of the fault of an episode and is not over.
+-- The second fault of an episode, on top of its fault, while it is not over.
 CREATE FUNCTION fdi.second(monitor bigint, episode text) RETURNS text
 LANGUAGE sql STABLE AS $$
   SELECT nullif(s.value, 'none') FROM fdi.episode_event s

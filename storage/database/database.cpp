@@ -207,7 +207,7 @@ std::vector<std::string> SplitNames(std::string_view joined) {
   return names;
 }
 
-// Of a lack of room nobody has to know a number.
+// A full disk is said in words: its number helps nobody.
 SqliteError::SqliteError(int code, const std::string& message)
     : std::runtime_error(
           (code & 0xFF) == SQLITE_FULL

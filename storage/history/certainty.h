@@ -17,12 +17,13 @@ Certainty CertaintyOf(const Episode& episode);
 /// (LookAlikesBeside()).
 std::vector<std::string> LookAlikesOf(const Episode& episode);
 
-/// What the witnesses say of its name: "named by simulation of the valve: f2
-/// explains it 40 times better than f19, the observers are undecided; the audit
-/// of its loop says: the valve sticks". Empty where the observers alone speak.
+/// Says which witness gave the name, and what the others say: "named by
+/// simulation of the valve: f2 explains it 40 times better than f19, the
+/// observers are undecided; the audit of its loop says: the valve sticks".
+/// Empty where the observers alone gave it.
 std::string WitnessText(const Episode& episode);
-/// Stores both for the view fault_history, after a change of what they depend
-/// on.
+/// Stores certainty and look-alikes for the view fault_history. Called after
+/// each change of a column that they depend on.
 void StoreCertainty(Database& database, const std::string& episode_id);
 
 /// What stands in the place of a name, as in the view fault_history; empty for

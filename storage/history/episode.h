@@ -87,11 +87,12 @@ struct Episode {
   std::optional<std::string> ack_comment;
   /// What came on top of the fault: names joined by |, or "unknown".
   std::optional<std::string> second;
-  /// What the audit of its loop had found until this episode took over.
+  /// The finding of the audit of its loop that this episode took over.
   std::optional<std::string> audit;
-  /// Of the look that counts (EpisodeLook): the best explanation by a fault
-  /// that is not named, and how many times larger its mean square error is;
-  /// what the observers named then, joined by |. Nothing without a look.
+  /// The look that counts (EpisodeLook) has found: the fault that explains the
+  /// episode best among those that are not named, how many times larger its
+  /// mean square error is, and what the observers named then, joined by |.
+  /// Nothing without a look.
   std::optional<std::string> rival;
   std::optional<double> rival_times;
   std::optional<std::string> observers;

@@ -131,7 +131,8 @@ struct ValveEvent {
   std::string note{};
   std::int64_t at_ns{0};  ///< UTC.
   std::string who{};
-  /// Of kOrdered: the number of the order, and when the valve is to be back.
+  /// For kOrdered alone: the number of the order, and when the valve is to be
+  /// back.
   std::string order{};
   std::optional<std::int64_t> expected_ns{};
 };

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# What the page answers is as docs/openapi.yaml has it: status, kind and schema of
+# The page answers as docs/openapi.yaml has it: status, kind and schema of
 # each GET, and the refusal of each POST, which a page on loopback without a proxy
 # in front answers with 403. 77 without python3-yaml or python3-jsonschema.
 # Usage: openapi.sh FOLDER-OF-PROGRAMS

@@ -120,7 +120,7 @@ TEST_F(LoneReadingsTest, AfterAWrongReadingTheThirdMakesAStepReal) {
   EXPECT_NEAR(bank_.residual(0, 1), 20.0, 1e-9);
 }
 
-// Of the second reading nothing is known.
+// The second reading is not known.
 TEST_F(LoneReadingsTest, AReadingThatIsNotReadMakesNoStepReal) {
   Step(Signal::kF, 0.0);
   Step(Signal::kF, 40.0);

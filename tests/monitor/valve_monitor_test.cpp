@@ -441,7 +441,7 @@ TEST_F(ValveMonitorTest, AValveThatIsNotJudgedForLongSaysSinceWhen) {
   EXPECT_EQ(valve_.unjudged_since_ns(), PlantSample(99).stamp_ns);
   Feed(740, 800);
   EXPECT_FALSE(valve_.unjudged_since_ns());
-  // Of what was not there nothing could be judged.
+  // Samples that were not there could not be judged.
   Feed(90'000, 90'010);
   EXPECT_FALSE(valve_.unjudged_since_ns());
 }

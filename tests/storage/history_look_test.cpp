@@ -47,7 +47,7 @@ TEST_F(HistoryLookTest, TheLastLookIsReadAsItWasStored) {
   EXPECT_EQ(reader.Look(Id()), Look(1.5));
 }
 
-// What gave the name is said where the name is.
+// The witness is said where the name is.
 TEST_F(HistoryLookTest, AnEpisodeSaysWhatItsWitnessesSay) {
   HistoryWriter writer(path_);
   FaultEvent named = Event(TransitionKind::kIsolated, 20, 0b100, 0.8);

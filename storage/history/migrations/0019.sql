@@ -1,4 +1,4 @@
--- What the look that counts says of the name: the best explanation by a fault
+-- The look that counts has these for the name: the best explanation by a fault
 -- that is not named, how many times larger its mean square error is, and what
 -- the observers named then, joined by |. Looks of before say nothing of it.
 ALTER TABLE episode_look ADD COLUMN rival TEXT;
@@ -91,7 +91,7 @@ SELECT
     || printf('.%03dZ', e.ended_ns / 1000000 % 1000) AS ended_utc,
   e.certainty,
   e.look_alikes,
-  -- What came on top of the fault and is not over.
+  -- The second fault, on top of the first, while it is not over.
   (SELECT nullif(s.value, 'none') FROM episode_event s
    WHERE s.episode_id = e.episode_id AND s.kind = 'SECOND'
    ORDER BY s.stamp_ns DESC LIMIT 1) AS second,

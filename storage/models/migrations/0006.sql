@@ -1,4 +1,4 @@
--- What is in work: ordered, under a number, and expected back at a time.
+-- An order has a number and a time when the valve is to be back.
 CREATE TABLE valve_event_6 (
   valve_event_id INTEGER PRIMARY KEY,
   valve TEXT NOT NULL,                   -- id or glob
