@@ -35,12 +35,13 @@ fail() {
 }
 
 # What differs from a new user's machine: where the campaigns are, ports that
-# others may have, the domain.
+# others may have, the domain, a plant whose seconds are shorter than the
+# client's interval.
 adapt() {
   sed -e "s#/usr/share/fdi/campaigns#$out/campaigns#g" \
     -e 's#=127\.0\.0\.1:8080#=127.0.0.1:0#' \
     -e 's#--console$#--console=127.0.0.1:0#' \
-    -e "s#opc.tcp://HOST:4840#opc.tcp://127.0.0.1:$plant_port#" \
+    -e "s#opc.tcp://HOST:4840#opc.tcp://127.0.0.1:$plant_port --interval 0#" \
     -e "s#^node server.mjs\(.*\) -- #node server.mjs --port $port\1 -- --domain $domain #" \
     -e "s#node alarm_client.mjs#& --endpoint opc.tcp://127.0.0.1:$port#" \
     -e "s#\(^\|| \)\(fdi-monitor\|fdi-simulator\|fdi-gateway\) #&--domain $domain #"

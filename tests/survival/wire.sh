@@ -81,7 +81,7 @@ run_plant() { exec node plant_server.mjs $plant_port "$valves" $rate "${tables[@
 run_broker() { exec mosquitto -c broker.conf; }
 run_monitor() { exec "$bin/fdi-monitor" --domain "$domain" run --model-set quick; }
 run_in() {
-  node client.mjs plant.toml --endpoint "opc.tcp://127.0.0.1:$plant_port" |
+  node client.mjs plant.toml --endpoint "opc.tcp://127.0.0.1:$plant_port" --interval 0 |
     "$bin/fdi-gateway" --domain "$domain" in --plant plant.toml --lines -
 }
 run_out() {
