@@ -16,6 +16,7 @@
 #include "idl/codec.h"
 #include "idl/endpoint.h"
 #include "idl/participant_impl.h"
+#include "idl/writer_pace.h"
 
 namespace fdi::idl {
 namespace {
@@ -31,6 +32,11 @@ constexpr auto kDisposeTimeout = std::chrono::seconds(5);
 // a free one forgets the oldest message, the last one of a silent valve.
 constexpr int kSparePlaces = 64;
 constexpr int kMaxPlaces = 100'000;  // See DdsOptions::max_valves.
+// Half of what a reader admits, and so much may come before it is told.
+constexpr std::uint64_t kMaxSpan = kLargestGap / 2;
+// Lossless writers look how far back their history reaches at each so many
+// writes.
+constexpr std::uint64_t kWritesBetweenLooks = 1024;
 
 bool IsFull(const ReturnCode& code) {
   return code == return_code::RETCODE_TIMEOUT ||
@@ -71,6 +77,7 @@ struct TopicWriter : dds::DataWriterListener {
     const dds::DataWriterQos qos =
         bus.profiles().Override(ours.name + "_writer", ours.writer, *publisher);
     policies = Describe(qos);
+    forgets = ours.reader.durability().kind == dds::VOLATILE_DURABILITY_QOS;
     dds::Topic* topic =
         bus.TopicOf(Traits::kTopic,
                     dds::TypeSupport(new CheckedType<typename Traits::Type>()));
@@ -98,6 +105,7 @@ struct TopicWriter : dds::DataWriterListener {
   WriteResult Write(const Message& message, const std::stop_token& stop,
                     std::chrono::milliseconds timeout) {
     const MutexLock lock(mutex);
+    ForgetSilentValves();
     MakeRoomFor(message);
     Traits::Encode(message, wire);
     const dds::InstanceHandle_t* instance = InstanceOf(message);
@@ -183,6 +191,37 @@ struct TopicWriter : dds::DataWriterListener {
     return &found->second.handle;
   }
 
+  // The library keeps the last samples of valves that are silent. The numbers
+  // written since are a hole in its history, which a new reader has to be told
+  // of with each heartbeat, and keeps number by number; one that nobody told
+  // asks for 256 numbers at a time. So a reader of samples, which gets none of
+  // before, would be kept waiting for minutes. A history that reaches far back
+  // is emptied: by a live writer when a reader comes, by a lossless one once
+  // everything is acknowledged.
+  void ForgetSilentValves() REQUIRES(mutex) {
+    const bool due = lossless ? writes % kWritesBetweenLooks == 0
+                              : has_newcomer.exchange(false);
+    if (!due || !forgets || SpanOfHistory() < kMaxSpan) {
+      return;
+    }
+    if (!lossless || WaitForAcknowledged(std::chrono::milliseconds(0))) {
+      std::size_t removed = 0;
+      writer->clear_history(&removed);
+      forgotten = writes;
+    }
+  }
+
+  // How many messages ago the oldest one that the history may have was written.
+  std::uint64_t SpanOfHistory() const REQUIRES(mutex) {
+    std::uint64_t oldest = writes;
+    for (const auto& [key, each] : instances) {
+      if (each.last_write > forgotten) {
+        oldest = std::min(oldest, each.last_write);
+      }
+    }
+    return writes - oldest;
+  }
+
   // Makes room for a new valve before its message is encoded: `wire` is needed
   // for the key of the one that goes.
   void MakeRoomFor(const Message& message) REQUIRES(mutex) {
@@ -239,6 +278,9 @@ struct TopicWriter : dds::DataWriterListener {
       dds::DataWriter* /*writer*/,
       const dds::PublicationMatchedStatus& status) override {
     total_matched.store(status.total_count);
+    if (status.current_count_change > 0) {
+      has_newcomer.store(true);
+    }
     matched.Set(status.current_count);
   }
 
@@ -273,6 +315,9 @@ struct TopicWriter : dds::DataWriterListener {
   };
   std::map<Key<Message>, Instance, std::less<>> instances GUARDED_BY(mutex);
   std::uint64_t writes GUARDED_BY(mutex){0};
+  std::uint64_t forgotten GUARDED_BY(mutex){0};  // Writes before are not kept.
+  bool forgets{false};  // Readers get nothing of before.
+  std::atomic<bool> has_newcomer{false};
   typename Traits::Wire wire GUARDED_BY(mutex);
 };
 

@@ -17,6 +17,7 @@ constexpr std::int64_t kPerSecondOfSilence = 100'000;
 constexpr seconds kSilence{10};
 // The library keeps each skipped number in a set, at 48 bytes.
 constexpr std::int64_t kCostOfLeftOut = 64;
+static_assert(kLargestGap == kBurst / kCostOfLeftOut);
 constexpr std::size_t kMaxRecentWriters = 32'768;
 
 std::int64_t Growth(WriterPace::Clock::duration since) {

@@ -18,6 +18,10 @@ constexpr bool IsOfDiscovery(std::uint8_t entity_kind) {
   return (entity_kind & 0xc0U) == 0xc0U;
 }
 
+/// Numbers that one message may leave out, after a pause. A writer with a reader
+/// that is new has none of before that are further apart.
+constexpr std::int64_t kLargestGap = 16'384;
+
 /// Limits how fast the sequence numbers of each writer may grow.
 ///
 /// Fast DDS 2.9.1 iterates, with the reader's mutex held, from the last known

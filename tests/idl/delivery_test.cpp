@@ -148,6 +148,44 @@ TEST_F(DeliveryTest, ALateJoinerHasTheLastDecisionOfEveryValve) {
   }
 }
 
+class LateReaderTest : public DeliveryTest,
+                       public ::testing::WithParamInterface<Profile> {};
+
+// The last samples of 1000 silent valves are 200 000 numbers back.
+TEST_P(LateReaderTest, IsNotHeldUpBySilentValves) {
+  Participant here(domain_.Options(), log_.Sink());
+  Participant there(domain_.Options(), log_.Sink());
+  Publisher<ValveSampleMessage> publisher(there, {GetParam()});
+  for (std::uint64_t i = 0; i < 1000; ++i) {
+    publisher.Write(SampleOf("silent" + std::to_string(i), i));
+  }
+  std::uint64_t number = 0;
+  const auto write = [&] {
+    const auto valve = "valve" + std::to_string(number % 100);
+    ASSERT_EQ(publisher.Write(SampleOf(valve, number++)), WriteResult::kSent);
+  };
+  while (number < 200'000) {
+    write();
+  }
+
+  Subscriber<ValveSampleMessage> late(here, {GetParam()});
+  std::set<std::string> seen;
+  const Handlers<ValveSampleMessage> handlers{
+      [&](const ValveSampleMessage& message, const Reception&) {
+        seen.insert(message.valve_id);
+      },
+      nullptr};
+  TakeUntil(late, handlers, [&] {
+    write();
+    return seen.size() == 100;
+  });
+
+  EXPECT_EQ(seen.size(), 100U);
+}
+
+INSTANTIATE_TEST_SUITE_P(Profiles, LateReaderTest,
+                         ::testing::Values(Profile::kLive, Profile::kLossless));
+
 TEST_F(DeliveryTest, AnEndedStreamIsSeenBehindItsLastSample) {
   Participant here(domain_.Options(), log_.Sink());
   Participant there(domain_.Options(), log_.Sink());
