@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <utility>
+#include <vector>
 
 namespace fdi::idl {
 namespace {
@@ -183,10 +184,14 @@ class Speaker {
   WriterGuid guid_{};
 };
 
+// Numbers that the submessages of one datagram leave out, by writer.
+using Gaps = std::vector<std::pair<WriterGuid, std::int64_t>>;
+
 // Whether a valid submessage contains only numbers that its writer can have
-// reached.
+// reached. `gaps` takes those that it leaves out.
 bool HasPlausibleNumbers(std::uint8_t kind, const Body& body, Speaker& speaker,
-                         WriterPace& pace, WriterPace::Clock::time_point now) {
+                         WriterPace& pace, WriterPace::Clock::time_point now,
+                         Gaps& gaps) {
   switch (kind) {
     case kData:
     case kDataFrag:
@@ -199,8 +204,14 @@ bool HasPlausibleNumbers(std::uint8_t kind, const Body& body, Speaker& speaker,
       const std::int64_t start = body.Sequence(8);
       const std::int64_t base = body.Sequence(16);
       const std::int64_t bits = body.U32(24);
-      return pace.Admit(speaker.Writer(body.bytes.subspan(4)), base + bits,
-                        std::max<std::int64_t>(0, base - start) + bits, now);
+      const std::int64_t left_out =
+          std::max<std::int64_t>(0, base - start) + bits;
+      const WriterGuid& writer = speaker.Writer(body.bytes.subspan(4));
+      const bool admitted = pace.Admit(writer, base + bits, left_out, now);
+      if (admitted) {
+        gaps.emplace_back(writer, left_out);
+      }
+      return admitted;
     }
     case kInfoSrc:
       speaker.SetPrefix(body.bytes.subspan(8));
@@ -255,6 +266,7 @@ CheckedDatagram CheckDatagram(Bytes datagram, WriterPace& pace,
   Speaker speaker(datagram);
   std::size_t sound = kHeaderBytes;  // Everything up to here is passed on.
   CheckedDatagram checked;
+  Gaps gaps;
   for (std::size_t at = sound; at < size;) {
     if (size - at < kSubmessageHeaderBytes) {
       return {DatagramVerdict::kLength, 0};
@@ -285,7 +297,10 @@ CheckedDatagram CheckDatagram(Bytes datagram, WriterPace& pace,
       if (!ContentIsSound(kind, flags, body)) {
         return {DatagramVerdict::kContent, 0};
       }
-      if (!HasPlausibleNumbers(kind, body, speaker, pace, now)) {
+      if (!HasPlausibleNumbers(kind, body, speaker, pace, now, gaps)) {
+        for (const auto& [writer, left_out] : gaps) {
+          pace.Refund(writer, left_out);
+        }
         return {DatagramVerdict::kPace, 0};
       }
       if (kind == kData && IsBareKey(body, flags)) {

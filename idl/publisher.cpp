@@ -34,9 +34,11 @@ constexpr int kSparePlaces = 64;
 constexpr int kMaxPlaces = 100'000;  // See DdsOptions::max_valves.
 // Half of what a reader admits, and so much may come before it is told.
 constexpr std::uint64_t kMaxSpan = kLargestGap / 2;
-// Lossless writers look how far back their history reaches at each so many
-// writes.
+// Writers look how far back their history reaches at each so many writes.
 constexpr std::uint64_t kWritesBetweenLooks = 1024;
+// A reader that was found has found the writer by then, which takes it a second
+// on a loaded machine.
+constexpr auto kNewcomer = std::chrono::seconds(10);
 
 bool IsFull(const ReturnCode& code) {
   return code == return_code::RETCODE_TIMEOUT ||
@@ -77,7 +79,7 @@ struct TopicWriter : dds::DataWriterListener {
     const dds::DataWriterQos qos =
         bus.profiles().Override(ours.name + "_writer", ours.writer, *publisher);
     policies = Describe(qos);
-    forgets = ours.reader.durability().kind == dds::VOLATILE_DURABILITY_QOS;
+    forgets = ours.is_stream;
     dds::Topic* topic =
         bus.TopicOf(Traits::kTopic,
                     dds::TypeSupport(new CheckedType<typename Traits::Type>()));
@@ -194,17 +196,20 @@ struct TopicWriter : dds::DataWriterListener {
   // The library keeps the last samples of valves that are silent. The numbers
   // written since are a hole in its history, which a new reader has to be told
   // of with each heartbeat, and keeps number by number; one that nobody told
-  // asks for 256 numbers at a time. So a reader of samples, which gets none of
-  // before, would be kept waiting for minutes. A history that reaches far back
-  // is emptied: by a live writer when a reader comes, by a lossless one once
-  // everything is acknowledged.
+  // asks for 256 numbers at a time. It would be kept waiting for minutes. A
+  // history of a stream that reaches far back is emptied: by a live writer
+  // while a reader is new, by a lossless one once everything is acknowledged.
   void ForgetSilentValves() REQUIRES(mutex) {
-    const bool due = lossless ? writes % kWritesBetweenLooks == 0
-                              : has_newcomer.exchange(false);
-    if (!due || !forgets || SpanOfHistory() < kMaxSpan) {
+    const bool comes = has_newcomer.exchange(false);
+    if (comes) {
+      newcomer_until = Clock::now() + kNewcomer;
+    }
+    if (!forgets || (!comes && writes % kWritesBetweenLooks != 0) ||
+        SpanOfHistory() < kMaxSpan) {
       return;
     }
-    if (!lossless || WaitForAcknowledged(std::chrono::milliseconds(0))) {
+    if (lossless ? WaitForAcknowledged(std::chrono::milliseconds(0))
+                 : Clock::now() < newcomer_until) {
       std::size_t removed = 0;
       writer->clear_history(&removed);
       forgotten = writes;
@@ -316,8 +321,9 @@ struct TopicWriter : dds::DataWriterListener {
   std::map<Key<Message>, Instance, std::less<>> instances GUARDED_BY(mutex);
   std::uint64_t writes GUARDED_BY(mutex){0};
   std::uint64_t forgotten GUARDED_BY(mutex){0};  // Writes before are not kept.
-  bool forgets{false};  // Readers get nothing of before.
+  bool forgets{false};                           // EndpointQos::is_stream.
   std::atomic<bool> has_newcomer{false};
+  Clock::time_point newcomer_until GUARDED_BY(mutex);
   typename Traits::Wire wire GUARDED_BY(mutex);
 };
 

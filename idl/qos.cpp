@@ -192,6 +192,7 @@ PolicyTexts RemotePolicyTexts(const auto& qos) {
 template <>
 EndpointQos QosFor<ValveSampleMessage>(Profile profile, int valves) {
   EndpointQos qos = Common("fdi_valve_sample");
+  qos.is_stream = true;
   SetKeepLast(qos, valves, std::clamp(kLiveHistory / valves, 2, 16), 16);
   ReaderKeepsAll(qos, valves);
   if (profile == Profile::kLossless) {
@@ -208,6 +209,7 @@ EndpointQos QosFor<ValveSampleMessage>(Profile profile, int valves) {
 template <>
 EndpointQos QosFor<DecisionMessage>(Profile /*profile*/, int valves) {
   EndpointQos qos = Common("fdi_decision_vector");
+  qos.is_stream = true;
   TransientLocal(qos);
   SetKeepLast(qos, valves, 1, 16);
   return qos;

@@ -18,6 +18,9 @@ struct EndpointQos {
   std::string name;  ///< Profiles of --qos: name + "_writer", + "_reader".
   dds::DataWriterQos writer{};
   dds::DataReaderQos reader{};
+  /// The next messages tell all that matters: a writer that cannot keep them
+  /// for a late reader may forget what it wrote.
+  bool is_stream{false};
 };
 
 /// The QoS of the topic of Message for up to `valves` valves. A profile that

@@ -70,4 +70,12 @@ bool WriterPace::Admit(const WriterGuid& writer, std::int64_t number,
   return true;
 }
 
+void WriterPace::Refund(const WriterGuid& writer, std::int64_t left_out) {
+  const MutexLock lock(mutex_);
+  if (const auto found = recent_.find(writer); found != recent_.end()) {
+    std::int64_t& burst = found->second.burst;
+    burst = std::min(kBurst, burst + left_out * kCostOfLeftOut);
+  }
+}
+
 }  // namespace fdi::idl

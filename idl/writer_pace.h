@@ -18,8 +18,7 @@ constexpr bool IsOfDiscovery(std::uint8_t entity_kind) {
   return (entity_kind & 0xc0U) == 0xc0U;
 }
 
-/// Numbers that one message may leave out, after a pause. A writer with a reader
-/// that is new has none of before that are further apart.
+/// Numbers that one message may leave out, after a pause.
 constexpr std::int64_t kLargestGap = 16'384;
 
 /// Limits how fast the sequence numbers of each writer may grow.
@@ -37,6 +36,10 @@ class WriterPace {
   /// `left_out` numbers, which cost more. If so, its position is updated.
   bool Admit(const WriterGuid& writer, std::int64_t number,
              std::int64_t left_out, Clock::time_point now);
+  /// Takes back the price of numbers left out that were admitted in a datagram
+  /// which was refused later on: the library does not see them, and they come
+  /// again with each heartbeat.
+  void Refund(const WriterGuid& writer, std::int64_t left_out);
 
  private:
   struct State {

@@ -226,6 +226,21 @@ TEST(DatagramTest, NoWriterLeapsAhead) {
   EXPECT_EQ(verdict(With(Header(), 0x07, first)), DatagramVerdict::kSound);
 }
 
+// A heartbeat that tells of two holes, of which the second is too wide, comes
+// again and again; the reader may still be told of a part of it.
+TEST(DatagramTest, WhatIsRefusedCostsNothing) {
+  WriterPace pace;
+  Bytes near = Zeros(8) + Sequence(4, 1) + Sequence(4, 1) + Zeros(8);
+  near[21] = 0x20;  // 8193.
+  const Bytes wide = Zeros(8) + Sequence(4, 2) + Sequence(6, 1) + Zeros(8);
+  const Bytes both = With(With(Header(), 0x08, near), 0x08, wide);
+  for (int i = 0; i < 100; ++i) {
+    EXPECT_EQ(CheckDatagram(both, pace, {}).verdict, DatagramVerdict::kPace);
+  }
+  EXPECT_EQ(CheckDatagram(With(Header(), 0x08, near), pace, {}).verdict,
+            DatagramVerdict::kSound);
+}
+
 WriterGuid Writer(std::uint8_t participant, std::uint8_t kind) {
   return {participant, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, kind};
 }

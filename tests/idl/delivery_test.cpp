@@ -186,6 +186,32 @@ TEST_P(LateReaderTest, IsNotHeldUpBySilentValves) {
 INSTANTIATE_TEST_SUITE_P(Profiles, LateReaderTest,
                          ::testing::Values(Profile::kLive, Profile::kLossless));
 
+TEST_F(DeliveryTest, ALateReaderOfDecisionsIsNotHeldUpByASilentValve) {
+  Participant here(domain_.Options(), log_.Sink());
+  Participant there(domain_.Options(), log_.Sink());
+  Publisher<DecisionMessage> publisher(there);
+  publisher.Write(DecisionOf("silent", 0));
+  std::uint64_t number = 0;
+  for (; number < 1'000'000; ++number) {
+    publisher.Write(
+        DecisionOf(ValveName(static_cast<int>(number % 10)), number));
+  }
+
+  Subscriber<DecisionMessage> late(here);
+  std::set<std::string> seen;
+  const Handlers<DecisionMessage> handlers{
+      [&](const DecisionMessage& message, const Reception&) {
+        seen.insert(message.valve_id);
+      },
+      nullptr};
+  EXPECT_TRUE(TakeUntil(late, handlers, [&] {
+    ++number;
+    publisher.Write(
+        DecisionOf(ValveName(static_cast<int>(number % 10)), number));
+    return seen.size() >= 10;
+  }));
+}
+
 TEST_F(DeliveryTest, AnEndedStreamIsSeenBehindItsLastSample) {
   Participant here(domain_.Options(), log_.Sink());
   Participant there(domain_.Options(), log_.Sink());
