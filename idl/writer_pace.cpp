@@ -60,7 +60,7 @@ bool WriterPace::Admit(const WriterGuid& writer, std::int64_t number,
   State& state = Find(writer, number, now);
   const std::int64_t allowed = state.burst + Growth(now - state.last_message);
   const std::int64_t cost = std::max<std::int64_t>(0, number - state.number) +
-                            std::min(left_out, allowed) * kCostOfLeftOut;
+                            std::min(left_out, allowed + 1) * kCostOfLeftOut;
   if (cost > allowed) {
     return false;
   }

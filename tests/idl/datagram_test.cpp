@@ -279,6 +279,9 @@ TEST(WriterPaceTest, WhatWasLeftOutCounts) {
   EXPECT_TRUE(pace.Admit(Writer(1, 3), 20'000, 10'000, {}));
   EXPECT_FALSE(pace.Admit(Writer(1, 3), 20'000, 10'000, {}));
   EXPECT_TRUE(pace.Admit(Writer(2, 3), 20'000, 10'000, {}));
+  // A budget that is spent to the last bit admits nothing.
+  EXPECT_TRUE(pace.Admit(Writer(3, 3), 20'000, kLargestGap, {}));
+  EXPECT_FALSE(pace.Admit(Writer(3, 3), 20'000, 1, {}));
 }
 
 TEST(WriterPaceTest, AFloodOfStrangersDoesNotMakeItForget) {
