@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Scores records of real valves and loops: one line each, failures included.
+"""Scores records that others made: one line each, failures included.
 
     bench/real_data.py BIN DIR
 
@@ -16,15 +16,18 @@ import subprocess
 import sys
 
 PLANT = "plant/lublin_actuator3_2001-10-11_first40min.csv"
-LUBLIN = ("Lublin sugar factory, actuator 3, 1 Hz: files of the DAMADICS "
-          "benchmark, Warsaw University of Technology")
-LOOPS = ("refinery, 10 s: TerenceXue-tech/StictionGPT, Apache-2.0, labels by "
-         "experts of the plant")
-PAIRS = ("plant, seven days at a sample a minute: "
-         "nPoKhappy/control-valve-stiction-implementation, MIT")
-AHU = ("air handler, cooling valve, 60 s: LBNL and ORNL, Granderson et al. 2020, "
-       "doi 10.1038/s41597-020-0398-6, CC BY 4.0")
-TEP = "Tennessee Eastman process, a simulator that is not ours; columns OP, PV"
+LUBLIN, LOOPS, PAIRS, AHU, TEP = "Lublin", "refinery", "plant", "AHU", "TEP"
+ORIGINS = {
+    LUBLIN: "actuator 3 of the sugar factory, 1 Hz; files of the DAMADICS benchmark, "
+            "Warsaw University of Technology",
+    PAIRS: "seven days at a sample a minute; "
+           "nPoKhappy/control-valve-stiction-implementation, MIT",
+    LOOPS: "10 s, labels by experts of the plant; TerenceXue-tech/StictionGPT, "
+           "Apache-2.0",
+    AHU: "cooling valve of an air handler, a day at 60 s; LBNL and ORNL, Granderson et "
+         "al. 2020, doi 10.1038/s41597-020-0398-6, CC BY 4.0",
+    TEP: "Tennessee Eastman process, of a simulator that is not ours; columns OP, PV",
+}
 MODEL = "the benchmark's own model errs by 1.956 % and 2.039 t/h on all 40 minutes"
 
 
@@ -193,14 +196,17 @@ def lines(study):
 def main():
     if len(sys.argv) != 3:
         sys.exit("real_data.py BIN DIR")
-    print("| record and question | from | came out | what fails |")
+    print("| record | question | came out | what fails |")
     print("|---|---|---|---|")
     for what, origin, answer in lines(Study(*sys.argv[1:])):
         try:
             found, fails = answer()
         except Missing as missing:
             found, fails = f"skipped: {missing} is not there", ""
-        print(f"| {what} | {origin} | {found} | {fails} |", flush=True)
+        print(f"| {origin} | {what} | {found} | {fails} |", flush=True)
+    print()
+    for origin, text in ORIGINS.items():
+        print(f"- {origin}: {text}.")
 
 
 if __name__ == "__main__":

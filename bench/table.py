@@ -43,7 +43,7 @@ DATA = {
     "given-days": "Without fault: the independent model under the sine",
     "open-hours": "Without fault: our own simulator under the sine",
 }
-LAYERS = ("early", "floor", "looks", "windows", "linear")
+LAYERS = ("early", "floor", "looks", "observers", "windows", "linear")
 # An answer is to be right in so many per cent of the cases.
 WORDS = {"sure": 97, "likely": 85, "one of": 90}
 RATES = ("1e-1", "1e-2", "1e-3", "1e-4")  # False alarms an hour.
@@ -288,7 +288,8 @@ class Table:
             return
         self.lines += ["", "## False episodes", "",
                        "Per 1000 valve-hours without a fault; in brackets the "
-                       "episodes.", ""]
+                       "episodes. CPU is the mean over the hours of the row, looks "
+                       "included.", ""]
         self.heads("method", *(f"{DATA[d].split(': ')[1]}, {self.hours[d]:.0f} h"
                                for d in hours), "CPU a sample [us]")
         for method, name in METHODS.items():
@@ -378,7 +379,8 @@ class Table:
                        "What changes without it: runs that are detected / whose "
                        "answer holds the fault / is the fault / is one wrong name, and "
                        "the median seconds to the name; `=`: no run has another "
-                       "answer; empty: not scored.", ""]
+                       "answer; empty: not scored. Observers only: without looks, floor "
+                       "and drift.", ""]
         faults = [d for d in DATA if (d, "ours") in self.answers
                   and not d.endswith(("-hours", "-days"))]
         self.heads("left out", *(DATA[d] for d in faults))
@@ -500,7 +502,7 @@ class Table:
             "unknown and those that get one wrong name.", ""]
         self.heads("method", "set for, in 1000 h", "false episodes a valve-year",
                    "detected", "holds the fault", "is the fault",
-                   "median s to the alarm", "known: named",
+                   "median s to the lasting alarm", "known: named",
                    "unknown: called so", "one wrong name")
         for method, name in METHODS.items():
             for rate in RATES:
@@ -581,9 +583,9 @@ class Table:
         path = os.path.join(self.folder, "real")
         if not os.path.exists(path):
             return
-        self.lines += ["", "## Records of real valves", "",
-                       "By bench/real_data.py; none of these was made by a "
-                       "simulator.", ""]
+        self.lines += ["", "## Records of others", "",
+                       "By bench/real_data.py. What is not there is skipped by "
+                       "name.", ""]
         with open(path, encoding="utf-8") as file:
             self.lines += file.read().splitlines()
 
@@ -597,36 +599,35 @@ class Table:
             return runs and (len(runs), *tally(runs))
 
         if paper := ours("paper"):
-            total, _, _, exact, wrong, _ = paper
+            total, _, _, exact, _, _ = paper
             self.row("the method of Mendonça, Sousa and Sá da Costa (2009), "
-                     "running live", f"right fault in {exact} of {total} scenarios, "
-                     f"{wrong} wrong names at the end")
+                     "running live", f"right fault in {exact} of {total} scenarios")
         if benchmark := ours("benchmark"):
             total, found, held, exact, wrong, _ = benchmark
             self.row(f"DAMADICS benchmark, {total} scenarios",
                      f"{found} detected, {held} with the fault in the answer, "
-                     f"{exact} exactly, {wrong} by one wrong name")
+                     f"{exact} exactly; wrong names: {wrong}")
         if loop := ours("loop"):
             total, found, held, _, wrong, _ = loop
-            self.row("models from healthy data alone, scored on an independent "
-                     "simulator", f"{found} of {total} faults detected, {held} answers "
-                     f"include the fault, {wrong} wrong names")
+            self.row("models from healthy data alone, on an independent simulator",
+                     f"{found} of {total} faults detected, {held} with the fault in "
+                     f"the answer; wrong names: {wrong}")
             if runs := self.answers.get(("loop", "observers")):
                 found, held, _, wrong, _ = tally(runs)
-                self.row("the same, without a second look at names by the valve's "
-                         "physics", f"{found} detected, {held} include the fault, "
-                         f"{wrong} wrong names")
+                self.row("the same, without floor and second look",
+                         f"{found} detected, {held} with the fault in the answer; "
+                         f"wrong names: {wrong}")
         if untrained := ours("untrained"):
             _, found, _, _, wrong, unknown = untrained
-            self.row("faults that nobody taught", f"{unknown} of {found} that are "
-                     f"detected are called unknown, {wrong} get one wrong name")
+            self.row("faults that nobody taught", f"{found} detected, {unknown} called "
+                     f"unknown; wrong names: {wrong}")
         taught = [part for data in DATA if data != "untrained"
                   for part in (data, data + "-second")]
         said = [r for r in self.named("ours", taught) if r.certainty == "sure"]
         if said:
             self.row('answers called "sure" that are right',
                      f"{sum(map(Answer.holds, said))} of {len(said)} on taught "
-                     "faults, by two sets of seeds")
+                     "faults")
         hours = [d for d in DATA for d in (d, d + "-second")
                  if self.is_of(d.removesuffix("-second"), "own-hours")
                  or self.is_of(d.removesuffix("-second"), "open-hours")]
@@ -653,6 +654,8 @@ class Table:
             f"Written by it with {version}, {cpu:.2f} h of CPU without the "
             "simulation of the runs"
             + (f"; left out: {', '.join(missing)}" if missing else "") + ". "
+            "The full command has ten healthy days of each kind, ten trainings and all "
+            "methods on all data; what this run left out is empty or has no row. "
             "Seeds are those of the script. Limits of all methods are set on the "
             "same healthy hours for one false alarm in 1000 h (paper, untrained: "
             "10 000 h), but those of trees end at the largest value of healthy "
