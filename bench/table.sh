@@ -1,29 +1,42 @@
 #!/usr/bin/env bash
 # Scores all methods on all data and writes docs/results/table.md and table.csv:
 # what each layer of ours buys, and what well-known detectors find with limits
-# for the same rate of false alarms, from the same healthy hours. benchmark, loop
-# and the hours of their sets need FDI_REFERENCE_DATA. bench/baselines.py
-# needs Debian's python3-sklearn and python3-numpy; a row whose package is missing
-# is skipped by name.
+# for the same rate of false alarms, from the same healthy hours. The data
+# benchmark, loop, loop-hours and given-days need FDI_REFERENCE_DATA.
+# bench/baselines.py needs Debian's python3-sklearn and python3-numpy; a row whose
+# package is missing is skipped by name.
 #
-# DIR keeps what is made, and a run that was stopped goes on there. It belongs to
-# one commit. One process at a time.
+# DIR keeps what is made, and a run that was stopped goes on there; parts that
+# are named later join the page. It belongs to one commit. One process at a time;
+# everything takes about an hour and a half of CPU.
 #
-#     bench/table.sh [--quick] [--seeds N] [-o FILE.md] build/release/bin DIR [DATA...]
+#     bench/table.sh [OPTION...] build/release/bin DIR [PART...]
 #
-# --seeds: added to those of all simulated runs but the training of campaigns.
+# PART: data (paper benchmark untrained loop own loop-hours own-hours open-hours
+# given-days), and what is done with those that are named:
+#   second       simulated data with other seeds
+#   curves       other rates of false alarms: CURVES=, their methods
+#   retrainings  sets that were trained again from other random starts
+#   real         records of real valves (bench/real_data.py)
+# METHODS="ours pca": these alone.
+#
 # --quick: without ramps of a day and with a tenth of the healthy hours.
-# DATA: some of paper benchmark untrained loop own loop-hours own-hours
-# open-hours. METHODS="ours pca": these alone.
+# --days N: healthy days of each kind (10).
+# --retrainings N: 10.
+# --seeds N: added to those of all simulated runs but the training of campaigns.
+# -o FILE.md: the page.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 days=10
+retrainings=10
 quick=""
 seeds=0
 page=docs/results/table.md
 while [[ ${1:-} == -* ]]; do
   case $1 in
     --quick) quick=1 days=1 ;;
+    --days) days=$2; shift ;;
+    --retrainings) retrainings=$2; shift ;;
     --seeds) seeds=$2; shift ;;
     -o) page=$2; shift ;;
     *) echo "table: no option $1" >&2; exit 2 ;;
@@ -33,16 +46,17 @@ done
 bin=$(realpath "$1")
 mkdir -p "$2"
 dir=$(realpath "$2")
-all=(paper benchmark untrained loop own loop-hours own-hours open-hours)
+all=(paper benchmark untrained loop own loop-hours own-hours open-hours
+  given-days second curves retrainings real)
 wanted=("${@:3}")
 [ ${#wanted[@]} -gt 0 ] || wanted=("${all[@]}")
 for name in "${wanted[@]}"; do
   [[ " ${all[*]} " == *" $name "* ]] || {
-    echo "table: no data $name; there are ${all[*]}" >&2
+    echo "table: no part $name; there are ${all[*]}" >&2
     exit 2
   }
   case $name in
-    benchmark | loop* | open-hours)
+    benchmark | loop* | *-days | real)
       : "${FDI_REFERENCE_DATA:?names the folder with closed-loop/}"
       ;;
   esac
@@ -51,13 +65,22 @@ data=${FDI_REFERENCE_DATA:-}
 export FDI_DATA=$dir/data OMP_NUM_THREADS=1
 mkdir -p "$dir"/{runs,models,parts,verdicts}
 
-version="$("$bin/fdi-study" --version | head -n 1)${quick:+, quick}, seeds +$seeds"
+version="$("$bin/fdi-study" --version | head -n 1)${quick:+, quick}, $days days"
+version+=", seeds +$seeds"
 [ -f "$dir/version" ] || echo "$version" >"$dir/version"
 [ "$(cat "$dir/version")" = "$version" ] || {
   echo "table: $dir is of $(cat "$dir/version"): name another folder" >&2
   exit 2
 }
 
+# What differs from the first pass over the data: `again` names the runs of
+# second seeds, `variant` the sets of another rate or another training.
+again=""
+variant=""
+wanted_rate=""
+clustering_seed=""
+# Seeds that no other study has; those from 200000000 on are for the next release.
+second_seeds=40000000
 
 TIMEFORMAT="%U %S"
 
@@ -98,24 +121,32 @@ open=(--parameters lublin-actuator-3 --excitation sine
   --set continuous_inputs=true --set cold_start=true)
 level=(--parameters lublin-actuator-3 --excitation level-loop)
 
+# Trains the set of a campaign under another name, with lines of [training].
+train() {  # CAMPAIGN NAME LINE...
+  local options=()
+  [ -z "$wanted_rate" ] || options=(--false-alarms-per-hour "$wanted_rate")
+  awk '{ print } /^\[training\]/ { print more; done = 1 }
+    END { if (!done) print "[training]\n" more }' \
+    more="$(printf '%s\n' "${@:3}")" "campaigns/$1.toml" >"$dir/$2.toml"
+  once "models/$2" "$bin/fdi-trainer" train --campaign "$dir/$2.toml" \
+    --name "$2" "${options[@]}"
+}
+
 # The set of ours that a method takes, into `model`; none: it does not exist for
 # the data. What onboarding fits has no switch for its rules.
 make_variant() {  # METHOD
-  model=$set_name-$1
+  model=$set_name$variant
+  [ "$1" != ours ] || return 0
+  model+=-$1
   case $1 in
-    ours) model=$set_name ;;
     linear)
       [ -f "campaigns/$set_name.toml" ] || { model="" && return; }
-      awk '{ print } /^\[training\]/ { print one; done = 1 }
-        END { if (!done) print "[training]\n" one }' \
-        one=$'min_rules = 1\nmax_rules = 1\nsearch_rules = 1' \
-        "campaigns/$set_name.toml" >"$dir/$model.toml"
-      once "models/$model" "$bin/fdi-trainer" train \
-        --campaign "$dir/$model.toml" --name "$model"
+      train "$set_name" "$model" "min_rules = 1" "max_rules = 1" \
+        "search_rules = 1"
       ;;
     *)
-      once "models/$model" "$bin/fdi-study" reduce "$set_name" --as "$model" \
-        --without-parts "${1/observers/looks,floor}"
+      once "models/$model" "$bin/fdi-study" reduce "$set_name$variant" \
+        --as "$model" --without-parts "${1/observers/looks,floor}"
       ;;
   esac
 }
@@ -123,16 +154,17 @@ make_variant() {  # METHOD
 make_set() {  # SET
   case $1 in
     paper | benchmark)
-      once "models/$1" "$bin/fdi-trainer" train --campaign "campaigns/$1.toml"
+      train "$1" "$1$variant" \
+        ${clustering_seed:+"clustering_seed = $clustering_seed"}
       ;;
     loop)
       once models/loop "$bin/fdi-trainer" onboard --valve loop --no-coverage \
         --file "$data/closed-loop/healthy_onboard.csv"
       ;;
-    own)
-      simulate own-healthy 11 7200 "${level[@]}"
-      once models/own "$bin/fdi-trainer" onboard --valve own --no-coverage \
-        --file "$dir/runs/own-healthy.csv"
+    own*)
+      simulate "$1-healthy" 11 7200 "${level[@]}"
+      once "models/$1" "$bin/fdi-trainer" onboard --valve "$1" --no-coverage \
+        --file "$dir/runs/$1-healthy.csv"
       ;;
   esac
 }
@@ -156,7 +188,7 @@ training_of() {  # SET
       ;;
     benchmark) training=("$data"/valve-reference/sine_*.csv) ;;
     loop) training=("$data/closed-loop/healthy_onboard.csv") ;;
-    own) training=("$dir/runs/own-healthy.csv") ;;
+    own*) training=("$dir/runs/$1-healthy.csv") ;;
   esac
 }
 
@@ -164,9 +196,9 @@ training_of() {  # SET
 hours() {  # DATA SEED OPTION...
   local n
   for n in $(seq "$days"); do
-    simulate "$1/$n" $(($2 + n)) $((quick ? 28800 : 86400)) "${@:3}"
+    simulate "$1$again/$n" $(($2 + n)) $((quick ? 28800 : 86400)) "${@:3}"
   done
-  files=("$dir/runs/$1"/*.csv)
+  files=("$dir/runs/$1$again"/*.csv)
 }
 make_runs() {  # DATA
   local seed fault strength
@@ -179,7 +211,7 @@ make_runs() {  # DATA
         f{3,6}:incipient@50+1650:strength=1 f7:incipient@50+210:strength=1 \
         f19:incipient@50+850:strength=1; do
         seed=$((seed + 1))
-        simulate "paper/$fault" $seed 2000 "${paper[@]}" --fault "$fault"
+        simulate "paper$again/$fault" $seed 2000 "${paper[@]}" --fault "$fault"
       done
       ;;
     benchmark)
@@ -187,7 +219,7 @@ make_runs() {  # DATA
       for fault in f{1,7,8,10,13,16,18}={.25,.5,.75} \
         f{12,14,19}=-{.25,.5,.75} f{2,11,15,17}=.75; do
         seed=$((seed + 1))
-        simulate "benchmark/$fault" $seed 1501 "${open[@]}" \
+        simulate "benchmark$again/$fault" $seed 1501 "${open[@]}" \
           --fault "${fault%=*}:abrupt@900:strength=${fault#*=}"
       done
       for fault in f13+900 f{4,17}+3600 f{2,3,5,6,9,11,18}+86400; do
@@ -196,7 +228,7 @@ make_runs() {  # DATA
         case ${fault#*+} in
           900) seconds=2401 ;; 3600) seconds=5101 ;; *) seconds=85501 ;;
         esac
-        simulate "benchmark/$fault" $seed $seconds "${open[@]}" \
+        simulate "benchmark$again/$fault" $seed $seconds "${open[@]}" \
           --fault "${fault%+*}:incipient@900+${fault#*+}:strength=1"
       done
       ;;
@@ -205,16 +237,16 @@ make_runs() {  # DATA
       for fault in f{2,4,5,9,10,11,12,13,15,16,17,18}={.3,.6} \
         f{12,13,17,19}=-{.3,.6} {t1,p1,p2}={.3,-.3,.6,-.6}; do
         seed=$((seed + 1))
-        simulate "untrained/$fault" $seed 600 "${paper[@]}" \
+        simulate "untrained$again/$fault" $seed 600 "${paper[@]}" \
           --fault "${fault%=*}:abrupt@200:strength=${fault#*=}"
       done
       ;;
     own)
-      set_name=own seed=97400
+      set_name=own$again seed=97400
       for fault in f{1,2,3,4,6,7,10,11,12,13,16,17,18,19}={.35,.7} \
         f12=-{.35,.7}; do
         seed=$((seed + 1))
-        simulate "own/$fault" $seed 2400 "${level[@]}" \
+        simulate "own$again/$fault" $seed 2400 "${level[@]}" \
           --fault "${fault%=*}:abrupt@1200:strength=${fault#*=}"
       done
       ;;
@@ -223,55 +255,108 @@ make_runs() {  # DATA
       set_name=loop files=("$data"/closed-loop/healthy_4h_*.csv)
       return
       ;;
-    own-hours) set_name=own; hours own-hours 98000 "${level[@]}"; return ;;
+    own-hours) set_name=own$again; hours own-hours 98000 "${level[@]}"; return ;;
     open-hours) set_name=benchmark; hours open-hours 98500 "${open[@]}"; return ;;
+    given-days)
+      set_name=benchmark files=("$data"/fault-free-days/*.csv)
+      return
+      ;;
   esac
-  files=("$dir/runs/$1"/*.csv)
+  files=("$dir/runs/$1$again"/*.csv)
+}
+
+# False alarms an hour that the set of the data is trained for.
+rate_of() {  # DATA
+  case $1 in paper | untrained) echo 1e-4 ;; *) echo 1e-3 ;; esac
 }
 
 score() {  # DATA METHOD
-  local name=$set_name-$2 runs=() rate=1e-3 file
+  local part=$1$again$variant fitted=$set_name$variant-$2 runs=() rate file
   for file in "${files[@]}"; do runs+=(--file "$file"); done
-  [ "$set_name" != paper ] || rate=1e-4
+  rate=${wanted_rate:-$(rate_of "$1")}
   case $2 in
     ours | observers | early | floor | looks | windows | linear)
       make_variant "$2"
       [ -z "$model" ] ||
-        once "parts/$1/$2.csv" "$bin/fdi-study" evaluate --assume-normal --csv \
-          --model-set "$model" "${runs[@]}"
+        once "parts/$part/$2.csv" "$bin/fdi-study" evaluate --assume-normal \
+          --csv --model-set "$model" "${runs[@]}"
       ;;
     arx-cusum | signature-table)
-      once "parts/$1/$2.csv" "$bin/fdi-study" baseline "$2" --assume-normal \
-        --csv "${training[@]/#/--train-file=}" "${runs[@]}"
+      once "parts/$part/$2.csv" "$bin/fdi-study" baseline "$2" --assume-normal \
+        --csv --false-alarms-per-hour "$rate" \
+        "${training[@]/#/--train-file=}" "${runs[@]}"
       ;;
     *)
-      once "models/$name" bench/baselines.py fit "$2" --per-hour $rate \
-        -o "$dir/models/$name.pickle" "${training[@]}"
-      if [ -f "$dir/models/$name.skipped" ]; then
-        cp "$dir/models/$name.skipped" "$dir/parts/$1/$2.csv.skipped"
+      once "models/$fitted" bench/baselines.py fit "$2" --per-hour "$rate" \
+        -o "$dir/models/$fitted.pickle" "${training[@]}"
+      if [ -f "$dir/models/$fitted.skipped" ]; then
+        cp "$dir/models/$fitted.skipped" "$dir/parts/$part/$2.csv.skipped"
         return
       fi
-      once "verdicts/$1-$2" bench/baselines.py score \
-        "$dir/models/$name.pickle" -o "$dir/verdicts/$1/$2" "${files[@]}"
-      once "parts/$1/$2.csv" "$bin/fdi-study" verdicts --assume-normal --csv \
+      once "verdicts/$part-$2" bench/baselines.py score \
+        "$dir/models/$fitted.pickle" -o "$dir/verdicts/$part/$2" "${files[@]}"
+      once "parts/$part/$2.csv" "$bin/fdi-study" verdicts --assume-normal --csv \
         "$(for file in "${files[@]}"; do
-          echo "$dir/verdicts/$1/$2/$(basename "$file")"
+          echo "$dir/verdicts/$part/$2/$(basename "$file")"
         done | paste -sd,)" "${runs[@]}"
       ;;
   esac
 }
 
-read -ra methods <<<"${METHODS:-ours observers early floor looks windows linear \
-  position pca forest boosted arx-cusum signature-table}"
-for name in "${wanted[@]}"; do
-  mkdir -p "$dir/parts/$name"
-  make_runs "$name"
+score_all() {  # DATA METHOD...
+  local method
+  mkdir -p "$dir/parts/$1$again$variant"
+  make_runs "$1"
   make_set "$set_name"
   training_of "$set_name"
-  cat "${files[@]}" | wc -l >"$dir/parts/$name/rows"
-  for method in "${methods[@]}"; do
-    score "$name" "$method"
-    echo "$name $method"
+  cat "${files[@]}" | wc -l >"$dir/parts/$1$again$variant/rows"
+  for method in "${@:2}"; do
+    score "$1" "$method"
+    echo "$1$again$variant $method"
   done
+}
+
+# Those of the data that were named.
+among() {  # DATA...
+  local name
+  for name in "$@"; do
+    [[ " ${wanted[*]} " != *" $name "* ]] || echo "$name"
+  done
+}
+
+read -ra methods <<<"${METHODS:-ours observers early floor looks windows linear \
+  position pca forest boosted arx-cusum signature-table}"
+read -ra curves <<<"${CURVES:-ours position pca forest boosted arx-cusum}"
+for name in "${wanted[@]}"; do
+  case $name in
+    second)
+      again=-second seeds=$((seeds + second_seeds))
+      for one in $(among paper benchmark untrained own own-hours open-hours); do
+        score_all "$one" "${methods[@]}"
+      done
+      again="" seeds=$((seeds - second_seeds))
+      ;;
+    curves)
+      for wanted_rate in 1e-1 1e-2 1e-3 1e-4; do
+        variant=-at$wanted_rate
+        for one in $(among paper benchmark untrained open-hours); do
+          [ "$wanted_rate" = "$(rate_of "$one")" ] ||
+            score_all "$one" "${curves[@]}"
+        done
+      done
+      variant="" wanted_rate=""
+      ;;
+    retrainings)
+      for n in $(seq "$retrainings"); do
+        variant=-training$n clustering_seed=$((1 + 100 * n))
+        for one in $(among paper benchmark untrained); do
+          score_all "$one" ours
+        done
+      done
+      variant="" clustering_seed=""
+      ;;
+    real) once real bench/real_data.py "$bin" "$dir/real-data" ;;
+    *) score_all "$name" "${methods[@]}" ;;
+  esac
 done
 bench/table.py "$dir" "$page"

@@ -3,9 +3,9 @@
 # and every event that warns stands in docs/troubleshooting.md, and no id there
 # is one that nothing logs. Links between documents lead somewhere, each page is
 # in one part of docs/README.md, README.md and docs/results.md keep their
-# lengths, docs/method.md has a row for every rule of the decision,
-# docs/openapi.yaml has the routes of the page, and docs/faults.md and docs/json.md
-# are up to date.
+# lengths, README.md's results are lines of docs/results/table.md, docs/method.md
+# has a row for every rule of the decision, docs/openapi.yaml has the routes of the
+# page, and docs/faults.md and docs/json.md are up to date.
 set -u
 cd "$(dirname "$0")/.."
 failed=0
@@ -75,6 +75,14 @@ words=$(wc -w <README.md)
 [ "$words" -le 700 ] || complain "README.md has $words words, at most 700"
 lines=$(wc -l <docs/results.md)
 [ "$lines" -le 120 ] || complain "docs/results.md has $lines lines, at most 120"
+# README's results are lines of the table of all methods, word for word.
+results=$(sed -n '/^## What nobody else has/,/^## Where/p' README.md |
+  grep '^| ' | tail -n +2)
+[ "$(wc -l <<<"$results")" -ge 5 ] || complain "README.md has few results"
+while read -r row; do
+  grep -qxF -- "$row" docs/results/table.md ||
+    complain "README.md says what docs/results/table.md does not: $row"
+done <<<"$results"
 tests/faults_page.sh --check || failed=1
 tests/json_page.sh --check || failed=1
 

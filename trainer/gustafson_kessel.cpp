@@ -334,7 +334,7 @@ FuzzyPartition BestStart(const MatrixXd& z,
   Iteration iteration(z, options);
   FuzzyPartition best;
   for (int start = 0; start < options.num_starts; ++start) {
-    const unsigned seed = options.seed + static_cast<unsigned>(start);
+    const auto seed = static_cast<unsigned>(options.seed + start);
     const Index c = options.num_clusters;
     // A single start is a random partition, because centers among the points
     // cut thin parallel clusters across.

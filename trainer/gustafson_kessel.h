@@ -19,7 +19,7 @@ struct GustafsonKesselOptions {
   double max_condition{1e12};     ///< β ≥ 1, bound on cond(Fᵢ) [-].
   int num_starts{3};              ///< ≥ 1; the start with the lowest J wins.
   int coarse_points{500};         ///< For choosing a start; 0: all points.
-  unsigned seed{1};               ///< Of the random starts.
+  int seed{1};                    ///< Of the first random start; >= 0.
 };
 
 /// A fuzzy partition of N points in n dimensions into c clusters.

@@ -5,6 +5,7 @@
 #include <CLI/CLI.hpp>
 
 #include "base/error.h"
+#include "bench/study/baseline.h"
 #include "bench/study/evaluation_report.h"
 #include "bench/study/model_reduction.h"
 #include "bench/study/studies.h"
@@ -25,8 +26,9 @@ struct ScoringOptions {
   StudySelection selection;
   bool assume_normal{false};
   int seeds{0};
-  std::vector<std::string> verdicts;     // Files, one per run.
-  std::string baseline;                  // Of BaselineNames().
+  std::vector<std::string> verdicts;  // Files, one per run.
+  std::string baseline;               // Of BaselineNames().
+  BaselineOptions fit;
   std::vector<std::string> train_runs;   // Of the baseline.
   std::vector<std::string> train_files;  // Of the baseline.
 };
@@ -115,7 +117,7 @@ report::Report ScoreBaseline(const ScoringOptions& options,
   dataset.assume_normal = options.assume_normal;
   const Baseline baseline =
       FitBaseline(options.baseline, BuildConditions(training, dataset),
-                  training.front().period_s, {});
+                  training.front().period_s, options.fit);
   report::Report report = Score(
       options, context, FittedBaseline(baseline, training.front().flow_unit));
   if (!baseline.table.empty()) {
@@ -173,6 +175,10 @@ void AddBaselineVerb(report::Program& program) {
       ->expected(1)
       ->take_all()
       ->type_name("FILE.csv[@from:to]");
+  verb.add_option("--false-alarms-per-hour", options->fit.false_alarms_per_hour,
+                  "Rate that the limits are set for")
+      ->check(CLI::Range(1e-9, 3600.0))
+      ->type_name("R");
   AddTruth(verb, *options);
   program.AllowCsv(verb, "One line per run instead of tables");
 }

@@ -40,6 +40,7 @@ void VisitTraining(TrainingOptions& t, Visitor&& visit) {
   visit("settling", t.fit.settling, 0, 100000);
   visit("fuzziness", clustering.fuzziness, 1.01, 10.0);
   visit("starts", clustering.num_starts, 1, 100);
+  visit("clustering_seed", clustering.seed, 0, 1000000000);
 }
 
 }  // namespace fdi::trainer
