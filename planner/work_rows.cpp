@@ -248,11 +248,14 @@ void RowReader::AddFault(SameFault& same) {
     finding.confirmed = true;
     finding.confidence = 1.0;
   }
-  // A label that names another fault has no stored priority.
+  // A label that names another fault changes what to check. The severity is
+  // that of the alarm in every view.
   if (const std::string fault = FaultOf(episode);
       fault != episode.fault.value_or("unknown")) {
     finding.fault = fault;
+    const Severity severity = finding.words.severity;
     finding.words = texts_.Words(fault, episode.strength);
+    finding.words.severity = severity;
   }
   std::string why = EpisodeText(finding, query_.now_ns);
   if (const auto labels = facts_.labels.find(episode.fault.value_or(""));

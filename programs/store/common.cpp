@@ -183,6 +183,7 @@ Json EpisodeJson(const Alarm& alarm) {
       {"isolated_utc", TextJson(episode.isolated_utc)},
       {"cleared_utc", TextJson(episode.cleared_utc)},
       {"ended_utc", TimeJson(episode.ended_ns)},
+      {"returned_utc", TimeJson(ReturnedNs(episode))},
       {"fault", TextJson(episode.fault)},
       {"certainty", CertaintyName(CertaintyOf(episode))},
       {"look_alikes", LookAlikesOf(episode)},

@@ -89,8 +89,9 @@ Report ListEpisodes(const HistoryOptions& options, const Context& context) {
   auto episodes = history->List(filter);
   NameFaults(episodes, context);
   const std::vector<Alarm> alarms =
-      history->Alarms(std::move(episodes), NowNs());
+      history->Alarms(std::move(episodes), filter.now_ns);
   Report report;
+  report.document["as_of_utc"] = FormatTime(filter.now_ns, true);
   report.document["episodes"] = Rows(alarms, ListedJson);
   std::vector<std::string> keys = EpisodeKeys();
   if (options.plant.asked()) {
@@ -107,8 +108,9 @@ Report ListEpisodes(const HistoryOptions& options, const Context& context) {
   Column alarm = TextColumn("alarm", AlarmText);
   alarm.tone = ToneOf;
   const auto end = [](const Json& row) {
-    return row["end_reason"].is_null() ? "open"
-                                       : row["end_reason"].get<std::string>();
+    return !row["unconfirmed_utc"].is_null() ? "not confirmed"
+           : row["end_reason"].is_null()     ? "open"
+                                         : row["end_reason"].get<std::string>();
   };
   std::vector<Column> columns = {
       {"episode", "episode_id"},
@@ -129,8 +131,8 @@ Report ListEpisodes(const HistoryOptions& options, const Context& context) {
           [](const Json& row) { return After(row, "isolated_utc"); }, 6,
           Align::kRight),
       TextColumn(
-          "lasted", [](const Json& row) { return After(row, "ended_utc"); }, 5,
-          Align::kRight),
+          "lasted", [](const Json& row) { return After(row, "returned_utc"); },
+          5, Align::kRight),
       TextColumn("end", end, 5),
       {"label", "label", Format::kPlain, 0, 6},
       {"acked by", "acked_by", Format::kPlain, 0, 7},
@@ -139,7 +141,8 @@ Report ListEpisodes(const HistoryOptions& options, const Context& context) {
     columns.insert(columns.begin() + 1, {{"host", "host", Format::kPlain, 0, 9},
                                          {"monitor", "monitor"}});
   }
-  return report.Table("episodes", columns, "no episode matches");
+  report.Table("episodes", columns, "no episode matches");
+  return report.Line("as of " + TimeText(filter.now_ns, context));
 }
 
 // Transitions have faults and a factor; operator actions have a who.

@@ -106,12 +106,8 @@ Finding FindingOf(const storage::Episode& episode,
     finding.grade = grade->second;
   }
   finding.since_ns = episode.detected_ns;
-  // The end of the data is no return to normal.
   finding.unconfirmed_ns = episode.unconfirmed_ns;
-  if (!episode.unconfirmed_ns) {
-    finding.ended_ns =
-        episode.cleared_ns ? episode.cleared_ns : episode.ended_ns;
-  }
+  finding.ended_ns = storage::ReturnedNs(episode);
   finding.last_ns = episode.trace_end_ns.value_or(episode.detected_ns);
   finding.episode_id = episode.episode_id;
   finding.episodes = 1;

@@ -194,6 +194,12 @@ AlarmState AlarmStateOf(const Episode& episode, bool shelved) {
                       shelved);
 }
 
+std::optional<std::int64_t> ReturnedNs(const Episode& episode) {
+  return episode.unconfirmed_ns ? std::nullopt
+         : episode.cleared_ns   ? episode.cleared_ns
+                                : episode.ended_ns;
+}
+
 bool IsTakenOver(const Episode& episode) {
   return episode.end_reason == "superseded" &&
          episode.layer == LayerName(Layer::kAudit);

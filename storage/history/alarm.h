@@ -87,6 +87,10 @@ bool LeavesUnconfirmed(EndReason reason);
 /// this one of the audit was (Episode::audit): it has not returned to normal.
 bool IsTakenOver(const Episode& episode);
 
+/// When its fault was seen to be gone; nothing while it stands. The end of its
+/// data is no return.
+std::optional<std::int64_t> ReturnedNs(const Episode& episode);
+
 /// The alarm that `event` belongs to, made from the event alone because it is
 /// not, or not yet, in the history.
 Alarm AlarmOf(const FaultEvent& event);

@@ -107,7 +107,7 @@ function tile(id, state, faults = [], more = {}) {
 function alarm(episode, valve, fault, more = {}) {
   return {episode, valve, fault, layer: null, state: 'ISOLATED', isa: 'UNACK',
     shelved: null, detected_ms: kNowMs, isolated_ms: null, cleared_ms: null,
-    ended_ms: null, end_reason: null, peak_factor: 0.9, strength: 0.5,
+    ended_ms: null, returned_ms: null, end_reason: null, peak_factor: 0.9, strength: 0.5,
     certainty: fault ? 'likely' : 'not yet',
     label: null, acked_by: null, acked_ms: null, model_set: 'm@1',
     severity: 'high', score: 4, discipline: 'instrument', namur: 'failure',
@@ -603,14 +603,20 @@ test('an alarm stays one while its valve is not judged', async () => {
 });
 
 test('an alarm whose data ended stays, and can be shelved', async () => {
-  const ended = {state: 'CLOSED', unconfirmed_ms: kNowMs};
+  // It is detected three hours ago and heard for an hour; it stands since then.
+  const ended = {state: 'CLOSED', detected_ms: kNowMs - 3 * 3600000,
+    ended_ms: kNowMs - 2 * 3600000, unconfirmed_ms: kNowMs - 2 * 3600000};
   monitor.reset([], [alarm('0000000000000001', 'V', 'f19', ended),
     alarm('0000000000000002', 'W', 'f19', {...ended, isa: 'RTN_UNACK',
-      unconfirmed_ms: null})]);
+      unconfirmed_ms: null, returned_ms: ended.ended_ms})]);
   Object.assign(monitor.answers.status, {write: true, user: 'anna'});
   const page = await openShared(browser, address, '#/alarms');
-  await page.locator('tr.group-UNACK', {hasText: 'not confirmed since'})
-      .getByRole('button', {name: 'Shelve V'}).waitFor();
+  const stands = page.locator('tr.group-UNACK',
+      {hasText: 'not confirmed since'});
+  await stands.getByRole('button', {name: 'Shelve V'}).waitFor();
+  assert.match(await stands.innerText(), /3 h 0\d min/);
+  assert.match(await page.locator('tr.group-RTN_UNACK').innerText(),
+      /1 h 00 min/);
   assert.equal(await page.getByRole('button', {name: 'Shelve W'}).count(), 0);
   await close(page);
 });
@@ -721,11 +727,15 @@ test('alarms stand in the order of the work list, and say as of when',
       monitor.reset([], [
         alarm('0000000000000001', 'Low', 'f6', {score: 1, severity: 'high'}),
         alarm('0000000000000002', 'Most', 'f19', {score: 8, severity: 'low'}),
-        alarm('0000000000000003', 'Seen', 'f19', {score: 9, isa: 'ACKED'})]);
+        alarm('0000000000000003', 'Seen', 'f19', {score: 9, isa: 'ACKED'}),
+        alarm('0000000000000004', 'Gone', 'f19', {score: 16, isa: 'RTN_UNACK',
+          returned_ms: kNowMs}),
+        alarm('0000000000000005', 'Aside', 'f19', {score: 16,
+          shelved: {until_ms: kNowMs, who: 'jan', comment: ''}})]);
       const page = await openShared(browser, address, '#/alarms');
       await page.locator('tbody tr').first().waitFor();
       assert.deepEqual(await page.locator('tbody th').allInnerTexts(),
-          ['Most', 'Low', 'Seen']);
+          ['Seen', 'Most', 'Low', 'Gone', 'Aside']);
       await page.getByText(/^As of /).waitFor();
       await close(page);
     });

@@ -210,6 +210,16 @@ TEST_F(WorkListTest, ALabelSaysWhatItReallyWas) {
   EXPECT_EQ(row["confidence"], 1.0);
 }
 
+// The alarm is the same in every view: a label leaves its severity.
+TEST_F(WorkListTest, ALabelDoesNotChangeTheSeverityOfTheAlarm) {
+  RecordOpen("V1", 0b100);
+  const std::string before = Rows().at(0)["severity"];
+  ASSERT_NE(SeverityName(Texts().Words("f5", 1.0).severity), before);
+  Label("V1", "f5");
+  EXPECT_EQ(Rows().at(0)["fault"], "f5");
+  EXPECT_EQ(Rows().at(0)["severity"], before);
+}
+
 TEST_F(WorkListTest, WhatIsLabelledAndOverIsDone) {
   RecordEpisode(writer_, 0b100, "V1");
   RecordOpen("V2", 0b100);

@@ -13,6 +13,7 @@
 #include <set>
 #include <string>
 #include <thread>
+#include <tuple>
 
 #include <gmock/gmock.h>
 #include <httplib.h>
@@ -37,7 +38,7 @@ using storage::PrivatePostgres;
 constexpr std::array kAgreed = {
     "valve_id", "fault",       "fault_name",  "strength", "worst",
     "severity", "priority",    "alarm_state", "shelved",  "unconfirmed",
-    "acked_by", "ack_comment", "label"};
+    "acked_by", "ack_comment", "label",       "stands",   "score"};
 using Alarms = std::map<std::string, json>;  // By episode.
 
 constexpr const char* kViewColumns =
@@ -63,7 +64,8 @@ std::string Differences(const std::string& where, const Alarms& list,
       continue;
     }
     for (const char* key : kAgreed) {
-      if (found->second.contains(key) && !Same(row[key], found->second[key])) {
+      if (row.contains(key) && found->second.contains(key) &&
+          !Same(row[key], found->second[key])) {
         text += where + ": " + key + " of " + row["valve_id"].dump() + " is " +
                 found->second[key].dump() + ", the list has " +
                 row[key].dump() + '\n';
@@ -189,6 +191,7 @@ class ShiftTest : public MonitorFixture {
       row["worst"] = row["worst_strength"];
       row["shelved"] = !row["shelved_until_utc"].is_null();
       row["unconfirmed"] = !row["unconfirmed_utc"].is_null();
+      row["stands"] = row["returned_utc"].is_null();
       if (row["alarm_state"] != "NORMAL") {
         alarms[row["episode_id"]] = row;
       }
@@ -210,6 +213,7 @@ class ShiftTest : public MonitorFixture {
       row["alarm_state"] = row["isa"];
       row["shelved"] = !row["shelved"].is_null();
       row["unconfirmed"] = !row["unconfirmed_ms"].is_null();
+      row["stands"] = row["returned_ms"].is_null();
       alarms[row["episode"]] = row;
     }
     return alarms;
@@ -234,7 +238,7 @@ class ShiftTest : public MonitorFixture {
   }
   static json AlarmOfRow(const std::vector<json>& row) {
     json alarm;
-    for (std::size_t i = 0; i < kAgreed.size(); ++i) {
+    for (std::size_t i = 0; i + 1 < row.size(); ++i) {
       alarm[kAgreed[i]] = row[i + 1];
     }
     return alarm;
@@ -330,27 +334,55 @@ class ShiftTest : public MonitorFixture {
     ADD_FAILURE() << "no panel " << title;
     return "";
   }
+  // The ids of alarms, as the page sorts what it gets: what stands, then the
+  // larger score, then the newer one.
+  static std::vector<std::string> ByRank(const Alarms& page) {
+    std::vector<std::string> ids;
+    for (const auto& [id, row] : page) {
+      ids.push_back(id);
+    }
+    const auto key = [&page](const std::string& id) {
+      const json& row = page.at(id);
+      return std::tuple(row["stands"] == false, -row["score"].get<double>(),
+                        -row["detected_ms"].get<std::int64_t>(),
+                        row["valve_id"].get<std::string>(), id);
+    };
+    std::ranges::sort(ids, {}, key);
+    return ids;
+  }
   // Of what is shelved nothing may be there.
-  std::string WorkListDifferences(Alarms list) const {
+  std::string WorkListDifferences(Alarms list, Alarms page) const {
     Alarms told;
+    std::vector<std::string> order;
     const json work = json::parse(Store("worklist --json"));
     for (const json& row : work["rows"]) {
       const json& id = row["episode_id"];
       // Of what ended and was acknowledged, it still tells for a time.
       if (id.is_string() && list.contains(id.get<std::string>())) {
+        order.push_back(id);
         told[id] = {{"valve_id", row["valve_id"]},
                     {"fault", row["fault"]},
                     {"severity", row["severity"]},
+                    {"unconfirmed", !row["unconfirmed_utc"].is_null()},
+                    {"stands", row["open"]},
+                    {"score", row["score"]},
                     {"strength", row["strength"]}};
       }
     }
+    for (auto& [id, row] : list) {
+      row["score"] = page.contains(id) ? page[id]["score"] : json();
+    }
+    std::erase_if(
+        page, [&told](const auto& item) { return !told.contains(item.first); });
+    const std::string ranked =
+        ByRank(page) == order ? "" : "the page has another order\n";
     // A finding that is labelled and over is done.
     std::erase_if(list, [](const auto& item) {
       const json& row = item.second;
       return row["shelved"] == true ||
              (!row["label"].is_null() && row["alarm_state"] == "RTN_UNACK");
     });
-    return Differences("work list", list, told);
+    return ranked + Differences("work list", list, told);
   }
   // What somebody knows who has heard nothing but the events, of active alarms.
   Alarms FromHook() const {
@@ -442,12 +474,13 @@ class ShiftTest : public MonitorFixture {
         bus[id].erase("unconfirmed");
       }
     }
+    const Alarms page = FromPage();
     std::string text =
-        Differences("page", list, FromPage()) +
+        Differences("page", list, page) +
         Differences("tiles", active, FromTiles()) +
-        Differences("history show", list, shown) + WorkListDifferences(list) +
-        Differences("SQL", list, FromSql()) + Differences("bus", active, bus) +
-        Differences("hook", announced, hook);
+        Differences("history show", list, shown) +
+        WorkListDifferences(list, page) + Differences("SQL", list, FromSql()) +
+        Differences("bus", active, bus) + Differences("hook", announced, hook);
     if (server_ != nullptr) {
       text += Differences("PostgreSQL", list, FromPostgres());
       text += Differences("Grafana", list, FromGrafana(list));

@@ -81,11 +81,12 @@ export function groupName(row) {
   return groups.find((group) => group.key === key)?.name ?? 'Normal';
 }
 
-/** Worst first: by group, then in the order of the work list. */
+/** In the order of the work list, which has nothing that is shelved. */
 export function compareAlarms(a, b) {
-  const group = (row) => groups.findIndex((g) => g.key === groupOf(row));
-  return group(a) - group(b) || b.score - a.score ||
-      b.detected_ms - a.detected_ms || (a.episode < b.episode ? -1 : 1);
+  const place = (row) => row.shelved ? 2 : row.returned_ms === null ? 0 : 1;
+  const key = (row) => `${row.valve}\n${row.episode}`;
+  return place(a) - place(b) || b.score - a.score ||
+      b.detected_ms - a.detected_ms || (key(a) < key(b) ? -1 : 1);
 }
 
 /** Of an alarm whose data ended; empty otherwise. */

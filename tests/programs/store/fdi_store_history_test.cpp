@@ -52,19 +52,39 @@ TEST_F(FdiStoreHistoryTest, ListedEpisodesHaveTheColumnsOfTheView) {
 
   ASSERT_EQ(listed["episodes"].size(), 1U);
   const json& episode = listed["episodes"][0];
-  EXPECT_THAT(
-      KeysOf(episode),
-      testing::UnorderedElementsAre(
-          "episode_id", "valve_id", "detected_utc", "isolated_utc",
-          "cleared_utc", "ended_utc", "fault", "peak_factor", "model_set",
-          "end_reason", "label", "acked_by", "strength", "worst_strength",
-          "severity", "priority", "unconfirmed_utc", "certainty", "look_alikes",
-          "fault_name", "acked_utc", "ack_comment", "alarm_state",
-          "shelved_until_utc", "second", "description", "witness"));
+  EXPECT_THAT(KeysOf(episode),
+              testing::UnorderedElementsAre(
+                  "episode_id", "valve_id", "detected_utc", "isolated_utc",
+                  "cleared_utc", "ended_utc", "returned_utc", "fault",
+                  "peak_factor", "model_set", "end_reason", "label", "acked_by",
+                  "strength", "worst_strength", "severity", "priority",
+                  "unconfirmed_utc", "certainty", "look_alikes", "fault_name",
+                  "acked_utc", "ack_comment", "alarm_state",
+                  "shelved_until_utc", "second", "description", "witness"));
   EXPECT_EQ(episode["fault_name"], "Flashing or critical flow");
   EXPECT_EQ(episode["fault"], "f7");
   EXPECT_EQ(episode["detected_utc"], "2026-11-20T14:56:11.000Z");
   EXPECT_TRUE(episode["cleared_utc"].is_null());
+}
+
+// The end of the data is not the end of the fault.
+TEST_F(FdiStoreHistoryTest, WhatEndedWithItsDataStandsInTheList) {
+  {
+    HistoryWriter writer(path_);
+    RecordEpisode(writer, 0b100, "FV-1");
+    writer.Record(
+        Event(TransitionKind::kClosed, 60, 0b010, 0.8, EndReason::kStreamEnded),
+        kDetected);
+  }
+  const json listed = StoreJson("history list");
+  EXPECT_TRUE(listed["as_of_utc"].is_string());
+  for (const json& row : listed["episodes"]) {
+    EXPECT_FALSE(row["ended_utc"].is_null());
+    EXPECT_EQ(row["returned_utc"].is_null(), row["valve_id"] != "FV-1");
+  }
+  const std::string text = Store("history list").out;
+  EXPECT_THAT(text, testing::ContainsRegex(" -  not confirmed "));
+  EXPECT_THAT(text, HasSubstr("\nas of 20"));
 }
 
 // Whatever the ids and names. A file or a pipe gets all columns.

@@ -1,5 +1,5 @@
-// The alarm list as ISA-18.2 has it: unacknowledged, returned, acknowledged,
-// shelved; worst first in each.
+// The alarms in the order of the work list, the shelved ones last. Each says in
+// which state of ISA-18.2 it is; a chip selects those of one state.
 
 import {acknowledge, actionButtons, canAct, label, shelve}
   from '../actions.js';
@@ -160,7 +160,7 @@ class Alarms extends View {
     setText(this.#asOf, asOf ? `As of ${timeText(asOf)}` : '');
     for (const node of this.#body.rows) {
       const row = store.alarms.get(node.dataset.episode);
-      if (!row || row.ended_ms !== null) continue;
+      if (!row || row.returned_ms !== null) continue;
       const at = kColumns.indexOf(columns.lasted) + (canAct() ? 1 : 0);
       setText(node.cells[at], columns.lasted.cell(row));
     }

@@ -70,11 +70,10 @@ export const faultAndCheck = {text: 'Fault', class: 'fault', cell: (row) => [
 export const forText = (discipline) =>
   discipline?.split('|').join(' or ') ?? '–';
 
-/** How long it lasted, or lasts. */
+/** How long it stood, or stands; the end of its data is no end of it. */
 export function lastedText(row) {
   return durationText(
-      (row.cleared_ms ?? row.ended_ms ?? store.valveNowMs(row.valve)) -
-      row.detected_ms);
+      (row.returned_ms ?? store.valveNowMs(row.valve)) - row.detected_ms);
 }
 
 export function labelText(label) {
