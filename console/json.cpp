@@ -321,6 +321,7 @@ Json AlarmJson(const storage::Alarm& alarm, const report::FaultTexts& texts,
   };
   Json json{{"episode", e.episode_id},
             {"valve", e.valve_id},
+            {"about", findings::AboutJson(finding.about)},
             {"fault", TextOrNull(e.fault)},
             {"certainty", CertaintyName(*finding.certainty)},
             {"look_alikes", finding.look_alikes},

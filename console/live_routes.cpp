@@ -8,6 +8,7 @@
 #include "base/printable.h"
 #include "base/time_units.h"
 #include "console/api.h"
+#include "report/findings/finding.h"
 #include "storage/models/models.h"
 #include "storage/models/plant_loops.h"
 
@@ -108,9 +109,9 @@ Json WindowsJson(const ModelFacts& models,
 // What the entry of the valve and the table of the plant say about it. The page
 // of a plant does not have them.
 Json About(const Api& api, const httplib::Request& request) {
-  Json about = {{"type", nullptr},
-                {"service", nullptr},
-                {"grade", nullptr},
+  Json about = {{"type", nullptr},        {"service", nullptr},
+                {"description", nullptr}, {"location", nullptr},
+                {"document", nullptr},    {"grade", nullptr},
                 {"group", nullptr}};
   if (api.sources.plant_history || api.sources.models.empty()) {
     return about;
@@ -123,8 +124,10 @@ Json About(const Api& api, const httplib::Request& request) {
   }
   for (const storage::PlantLoop& loop : store.Loops()) {
     if (loop.name == valve_id) {
-      about["service"] = loop.service.empty() ? Json() : Json(loop.service);
-      about["grade"] = loop.grade ? Json(*loop.grade) : Json();
+      if (const Json identity = findings::AboutJson(loop);
+          identity.is_object()) {
+        about.update(identity);
+      }
       about["group"] = loop.group.empty() ? Json() : Json(loop.group);
     }
   }

@@ -11,6 +11,7 @@
 
 #include "monitor/bus/watch_table.h"
 #include "report/fault_texts.h"
+#include "report/findings/finding.h"
 #include "report/json_output.h"
 #include "storage/history/alarm.h"
 
@@ -54,6 +55,10 @@ class ValveStates {
   void SetGroup(const std::string& valve_id, const std::string& group) {
     groups_[valve_id] = group;
   }
+  /// Who the valve is; `about` of its state is findings::AboutJson().
+  void SetIdentity(const std::string& valve_id, const ValveIdentity& identity) {
+    identities_[valve_id] = identity;
+  }
   /// The alarms of all valves that somebody has still to see or that stand.
   /// @param alarms nothing: the history cannot be read.
   void SetAlarms(const std::optional<std::vector<storage::Alarm>>& alarms);
@@ -90,6 +95,7 @@ class ValveStates {
   std::vector<report::Json> new_events_;
   std::set<std::string> expected_;
   std::map<std::string, std::string> groups_;
+  findings::Identities identities_;
   bool has_history_{false};
   std::map<std::string, report::Json> alarms_;  // Arrays, by valve.
   std::map<std::string, Published> published_;  // By topic.

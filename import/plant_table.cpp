@@ -24,8 +24,9 @@ using NamedCells = std::map<std::string, std::string>;
 constexpr std::array<std::string_view, kLoopTagCount> kTagNames = {
     "op", "pv", "sp", "mode", "x", "f", "p1", "p2", "t1"};
 constexpr std::string_view kOtherKeys[] = {
-    "name", "sense", "service", "type",   "grade",   "group", "file",  "from",
-    "to",   "auto",  "manual",  "report", "max_age", "topic", "value", "time"};
+    "name",  "sense", "service",     "type",     "grade",   "group",   "file",
+    "from",  "to",    "auto",        "manual",   "report",  "max_age", "topic",
+    "value", "time",  "description", "location", "document"};
 // How rows without a model set are told apart from a forgotten type.
 constexpr std::string_view kDataOnly = "data only";
 
@@ -82,6 +83,7 @@ class RowReader {
     row_.group = Cell("group");
     ReadTags();
     ReadKind();
+    ReadIdentity();
     row_.file = Filled(Cell("file"));
     row_.from = Cell("from");
     row_.to = Cell("to");
@@ -215,6 +217,12 @@ class RowReader {
                "3");
       }
     }
+  }
+
+  void ReadIdentity() {
+    row_.description = Filled(Cell("description"));
+    row_.location = Filled(Cell("location"));
+    row_.document = Filled(Cell("document"));
   }
 
   // How the tags come while the plant runs.

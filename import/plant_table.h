@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "diagnosis/model/valve_identity.h"
 #include "import/csv.h"
 
 namespace fdi::importer {
@@ -30,14 +31,12 @@ struct TagCell {
 };
 
 /// A row of a plant's table: a valve or a loop.
-struct PlantRow {
+struct PlantRow : ValveIdentity {
   std::string name;
   std::string place;  ///< For messages: "plant.csv:12".
   std::array<TagCell, kLoopTagCount> tags;
   Sense sense{Sense::kClosing};  ///< Of op and x.
-  std::string service{};         ///< F, P, L, T or A; empty: not said.
   std::string type{};            ///< Empty: data only.
-  std::optional<int> grade{};    ///< 1..3
   std::string group{};
   std::string file{};  ///< Empty: those of the table.
   std::string from{};  ///< A time, or seconds of the file; empty: its begin.

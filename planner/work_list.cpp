@@ -46,8 +46,10 @@ Json RowJson(const WorkRow& row, std::size_t rank,
       {"name", f.words.name},
       {"severity", SeverityName(f.words.severity)},
       {"severity_points", findings::SeverityPoints(f.words.severity)},
-      {"grade", f.grade ? Json(*f.grade) : Json()},
-      {"grade_factor", findings::GradeFactor(f.grade)},
+      {"about", findings::AboutJson(f.about)},
+      {"about_text", findings::AboutText(f.about)},
+      {"grade", f.about.grade ? Json(*f.about.grade) : Json()},
+      {"grade_factor", findings::GradeFactor(f.about.grade)},
       {"certainty", f.certainty ? Json(CertaintyName(*f.certainty)) : Json()},
       {"confidence", SixDigits(f.confidence)},
       {"layer", OrNull(f.layer)},
@@ -242,9 +244,7 @@ Json WorkList(storage::History* history, const report::FaultTexts& texts,
   RankFacts facts;
   facts.labels = alarms.faults;
   for (const PlannedLoop& loop : query.loops) {
-    if (loop.grade) {
-      facts.grades[loop.valve_id] = *loop.grade;
-    }
+    facts.valves[loop.valve_id] = loop.about;
   }
   std::map<std::string, ValveLife> lives;
   std::vector<DoneFinding> done;

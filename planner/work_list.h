@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "diagnosis/model/valve_identity.h"
 #include "diagnosis/records/loop_audits.h"
 #include "planner/health_view.h"
 #include "report/fault_texts.h"
@@ -22,8 +23,8 @@ inline constexpr int kJudgedDays = 7;
 /// A loop that ought to be watched.
 struct PlannedLoop {
   std::string valve_id;
-  std::optional<int> grade{};  ///< As RankFacts::grades.
-  std::string finding{};       ///< Why its record could not be used, if known.
+  ValveIdentity about{};
+  std::string finding{};  ///< Why its record could not be used, if known.
 };
 
 /// Something was done about a finding, or was ordered.

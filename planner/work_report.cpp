@@ -68,7 +68,11 @@ std::string RowText(const Json& row) {
   }
   text += "  " + FormatNumber(row["score"].get<double>(), 2) + " (severity " +
           SeverityText(row) + ", certainty " + CertaintyText(row) + ", grade " +
-          GradeText(row) + ")\n   because " + row["why"].get<std::string>();
+          GradeText(row) + ")";
+  if (!row["about_text"].get_ref<const std::string&>().empty()) {
+    text += "\n   " + row["about_text"].get<std::string>();
+  }
+  text += "\n   because " + row["why"].get<std::string>();
   if (!row["shares"].is_null()) {
     text += "; shares " + row["shares"].get<std::string>();
   }
@@ -121,6 +125,9 @@ void AddCsv(report::Report& report) {
                                    "certainty",
                                    "confidence",
                                    "layer",
+                                   "about/description",
+                                   "about/location",
+                                   "about/document",
                                    "grade",
                                    "grade_factor",
                                    "score",
@@ -182,8 +189,10 @@ std::vector<Column> RowColumns() {
       Wide(Text("valve",
                 [](const Json& row) {
                   const std::string where = Where(row);
+                  const std::string about = row["about_text"];
                   return row["valve_id"].get<std::string>() +
-                         (where.empty() ? "" : " of " + where);
+                         (where.empty() ? "" : " of " + where) +
+                         (about.empty() ? "" : ": " + about);
                 })),
       Wide(Text("finding", FindingText)),
       severity,

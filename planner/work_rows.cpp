@@ -23,6 +23,7 @@ namespace fdi::planner {
 namespace {
 
 using findings::Finding;
+using findings::IdentityOf;
 using findings::RankFacts;
 using storage::Episode;
 
@@ -193,7 +194,6 @@ class RowReader {
   void AddFigures(const Finding& of, const std::vector<HealthHour>& hours);
   Finding Low(const Finding& of, const char* kind,
               const report::FigureText& text) const;
-  std::optional<int> GradeOf(const std::string& valve) const;
 
   const report::FaultTexts& texts_;
   const WorkQuery& query_;
@@ -201,12 +201,6 @@ class RowReader {
   std::vector<WorkRow> rows_;
   std::vector<DoneFinding> done_;
 };
-
-std::optional<int> RowReader::GradeOf(const std::string& valve) const {
-  const auto grade = facts_.grades.find(valve);
-  return grade == facts_.grades.end() ? std::nullopt
-                                      : std::optional(grade->second);
-}
 
 void RowReader::FindDone(SameFault& same, storage::History& history) const {
   const auto add = [&same](const Repair& repair) {
@@ -381,7 +375,7 @@ void RowReader::AddHealth(const std::string& valve,
   of.valve_id = valve;
   of.host = hours.back().host;
   of.monitor = hours.back().monitor;
-  of.grade = GradeOf(valve);
+  of.about = IdentityOf(facts_.valves, valve);
   of.last_ns = life.last_ns;
   // These say what the last day with data was like.
   if (query_.now_ns - of.last_ns > kNsPerDay) {
@@ -501,7 +495,7 @@ void RowReader::AddAudits() {
                      : texts_.Words(name, audit.band_pct.value_or(0.0) / 100.0);
     finding.certainty = audit.sure ? Certainty::kSure : Certainty::kLikely;
     finding.confidence = findings::CertaintyFactor(*finding.certainty);
-    finding.grade = GradeOf(audit.loop);
+    finding.about = IdentityOf(facts_.valves, audit.loop);
     finding.since_ns = finding.last_ns = audit.start_ns;
     std::string why = finding.words.name + ": " + audit.reason;
     if (audit.band_pct) {

@@ -9,6 +9,7 @@
 #include "base/time_text.h"
 #include "diagnosis/decision/certainty.h"
 #include "diagnosis/model/fault_catalogue.h"
+#include "report/findings/finding.h"
 #include "storage/history/episode.h"
 
 namespace fdi::monitor {
@@ -36,7 +37,8 @@ std::string FaultsOf(const FaultEvent& event) {
 
 report::Json EventJson(const FaultEvent& event, bool persisted,
                        const report::FaultTexts& texts,
-                       const std::vector<storage::Shelf>& shelves) {
+                       const std::vector<storage::Shelf>& shelves,
+                       const ValveIdentity& about) {
   const Transition& t = event.transition;
   const std::string fault = FaultsOf(event);
   // For an event without a fault the catalogue says "unlike any known fault",
@@ -58,6 +60,7 @@ report::Json EventJson(const FaultEvent& event, bool persisted,
   return {
       {"kind", std::string(TransitionName(t.kind))},
       {"valve_id", event.valve_id},
+      {"about", findings::AboutJson(about)},
       {"episode_id", storage::EpisodeIdText(event.episode_id)},
       {"stamp_utc", FormatTime(t.stamp_ns, true)},
       {"fault", fault.empty() ? report::Json() : report::Json(fault)},

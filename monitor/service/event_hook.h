@@ -13,6 +13,7 @@
 #include "base/log.h"
 #include "base/mutex.h"
 #include "base/worker.h"
+#include "diagnosis/model/valve_identity.h"
 #include "diagnosis/records/fault_event.h"
 #include "report/fault_texts.h"
 #include "report/json_output.h"
@@ -53,15 +54,17 @@ struct EventHookOptions {
       std::chrono::steady_clock::now};
 };
 
-/// {"kind", "valve_id", "episode_id", "stamp_utc", "fault", "name",
+/// {"kind", "valve_id", "about", "episode_id", "stamp_utc", "fault", "name",
 /// "certainty", "severity", "priority", "discipline", "namur", "check",
 /// "factor", "strength", "reason", "model_set", "persisted", "shelved"};
 /// missing values are null. Without a fault, strength, name and check are null
 /// too, the last two until the event is known to lie outside all known faults.
 /// @param shelves those in force; "shelved" says whether one covers the event.
+/// @param about the valve: "about" is findings::AboutJson().
 report::Json EventJson(const FaultEvent& event, bool persisted,
                        const report::FaultTexts& texts,
-                       const std::vector<storage::Shelf>& shelves = {});
+                       const std::vector<storage::Shelf>& shelves = {},
+                       const ValveIdentity& about = {});
 
 /// Notifies a program of every fault event that goes to the
 /// bus, each at most once and in order, from a thread of its own: neither the

@@ -32,6 +32,7 @@
 #include "monitor/guard.h"
 #include "monitor/health_book.h"
 #include "report/fault_texts.h"
+#include "report/findings/finding.h"
 #include "report/logging.h"
 #include "storage/history/history_reader.h"
 #include "storage/models/models.h"
@@ -216,9 +217,20 @@ void Service::ListAfterCommit() {
                         const FaultEvent& event, bool stored) {
           // Its session may have notified of it.
           if (!event.resent) {
-            hook_->Notify(EventJson(event, stored, texts, ShelvesInForce()));
+            hook_->Notify(EventJson(event, stored, texts, ShelvesInForce(),
+                                    IdentityOf(event.valve_id)));
           }
         });
+  }
+}
+
+// Nothing where it cannot be read: an alarm without it is better than none.
+ValveIdentity Service::IdentityOf(const std::string& valve_id) {
+  try {
+    return findings::IdentityOf(findings::ReadIdentities(data_.models()),
+                                valve_id);
+  } catch (const std::exception&) {
+    return {};
   }
 }
 

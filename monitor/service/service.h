@@ -85,6 +85,7 @@ class Service {
   void AttachListeners();
   void ListAfterCommit();
   std::vector<storage::Shelf> ShelvesInForce();
+  ValveIdentity IdentityOf(const std::string& valve_id);
   void AnnounceModels(const ModelSet& models);
 
   void Start();

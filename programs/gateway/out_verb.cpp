@@ -17,6 +17,7 @@
 #include "gateway/live_table.h"
 #include "gateway/mqtt_client.h"
 #include "gateway/valve_states.h"
+#include "import/plant_table.h"
 #include "monitor/bus/bus_view.h"
 #include "monitor/bus/watch_records.h"
 #include "programs/gateway/verbs.h"
@@ -217,6 +218,10 @@ void ExpectTable(const OutOptions& options, ValveStates& states) {
       states.Expect(valve.id);
       states.SetGroup(valve.id, valve.group);
     }
+  }
+  for (const importer::PlantRow& row :
+       importer::ReadPlantTable(options.plant).rows) {
+    states.SetIdentity(row.name, row);
   }
   for (const RefusedRow& row : table.refused) {
     if (GlobMatches(options.valves, row.name)) {

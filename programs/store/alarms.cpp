@@ -63,7 +63,10 @@ Report Acknowledge(const AckOptions& options, const Context& context) {
   }
   NameFaults(episodes, context);
   report.document["episodes"] =
-      Rows(reader.Alarms(std::move(episodes), NowNs()), EpisodeJson);
+      Rows(reader.Alarms(std::move(episodes), NowNs()),
+           [valves = IdentitiesOf(context)](const Alarm& alarm) {
+             return EpisodeJson(alarm, valves);
+           });
   return report;
 }
 
@@ -85,7 +88,7 @@ Report LabelEpisode(const EpisodeLabelOptions& options,
   const Alarm alarm = reader.Alarms(std::move(labelled), NowNs()).front();
   const Episode& episode = alarm.episode;
   Report report;
-  report.document = EpisodeJson(alarm);
+  report.document = EpisodeJson(alarm, IdentitiesOf(context));
   return report.Line(episode.episode_id + " labelled " +
                      episode.label.value_or(""));
 }

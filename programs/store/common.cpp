@@ -142,6 +142,15 @@ Json VafJson(double vaf) {
   return IsVafMeaningful(vaf) ? NumberJson(vaf) : Json();
 }
 
+findings::Identities IdentitiesOf(const Context& context) {
+  return findings::ReadIdentities(DataOf(context).models());
+}
+
+findings::Identities IdentitiesOf(const PlantOptions& plant,
+                                  const Context& context) {
+  return plant.asked() ? findings::Identities{} : IdentitiesOf(context);
+}
+
 const std::vector<std::string>& EpisodeKeys() {
   static const std::vector<std::string> keys = {
       "episode_id",        "valve_id",  "detected_utc", "isolated_utc",
@@ -171,7 +180,7 @@ void NameFaults(std::vector<Episode>& episodes, const Context& context) {
 }
 
 // A strength is that of a fault: while there is no name, it is null and not 0.
-Json EpisodeJson(const Alarm& alarm) {
+Json EpisodeJson(const Alarm& alarm, const findings::Identities& valves) {
   const Episode& episode = alarm.episode;
   const bool named = IsNamed(episode);
   const auto severity = episode.priority ? SeverityOf(*episode.priority)
@@ -179,6 +188,8 @@ Json EpisodeJson(const Alarm& alarm) {
   return {
       {"episode_id", episode.episode_id},
       {"valve_id", episode.valve_id},
+      {"about",
+       findings::AboutJson(findings::IdentityOf(valves, episode.valve_id))},
       {"detected_utc", episode.detected_utc},
       {"isolated_utc", TextJson(episode.isolated_utc)},
       {"cleared_utc", TextJson(episode.cleared_utc)},

@@ -52,9 +52,9 @@ std::string After(const Json& row, const char* key) {
 }
 
 // Rows of the plant history also have host and monitor.
-Json ListedJson(const Alarm& alarm) {
+Json ListedJson(const Alarm& alarm, const findings::Identities& valves) {
   const Episode& e = alarm.episode;
-  Json row = EpisodeJson(alarm);
+  Json row = EpisodeJson(alarm, valves);
   if (!e.monitor.empty()) {
     row.update({{"host", e.host}, {"monitor", e.monitor}});
   }
@@ -92,7 +92,10 @@ Report ListEpisodes(const HistoryOptions& options, const Context& context) {
       history->Alarms(std::move(episodes), filter.now_ns);
   Report report;
   report.document["as_of_utc"] = FormatTime(filter.now_ns, true);
-  report.document["episodes"] = Rows(alarms, ListedJson);
+  const auto valves = IdentitiesOf(options.plant, context);
+  report.document["episodes"] = Rows(alarms, [&valves](const Alarm& alarm) {
+    return ListedJson(alarm, valves);
+  });
   std::vector<std::string> keys = EpisodeKeys();
   if (options.plant.asked()) {
     keys.insert(keys.end(), {"host", "monitor"});
@@ -115,6 +118,7 @@ Report ListEpisodes(const HistoryOptions& options, const Context& context) {
   std::vector<Column> columns = {
       {"episode", "episode_id"},
       {"valve", "valve_id"},
+      {"description", "about/description", Format::kPlain, 0, 6},
       TextColumn("detected",
                  [utc = context.options.utc](const Json& row) {
                    return WallClock(row["detected_utc"], utc);
@@ -352,7 +356,8 @@ Report ShowEpisode(const ShowOptions& options, const Context& context) {
   const Alarm alarm = history->Alarms(std::move(shown), NowNs()).front();
   const Episode& e = alarm.episode;
   Report report;
-  report.document = ListedJson(alarm);
+  const auto valves = IdentitiesOf(options.plant, context);
+  report.document = ListedJson(alarm, valves);
   report.document.update(
       {{"source_id", Hex16(e.source_id)},
        {"model_hash", Hex16(e.model_hash)},
@@ -364,6 +369,11 @@ Report ShowEpisode(const ShowOptions& options, const Context& context) {
        {"trace_instants", history->Trace(e.id).size()}});
   if (!e.monitor.empty()) {
     report.Fields("", {TextField("monitor", e.host + "/" + e.monitor)});
+  }
+  if (const std::string about =
+          findings::AboutText(findings::IdentityOf(valves, e.valve_id));
+      !about.empty()) {
+    report.Fields("", {TextField("description", about)});
   }
   report.Fields(
       "", plot::EpisodeFields(alarm, report::LoadFaultTexts(context.options),

@@ -49,9 +49,8 @@ Json EntryJson(const ValveEntry& entry) {
 // What the table of the plant says about a valve, and what watches it.
 Json LoopJson(const PlantLoop& loop) {
   return {{"loop", loop.name},
-          {"service", loop.service.empty() ? Json() : Json(loop.service)},
+          {"about", findings::AboutJson(loop)},
           {"type", loop.type.empty() ? Json() : Json(loop.type)},
-          {"grade", loop.grade ? Json(*loop.grade) : Json()},
           {"group", loop.group.empty() ? Json() : Json(loop.group)},
           {"watched_by", LoopWatchName(loop.watch)},
           {"state", LoopStateName(loop.state)},
@@ -74,13 +73,15 @@ Report ListValves(const NoOptions&, const Context& context) {
                           {"baseline", "baseline"},
                           {"model set", "model_set"}});
   if (!report.document["loops"].empty()) {
-    report.Line("").Table("loops",
-                          {{"loop of the plant", "loop"},
-                           {"group", "group", Format::kPlain, 0, 2},
-                           {"grade", "grade", Format::kPlain, 0, 2},
-                           {"watched by", "watched_by"},
-                           {"state", "state"},
-                           {"finding", "finding", Format::kPlain, 0, 1}});
+    report.Line("").Table(
+        "loops", {{"loop of the plant", "loop"},
+                  {"group", "group", Format::kPlain, 0, 2},
+                  {"description", "about/description", Format::kPlain, 0, 2},
+                  {"location", "about/location", Format::kPlain, 0, 3},
+                  {"grade", "about/grade", Format::kPlain, 0, 2},
+                  {"watched by", "watched_by"},
+                  {"state", "state"},
+                  {"finding", "finding", Format::kPlain, 0, 1}});
   }
   return report;
 }
@@ -262,6 +263,9 @@ struct AddOptions {
   std::string signals{"CV,P1,P2,T1,X,F"};
   double period_s{1.0};
   std::string plant;
+  // These say who it is; with none of the others an entry stays as it is.
+  ValveIdentity about;
+  std::vector<const CLI::Option*> of_entry;
 };
 
 // The first line of a file of groups that may be written again.
@@ -364,6 +368,32 @@ Report AddPlant(const std::string& file, const Context& context) {
   return report;
 }
 
+// What is stated replaces what was, and the rest of the loop stays.
+void PutIdentity(const AddOptions& options, const ValveEntry& entry,
+                 ModelStore& store) {
+  if (options.pattern.find_first_of("*?[") != std::string::npos) {
+    throw ConfigError(options.pattern +
+                      " is a glob: --description, --location, --document and "
+                      "--grade are of one valve");
+  }
+  PlantLoop loop;
+  loop.name = options.pattern;
+  for (const PlantLoop& each : store.Loops()) {
+    if (each.name == loop.name) {
+      loop = each;
+    }
+  }
+  for (const auto member :
+       {&ValveIdentity::description, &ValveIdentity::location,
+        &ValveIdentity::document}) {
+    if (!(options.about.*member).empty()) {
+      loop.*member = options.about.*member;
+    }
+  }
+  loop.grade = options.about.grade ? options.about.grade : loop.grade;
+  store.PutLoop(loop, entry);
+}
+
 Report AddValves(const AddOptions& options, const Context& context) {
   if (!options.plant.empty()) {
     return AddPlant(options.plant, context);
@@ -379,7 +409,19 @@ Report AddValves(const AddOptions& options, const Context& context) {
   entry.signals = report::ParseSignals(options.signals);
   entry.period_s = options.period_s;
   ModelStore store = WritableModels(context);
-  store.PutValve(entry);
+  const auto before = store.FindValve(options.pattern);
+  const bool is_there = before && before->pattern == options.pattern;
+  if (is_there && options.about != ValveIdentity{} &&
+      std::ranges::none_of(options.of_entry, [](const auto* each) {
+        return each->count() > 0;
+      })) {
+    entry = *before;
+  } else {
+    store.PutValve(entry);
+  }
+  if (options.about != ValveIdentity{}) {
+    PutIdentity(options, entry, store);
+  }
   return Changed(entry);
 }
 
@@ -577,15 +619,25 @@ void AddAdd(report::Program& program, CLI::App& group) {
                   "groups.toml of the data directory (docs/plant.md)")
       ->type_name("FILE.toml|FILE.csv")
       ->excludes(valve);
-  verb.add_option("--type", options.type, "Free text");
-  verb.add_option("--flow-unit", options.flow_unit, "m3/h or t/h")
-      ->check(CLI::IsMember({"m3/h", "t/h"}));
-  verb.add_option("--sense", options.sense,
-                  "Whether CV and X are in % of closing or of opening")
-      ->check(CLI::IsMember({"closing", "opening"}));
-  verb.add_option("--signals", options.signals, "Signals it delivers");
-  verb.add_option("--period", options.period_s, "Sample period in s")
-      ->check(CLI::PositiveNumber);
+  options.of_entry = {
+      verb.add_option("--type", options.type, "Free text"),
+      verb.add_option("--flow-unit", options.flow_unit, "m3/h or t/h")
+          ->check(CLI::IsMember({"m3/h", "t/h"})),
+      verb.add_option("--sense", options.sense,
+                      "Whether CV and X are in % of closing or of opening")
+          ->check(CLI::IsMember({"closing", "opening"})),
+      verb.add_option("--signals", options.signals, "Signals it delivers"),
+      verb.add_option("--period", options.period_s, "Sample period in s")
+          ->check(CLI::PositiveNumber)};
+  verb.add_option("--description", options.about.description,
+                  "What it serves: \"Feed to column C-101\"");
+  verb.add_option("--location", options.about.location, "Where it stands");
+  verb.add_option("--document", options.about.document,
+                  "Address or number of its data sheet");
+  verb.add_option("--grade", options.about.grade,
+                  "How much the plant depends on it: 1 counts 2 in the rank of "
+                  "its findings, 2 or none 1, 3 a half")
+      ->check(CLI::Range(1, 3));
 }
 
 void AddRepaired(report::Program& program, CLI::App& group) {

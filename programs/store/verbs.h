@@ -13,6 +13,7 @@
 #include "base/text.h"
 #include "base/time_text.h"
 #include "diagnosis/records/loop_audits.h"
+#include "report/findings/finding.h"
 #include "report/output_folder.h"
 #include "report/program.h"
 #include "report/report.h"
@@ -158,11 +159,15 @@ Json Rows(const Items& items, RowOf row_of) {
   return rows;
 }
 
+/// Who the valves are; nothing for the history of a plant.
+findings::Identities IdentitiesOf(const Context& context);
+findings::Identities IdentitiesOf(const PlantOptions& plant,
+                                  const Context& context);
 /// The columns of the view fault_history, in its order.
 const std::vector<std::string>& EpisodeKeys();
 /// Puts the names of the fault catalogue where the history has none.
 void NameFaults(std::vector<Episode>& episodes, const Context& context);
-Json EpisodeJson(const Alarm& alarm);
+Json EpisodeJson(const Alarm& alarm, const findings::Identities& valves);
 Json ShelfJson(const Shelf& shelf);
 
 /// {"V1": {"LIVE": 12.5, ...}, ...}: hours by valve and quality.

@@ -47,7 +47,7 @@ double GradeFactor(std::optional<int> grade) {
 }
 
 double Finding::score() const {
-  return SeverityPoints(words.severity) * GradeFactor(grade) * confidence;
+  return SeverityPoints(words.severity) * GradeFactor(about.grade) * confidence;
 }
 
 bool IsWorse(const Finding& a, const Finding& b) {
@@ -64,6 +64,45 @@ bool IsWorse(const Finding& a, const Finding& b) {
          std::tie(b.valve_id, b.episode_id);
 }
 
+Identities ReadIdentities(const std::filesystem::path& models) {
+  Identities valves;
+  if (std::filesystem::exists(models)) {
+    for (const storage::PlantLoop& loop : storage::ModelStore(models).Loops()) {
+      valves[loop.name] = loop;
+    }
+  }
+  return valves;
+}
+
+ValveIdentity IdentityOf(const Identities& valves,
+                         const std::string& valve_id) {
+  const auto found = valves.find(valve_id);
+  return found == valves.end() ? ValveIdentity{} : found->second;
+}
+
+report::Json AboutJson(const ValveIdentity& valve) {
+  const auto text = [](const std::string& stated) {
+    return stated.empty() ? report::Json() : report::Json(stated);
+  };
+  if (valve == ValveIdentity{}) {
+    return nullptr;
+  }
+  return {{"description", text(valve.description)},
+          {"service", text(valve.service)},
+          {"location", text(valve.location)},
+          {"document", text(valve.document)},
+          {"grade", valve.grade ? report::Json(*valve.grade) : report::Json()}};
+}
+
+std::string AboutText(const ValveIdentity& valve) {
+  std::string text;
+  for (const std::string& part :
+       {valve.description, valve.location, valve.document}) {
+    text += (text.empty() || part.empty() ? "" : ", ") + part;
+  }
+  return text;
+}
+
 RankFacts ReadRankFacts(storage::History& history,
                         const std::filesystem::path& models,
                         std::int64_t now_ns) {
@@ -71,13 +110,7 @@ RankFacts ReadRankFacts(storage::History& history,
   filter.since_ns = now_ns - kPeriodDays * kNsPerDay;
   RankFacts facts;
   facts.labels = history.AlarmFigures(filter, now_ns).faults;
-  if (std::filesystem::exists(models)) {
-    for (const storage::PlantLoop& loop : storage::ModelStore(models).Loops()) {
-      if (loop.grade) {
-        facts.grades[loop.name] = *loop.grade;
-      }
-    }
-  }
+  facts.valves = ReadIdentities(models);
   return facts;
 }
 
@@ -101,10 +134,7 @@ Finding FindingOf(const storage::Episode& episode,
   if (IsNamed(episode)) {
     finding.strength = episode.strength;
   }
-  if (const auto grade = facts.grades.find(episode.valve_id);
-      grade != facts.grades.end()) {
-    finding.grade = grade->second;
-  }
+  finding.about = IdentityOf(facts.valves, episode.valve_id);
   finding.since_ns = episode.detected_ns;
   finding.unconfirmed_ns = episode.unconfirmed_ns;
   finding.ended_ns = storage::ReturnedNs(episode);

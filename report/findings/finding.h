@@ -9,7 +9,9 @@
 #include <vector>
 
 #include "diagnosis/decision/certainty.h"
+#include "diagnosis/model/valve_identity.h"
 #include "report/fault_texts.h"
+#include "report/json_output.h"
 #include "storage/history/alarm.h"
 #include "storage/history/episode.h"
 #include "storage/history/history.h"
@@ -19,10 +21,11 @@ namespace fdi::findings {
 /// The period of every list unless somebody states another one.
 inline constexpr int kPeriodDays = 90;
 
+using Identities = std::map<std::string, ValveIdentity>;  ///< By valve.
+
 /// The facts of a plant that weigh in the rank of an episode.
 struct RankFacts {
-  /// How much the plant depends on a loop, by valve: 1 most, 3 least.
-  std::map<std::string, int> grades{};
+  Identities valves{};
   /// How often labels called an answer right or wrong, by answer.
   std::map<std::string, storage::FaultAlarms> labels{};
 };
@@ -45,7 +48,7 @@ struct Finding {
   std::vector<std::string> look_alikes{};
   std::string witness{};             ///< storage::WitnessText()
   std::optional<double> strength{};  ///< Signed [-]; nothing before a name.
-  std::optional<int> grade{};        ///< RankFacts::grades.
+  ValveIdentity about{};             ///< RankFacts::valves.
   double confidence{1.0};            ///< What certainty weighs, 0..1 [-].
 
   std::optional<std::int64_t> since_ns{};  ///< When it was detected.
@@ -80,8 +83,21 @@ double GradeFactor(std::optional<int> grade);
 /// same facts give the same list.
 bool IsWorse(const Finding& a, const Finding& b);
 
-/// Labels of the last kPeriodDays, and the grades that the table of the plant
-/// states. @param models file of models.db; need not exist.
+/// What models.db says of the loops of the plant. @param models its file; need
+///   not exist.
+/// @throws storage::SqliteError, DataError
+Identities ReadIdentities(const std::filesystem::path& models);
+/// That of a valve; an empty one if nothing is stated.
+ValveIdentity IdentityOf(const Identities& valves, const std::string& valve_id);
+/// {"description", "service", "location", "document", "grade"}; null if nothing
+/// is stated.
+report::Json AboutJson(const ValveIdentity& valve);
+/// "Feed to column C-101, hall 2, data sheet DS-101"; empty if nothing is
+/// stated.
+std::string AboutText(const ValveIdentity& valve);
+
+/// Labels of the last kPeriodDays, and ReadIdentities(). @param models file of
+/// models.db; need not exist.
 /// @throws storage::SqliteError, DataError
 RankFacts ReadRankFacts(storage::History& history,
                         const std::filesystem::path& models,

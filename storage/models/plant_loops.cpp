@@ -37,7 +37,8 @@ std::string_view LoopStateName(LoopState state) {
 void ModelStore::StoreLoop(const PlantLoop& loop) {
   database_.Run(sql::put_loop, loop.name, loop.service, loop.type, loop.grade,
                 loop.group, loop.watch, loop.state, loop.finding,
-                loop.input_hash, NowNs());
+                loop.input_hash, NowNs(), loop.description, loop.location,
+                loop.document);
 }
 
 bool ModelStore::IsEntry(std::string_view pattern) {
@@ -98,7 +99,7 @@ std::vector<PlantLoop> ModelStore::Loops() {
     PlantLoop& loop = loops.emplace_back();
     rows.Read(0, loop.name, loop.service, loop.type, loop.grade, loop.group,
               loop.watch, loop.state, loop.finding, loop.input_hash,
-              loop.checked_ns);
+              loop.checked_ns, loop.description, loop.location, loop.document);
   }
   return loops;
 }

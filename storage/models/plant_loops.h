@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 
+#include "diagnosis/model/valve_identity.h"
 #include "storage/models/models.h"
 
 namespace fdi::storage {
@@ -27,12 +28,10 @@ enum class LoopState : std::uint8_t {
 std::string_view LoopStateName(LoopState state);  ///< "expected", ...
 
 /// A loop that ought to be there, as the table of the plant states it.
-struct PlantLoop {
-  std::string name;            ///< The id of its valve.
-  std::string service{};       ///< F, P, L, T, A; empty: not said.
-  std::string type{};          ///< Empty: data only.
-  std::optional<int> grade{};  ///< 1 (most important) to 3.
-  std::string group{};         ///< Of valves that may share a cause.
+struct PlantLoop : ValveIdentity {
+  std::string name;     ///< The id of its valve.
+  std::string type{};   ///< Empty: data only.
+  std::string group{};  ///< Of valves that may share a cause.
   LoopWatch watch{LoopWatch::kNothing};
   LoopState state{LoopState::kExpected};
   std::string finding{};       ///< One sentence about its record.

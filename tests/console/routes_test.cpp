@@ -199,16 +199,19 @@ TEST_F(ConsoleRoutesTest, WhatAValveServesComesFromItsEntryAndThePlantsTable) {
     loop.name = "LV-1";
     loop.service = "L";
     loop.grade = 1;
+    loop.description = "Feed";
     models.PutLoop(loop, entry);
   }
   Start();
 
   EXPECT_EQ(Get("/api/v1/valves/LV-1/about"),
             Json::parse(R"({"type": "globe DN100", "service": "L", "grade": 1,
-                            "group": null})"));
+                            "description": "Feed", "location": null,
+                            "document": null, "group": null})"));
   EXPECT_EQ(Get("/api/v1/valves/FV-1/about"),
             Json::parse(R"({"type": null, "service": null, "grade": null,
-                            "group": null})"));
+                            "description": null, "location": null,
+                            "document": null, "group": null})"));
 }
 
 TEST_F(ConsoleRoutesTest, AnEpisodeComesWithItsEvidence) {

@@ -722,6 +722,29 @@ test('the work list has the order of its document, factors, and what nobody ' +
   await close(page);
 });
 
+test('a valve says who it is, and links its data sheet only to the web',
+    async () => {
+      const about = (document) => ({description: '<i>Feed</i>', service: 'F',
+        location: 'Hall 2', document, grade: 1});
+      monitor.reset([tile('V', 'NORMAL')], [
+        alarm('0000000000000001', 'V', 'f19', {about: about('https://d/1')})]);
+      monitor.answers.worklist = {...kList, rows: [
+        {...kList.rows[0], about: about('DS-1')}]};
+      monitor.answers['valves/V/about'] = about('javascript:alert(1)');
+      monitor.answers['valves/V/trend'] =
+          trend({state: 'NORMAL', d0: 1, d: [0, 0]});
+      const page = await openShared(browser, address, '#/alarms');
+      const head = page.locator('tbody th').first();
+      await head.getByText('<i>Feed</i>').waitFor();
+      await head.getByText('Hall 2').waitFor();
+      await page.goto(`${address}/#/worklist`);
+      await head.getByText('<i>Feed</i>').waitFor();
+      await page.goto(`${address}/#/valve/V`);
+      await page.getByText('Feed</i>, Hall 2, data sheet javascript:').waitFor();
+      assert.equal(await page.locator('a[href^="javascript"]').count(), 0);
+      await close(page);
+    });
+
 test('alarms stand in the order of the work list, and say as of when',
     async () => {
       monitor.reset([], [

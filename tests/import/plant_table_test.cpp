@@ -32,6 +32,7 @@ class PlantTableTest : public ::testing::Test {
 constexpr const char* kToml = R"(
 files = ["day.csv"]
 [defaults]
+document = "https://d/{loop}"
 op = "{loop}.OP"
 sense = "opening"
 [group.boiler]
@@ -42,6 +43,8 @@ name = "FIC1"
 group = "boiler"
 service = "f"
 grade = 2
+description = "Feed"
+location = "Hall 2"
 type = "lublin-actuator-3"
 [[loop]]
 name = "LIC2"
@@ -49,10 +52,11 @@ service = "L"
 type = "data only"
 )";
 constexpr const char* kCsv =
-    "name,group,op,x,op_range,sense,service,grade,type\n"
-    "*,,{loop}.OP,,,opening,,,\n"
-    "*,boiler,,{loop}.ZT,0..1,,,,\n"
-    "FIC1,boiler,,,,,f,2,lublin-actuator-3\n"
+    "name,group,op,x,op_range,sense,service,grade,type,description,location,"
+    "document\n"
+    "*,,{loop}.OP,,,opening,,,,,,https://d/{loop}\n"
+    "*,boiler,,{loop}.ZT,0..1,,,,,,,\n"
+    "FIC1,boiler,,,,,f,2,lublin-actuator-3,Feed,Hall 2,\n"
     "LIC2,,,,,,L,,data only\n";
 
 // As in plants that number their loops so.
@@ -82,6 +86,9 @@ TEST_F(PlantTableTest, TomlAndCsvSayTheSame) {
     EXPECT_EQ(first.sense, Sense::kOpening);
     EXPECT_EQ(first.service, "F");
     EXPECT_EQ(first.grade, 2);
+    EXPECT_EQ(first.description, "Feed");
+    EXPECT_EQ(first.location, "Hall 2");
+    EXPECT_EQ(first.document, "https://d/FIC1");
     EXPECT_EQ(first.type, "lublin-actuator-3");
     const PlantRow& second = table.rows[1];
     EXPECT_EQ(second[LoopTag::kOp].pattern, "LIC2.OP");

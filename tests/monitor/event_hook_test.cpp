@@ -321,6 +321,19 @@ TEST(EventJsonTest, AShelvedAlarmSaysSo) {
   EXPECT_EQ(EventJson(event, true, texts)["shelved"], false);
 }
 
+TEST(EventJsonTest, AnEventSaysWhoTheValveIs) {
+  const report::FaultTexts texts(report::SharedFile("faults.toml"));
+  FaultEvent event;
+  event.valve_id = "V1";
+  ValveIdentity about;
+  about.description = "Feed";
+  about.grade = 1;
+  const report::Json json = EventJson(event, true, texts, {}, about);
+  EXPECT_EQ(json["about"]["description"], "Feed");
+  EXPECT_EQ(json["about"]["grade"], 1);
+  EXPECT_TRUE(EventJson(event, true, texts)["about"].is_null());
+}
+
 // Only once no known fault explains it any more.
 TEST(EventJsonTest, ADetectionIsNotYetUnlikeAnyKnownFault) {
   const report::FaultTexts texts(report::SharedFile("faults.toml"));

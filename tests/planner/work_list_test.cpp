@@ -134,7 +134,7 @@ TEST_F(WorkListTest, ARowHasItsFactorsAndWhoSawIt) {
 
 TEST_F(WorkListTest, WhatStandsIsAboveWhatHasEnded) {
   RecordEpisode(writer_, 0b100, "A");  // high
-  query_.loops = {{"A", 1}};
+  query_.loops = {{"A", {1}}};
   AddHealth("C", 60);
   query_.since_ns = kDetected - 90 * kDay;
   const Json rows = Rows();
@@ -148,8 +148,16 @@ TEST_F(WorkListTest, GradeMovesALoopUpOrDown) {
   for (const char* valve : {"A", "B", "C"}) {
     RecordEpisode(writer_, 0b100, valve);
   }
-  query_.loops = {{"A", 3}, {"C", 1}};
+  query_.loops = {{"A", {3}}, {"C", {1}}};
+  query_.loops[1].about.description = "Feed to column C-101";
+  query_.loops[1].about.location = "Hall 2";
+  std::ostringstream text;
+  WorkListReport(List()).PrintText(text, {});
+  EXPECT_THAT(text.str(), HasSubstr("\n   Feed to column C-101, Hall 2\n"));
+  EXPECT_THAT(Html(), HasSubstr("C: Feed to column C-101, Hall 2"));
   const Json rows = Rows();
+  EXPECT_EQ(rows[0]["about"]["location"], "Hall 2");
+  EXPECT_EQ(rows[1]["about"], nullptr);
   EXPECT_EQ(rows[0]["valve_id"], "C");
   EXPECT_EQ(rows[1]["valve_id"], "B");
   EXPECT_EQ(rows[2]["valve_id"], "A");

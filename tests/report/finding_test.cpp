@@ -43,9 +43,9 @@ TEST(FindingTest, ScoreIsSeverityGradeAndConfidence) {
   EXPECT_DOUBLE_EQ(Of(episode, facts).score(), 3.0 * 4.0 / 5.0);
   episode.label = "f19";
   EXPECT_DOUBLE_EQ(Of(episode, facts).score(), 4.0);
-  facts.grades["V"] = 1;
+  facts.valves["V"].grade = 1;
   EXPECT_DOUBLE_EQ(Of(episode, facts).score(), 8.0);
-  facts.grades["V"] = 3;
+  facts.valves["V"].grade = 3;
   EXPECT_DOUBLE_EQ(Of(episode, facts).score(), 2.0);
 }
 

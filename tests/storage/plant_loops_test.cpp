@@ -25,6 +25,9 @@ class PlantLoopsTest : public ::testing::Test {
     PlantLoop loop;
     loop.name = name;
     loop.grade = 1;
+    loop.description = "Feed";
+    loop.location = "Hall 2";
+    loop.document = "DS-1";
     loop.group = "unit 1";
     loop.watch = LoopWatch::kFaults;
     loop.state = LoopState::kOnboarded;
@@ -40,7 +43,8 @@ TEST_F(PlantLoopsTest, AResultIsStoredWhole) {
   const auto saved = store_.Store(Result("FV-1", 1));
   EXPECT_EQ(saved->version, 1);
   ASSERT_EQ(store_.Loops().size(), 1U);
-  EXPECT_EQ(store_.Loops().front().grade, 1);
+  EXPECT_EQ(static_cast<const ValveIdentity&>(store_.Loops().front()),
+            *Result("FV-1", 1).loop);
   EXPECT_EQ(store_.AssignedModelSet("FV-1"), (ModelReference{"FV-1", 1}));
   EXPECT_EQ(store_.FindValve("FV-1")->baseline(), BaselineState::kValid);
   EXPECT_EQ(store_.LoadTemplate("globe").summary, "FV-1");

@@ -6,10 +6,9 @@ using importer::LoopTag;
 
 storage::PlantLoop LoopOf(const importer::PlantRow& row) {
   storage::PlantLoop loop;
+  static_cast<ValveIdentity&>(loop) = row;
   loop.name = row.name;
-  loop.service = row.service;
   loop.type = row.type;
-  loop.grade = row.grade;
   loop.group = row.group;
   return loop;
 }

@@ -187,9 +187,9 @@ class PlantRun {
     outcome.unchanged = true;
     const storage::PlantLoop listed = std::move(outcome.loop);
     outcome.loop = before->second;
-    if (listed.grade != outcome.loop.grade ||
-        listed.group != outcome.loop.group) {
-      outcome.loop.grade = listed.grade;
+    ValveIdentity& identity = outcome.loop;
+    if (identity != listed || listed.group != outcome.loop.group) {
+      identity = listed;
       outcome.loop.group = listed.group;
       const MutexLock lock(mutex_);
       store_.PutLoop(outcome.loop, EntryOf(job.row));

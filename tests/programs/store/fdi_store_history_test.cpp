@@ -54,17 +54,39 @@ TEST_F(FdiStoreHistoryTest, ListedEpisodesHaveTheColumnsOfTheView) {
   const json& episode = listed["episodes"][0];
   EXPECT_THAT(KeysOf(episode),
               testing::UnorderedElementsAre(
-                  "episode_id", "valve_id", "detected_utc", "isolated_utc",
-                  "cleared_utc", "ended_utc", "returned_utc", "fault",
-                  "peak_factor", "model_set", "end_reason", "label", "acked_by",
-                  "strength", "worst_strength", "severity", "priority",
-                  "unconfirmed_utc", "certainty", "look_alikes", "fault_name",
-                  "acked_utc", "ack_comment", "alarm_state",
+                  "episode_id", "valve_id", "about", "detected_utc",
+                  "isolated_utc", "cleared_utc", "ended_utc", "returned_utc",
+                  "fault", "peak_factor", "model_set", "end_reason", "label",
+                  "acked_by", "strength", "worst_strength", "severity",
+                  "priority", "unconfirmed_utc", "certainty", "look_alikes",
+                  "fault_name", "acked_utc", "ack_comment", "alarm_state",
                   "shelved_until_utc", "second", "description", "witness"));
   EXPECT_EQ(episode["fault_name"], "Flashing or critical flow");
   EXPECT_EQ(episode["fault"], "f7");
   EXPECT_EQ(episode["detected_utc"], "2026-11-20T14:56:11.000Z");
   EXPECT_TRUE(episode["cleared_utc"].is_null());
+}
+
+TEST_F(FdiStoreHistoryTest, WhoAValveIsStandsInEveryList) {
+  const std::string valve =
+      StoreJson("history list")["episodes"][0]["valve_id"];
+  ASSERT_EQ(Store("valves add " + valve + " --type globe").code, 0);
+  ASSERT_EQ(
+      Store("valves add " + valve + " --description 'Feed to C-101' --grade 1")
+          .code,
+      0);
+  ASSERT_EQ(Store("valves add " + valve + " --location 'Hall 2'").code, 0);
+  EXPECT_EQ(Store("valves add 'FV-*' --location 'Hall 2'").code, 2);
+  // What is said of the valve leaves its entry as it was.
+  EXPECT_EQ(StoreJson("valves show " + valve)["type"], "globe");
+  for (const char* verb : {"history list", "history show last", "worklist"}) {
+    EXPECT_THAT(Store(verb).out, HasSubstr("Feed to C-101")) << verb;
+  }
+  const json about = StoreJson("history list")["episodes"][0]["about"];
+  EXPECT_EQ(about["grade"], 1);
+  EXPECT_EQ(about["location"], "Hall 2");
+  EXPECT_EQ(StoreJson("worklist")["rows"][0]["grade_factor"], 2.0);
+  EXPECT_EQ(StoreJson("valves list")["loops"][0]["about"], about);
 }
 
 // The end of the data is not the end of the fault.

@@ -15,7 +15,7 @@ import {durationText, intervalText, percentText, rangeText,
   from '../format.js';
 import {link} from '../route.js';
 import {store} from '../store.js';
-import {dataTable, forText, labelText, lastedText, timeCell, valveLink}
+import {aboutNodes, dataTable, forText, labelText, lastedText, timeCell, valveLink}
   from './table.js';
 import {View} from './view.js';
 
@@ -32,6 +32,8 @@ const inWords = (strength, percent) =>
 function facts({episode: row, model_hash: hash}) {
   return [
     ['Valve', valveLink(row.valve)],
+    ...(row.about ? [['Description', h('span', {}, aboutNodes(row.about))]] :
+      []),
     ['Fault', h('span', {class: 'with-sign'},
         prioritySign(priorityOf(row), members(row.fault).length > 0),
         [rowTitle(row) + moreText(row), row.witness]

@@ -98,9 +98,21 @@ function personText(row) {
 
 export const valveLink = (valve) => h('a', {href: link('valve', valve)}, valve);
 
-/** A valve and, of a plant, the monitor that `row` is from. */
-export const valveCell = (valve, {host, monitor}) => [valveLink(valve),
+/** A valve, who it is and, of a plant, the monitor that `row` is from. */
+export const valveCell = (valve, {host, monitor, about}) => [valveLink(valve),
+  about?.description && h('div', {class: 'remark'}, about.description),
+  about?.location && h('div', {class: 'number'}, about.location),
   monitor && h('div', {class: 'number'}, `${host}/${monitor}`)];
+
+/** A data sheet: a link where it is an address of the web. */
+export const documentNode = (document) => !document ? null :
+  /^https?:\/\//.test(document) ? h('a', {href: document, target: '_blank',
+    rel: 'noopener noreferrer'}, 'data sheet') : `data sheet ${document}`;
+
+/** "Feed to column C-101, hall 2, data sheet"; empty if nothing is stated. */
+export const aboutNodes = (about) => [about?.description, about?.location,
+  documentNode(about?.document)].filter(Boolean)
+    .flatMap((part, i) => i > 0 ? [', ', part] : [part]);
 
 /** The columns of alarms. */
 export const columns = {

@@ -14,7 +14,7 @@ import {store} from '../store.js';
 import {actionButtons, canAct, shelve} from '../actions.js';
 import {exportPng} from '../charts/export.js';
 import {HealthSection} from './health.js';
-import {dataTable, labelText} from './table.js';
+import {aboutNodes, dataTable, labelText} from './table.js';
 import {View} from './view.js';
 
 const kTrendSeconds = 900;  // What the monitor keeps.
@@ -68,7 +68,7 @@ function serviceText({service, type, grade, group}) {
   const words = [kServices[service] ?? service, type,
     grade && `grade ${grade}`, group && `group ${group}`]
       .filter(Boolean).join(', ');
-  return words && `Service: ${words}. `;
+  return words ? `Service: ${words}. ` : '';
 }
 
 const kResidualColumns = [
@@ -152,6 +152,7 @@ class ValvePage extends View {
   #state = h('div', {class: 'state-line'});
   #words = h('p', {class: 'words'});
   #now = h('div', {class: 'now-tables'});
+  #who = h('p', {class: 'hint'});
   #scope = h('p', {class: 'hint scope'});
   #actions = h('div', {class: 'actions'});
   #note = h('p', {class: 'note', role: 'status'});
@@ -180,7 +181,7 @@ class ValvePage extends View {
         h('div', {class: 'controls'}, h('h1', {}, id), this.#state,
             this.#actions),
         h('div', {class: 'live'}, this.#words, this.#checks,
-            this.#now, this.#scope),
+            this.#who, this.#now, this.#scope),
         this.#note,
         h('div', {class: 'row-end'}, button('Save as PNG', () =>
           exportPng(this.#timeline, id)), h('a', {href: link('history', '', {valve: id})},
@@ -239,6 +240,7 @@ class ValvePage extends View {
   async #loadAbout() {
     try {
       this.#about = await getOptional(path('valves', this.id, 'about')) ?? {};
+      replace(this.#who, ...aboutNodes(this.#about));
       if (!this.gone) this.#showState();
     } catch {
       // What is known without it is shown.
