@@ -4,6 +4,7 @@
 #include <cctype>
 #include <chrono>
 #include <exception>
+#include <filesystem>
 #include <iterator>
 #include <memory>
 
@@ -13,6 +14,7 @@
 #include "base/text.h"
 #include "storage/history/foreign_history.h"
 #include "storage/history/history_reader.h"
+#include "storage/models/repairs.h"
 
 namespace fdi::console {
 namespace {
@@ -75,6 +77,41 @@ std::unique_ptr<storage::History> Api::History() const {
     foreign->FinishWithin(kRequestTime);
   }
   return history;
+}
+
+std::vector<storage::ValveEvent> Api::Repairs(
+    const std::string& valve_id) const {
+  if (sources.plant_history || !std::filesystem::exists(sources.models)) {
+    return {};
+  }
+  storage::ModelStore store(sources.models);
+  return storage::RepairsOf(store, valve_id);
+}
+
+Json RepairsJson(const std::vector<storage::ValveEvent>& repairs,
+                 std::int64_t from_ns) {
+  Json list = Json::array();
+  for (const storage::ValveEvent& repair : repairs) {
+    if (repair.at_ns >= from_ns) {
+      list.push_back({{"at_ms", Ms(repair.at_ns)},
+                      {"kind", storage::ValveEventKindName(repair.kind)},
+                      {"who", TextOrNull(repair.who)},
+                      {"note", TextOrNull(repair.note)},
+                      {"order", TextOrNull(repair.order)}});
+    }
+  }
+  return list;
+}
+
+void AddRepairs(const std::vector<storage::ValveEvent>& repairs,
+                std::int64_t from_ns, std::int64_t to_ns, Json& marks) {
+  for (const storage::ValveEvent& repair : repairs) {
+    if (repair.at_ns >= from_ns && repair.at_ns <= to_ns) {
+      marks.push_back({{"t_ms", Ms(repair.at_ns)},
+                       {"kind", storage::ValveEventKindName(repair.kind)},
+                       {"text", repair.order}});
+    }
+  }
 }
 
 Json Api::Words(const ModelFacts* facts, const TracePoint* point) const {

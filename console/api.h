@@ -17,6 +17,7 @@
 #include "console/live_stream.h"
 #include "monitor/service/service_part.h"
 #include "report/fault_texts.h"
+#include "storage/models/models.h"
 
 namespace httplib {
 class Server;
@@ -77,6 +78,9 @@ struct Api {
   /// @throws storage::HistoryAwayError immediately while that of a plant is
   ///   away.
   std::unique_ptr<storage::History> History() const;
+  /// What was noted of the valve by `valves repaired`; nothing on the page of a
+  /// plant.
+  std::vector<storage::ValveEvent> Repairs(const std::string& valve_id) const;
   /// Explain(), with the fault names of the catalogue.
   Json Words(const ModelFacts* facts, const TracePoint* point) const;
 };
@@ -116,6 +120,13 @@ void AddActionRoutes(httplib::Server& server, const Api& api);
 /// "valves", "heard_ms", "silent"}], "history_away": {"since_ms", "reason"} or
 /// null}. Otherwise null.
 Json PlantJson(const Api& api);
+
+/// [{"at_ms", "kind", "who", "note", "order"}] of those from `from_ns` on.
+Json RepairsJson(const std::vector<storage::ValveEvent>& repairs,
+                 std::int64_t from_ns);
+/// Adds those within a trend to its marks.
+void AddRepairs(const std::vector<storage::ValveEvent>& repairs,
+                std::int64_t from_ns, std::int64_t to_ns, Json& marks);
 
 void SendJson(httplib::Response& response, const Json& json);
 void SendError(httplib::Response& response, int status,

@@ -13,7 +13,6 @@
 #include "base/time_units.h"
 #include "console/api.h"
 #include "diagnosis/model/fault_catalogue.h"
-#include "diagnosis/records/valve_glob.h"
 #include "import/csv.h"
 #include "report/plot/episode_figure.h"
 #include "report/plot/episode_text.h"
@@ -213,25 +212,6 @@ Json MarksOf(const std::vector<storage::HistoryEntry>& events) {
   return marks;
 }
 
-// Adds the repairs of the valve that fall into the recorded trace.
-void AddRepairs(const Api& api, const storage::Episode& episode,
-                const std::vector<TracePoint>& points, Json& marks) {
-  if (points.empty() || api.sources.plant_history ||
-      !std::filesystem::exists(api.sources.models)) {
-    return;
-  }
-  for (const auto& [valves, event] :
-       storage::ModelStore(api.sources.models).Repairs()) {
-    if (GlobMatches(valves, episode.valve_id) &&
-        event.at_ns >= points.front().sample.stamp_ns &&
-        event.at_ns <= points.back().sample.stamp_ns) {
-      marks.push_back({{"t_ms", Ms(event.at_ns)},
-                       {"kind", storage::ValveEventKindName(event.kind)},
-                       {"text", event.order}});
-    }
-  }
-}
-
 Json GapsOf(storage::History& history, const storage::Episode& episode,
             const std::vector<TracePoint>& points) {
   Json gaps = Json::array();
@@ -335,7 +315,11 @@ Json Episode(const Api& api, const httplib::Request& request) {
   Json trace = TrendJson(models.get(), episode.valve_id, points);
   trace["gaps"] = GapsOf(*reader, episode, points);
   trace["marks"] = MarksOf(events);
-  AddRepairs(api, episode, points, trace["marks"]);
+  const auto repairs = api.Repairs(episode.valve_id);
+  if (!points.empty()) {
+    AddRepairs(repairs, points.front().sample.stamp_ns,
+               points.back().sample.stamp_ns, trace["marks"]);
+  }
   trace["words"] =
       api.Words(models.get(), MostInformativePoint(episode, points));
   Json list = Json::array();
@@ -347,6 +331,7 @@ Json Episode(const Api& api, const httplib::Request& request) {
       GrowthJson(storage::GrowthOf(episode, reader->Strengths(episode.id)));
   return {{"episode", AlarmJson(alarm, api.texts, *api.alarms.Facts())},
           {"events", std::move(list)},
+          {"repairs", RepairsJson(repairs, episode.detected_ns)},
           {"look", std::move(look)},
           {"growth", std::move(growth)},
           {"note", TextOrNull(storage::TakeNote(*reader))},

@@ -1,5 +1,6 @@
 // Current state of the monitor and its valves, and the stream of changes.
 #include <algorithm>
+#include <limits>
 #include <set>
 
 #include <httplib.h>
@@ -112,11 +113,13 @@ Json About(const Api& api, const httplib::Request& request) {
   Json about = {{"type", nullptr},        {"service", nullptr},
                 {"description", nullptr}, {"location", nullptr},
                 {"document", nullptr},    {"grade", nullptr},
-                {"group", nullptr}};
+                {"group", nullptr},       {"repairs", Json::array()}};
   if (api.sources.plant_history || api.sources.models.empty()) {
     return about;
   }
   const std::string valve_id = request.matches[1];
+  about["repairs"] = RepairsJson(api.Repairs(valve_id),
+                                 std::numeric_limits<std::int64_t>::min());
   storage::ModelStore store(api.sources.models);
   if (const auto entry = store.FindValve(valve_id);
       entry && !entry->type.empty()) {
@@ -164,6 +167,10 @@ Json Trend(const Api& api, const httplib::Request& request) {
     json["marks"].push_back({{"t_ms", Ms(mark.stamp_ns)},
                              {"kind", TransitionName(mark.kind)},
                              {"text", mark.text}});
+  }
+  if (!trend->points.empty()) {
+    AddRepairs(api.Repairs(valve_id), trend->points.front().sample.stamp_ns,
+               trend->points.back().sample.stamp_ns, json["marks"]);
   }
   json["words"] =
       api.Words(trend->now.models.get(),

@@ -64,7 +64,7 @@ Report Acknowledge(const AckOptions& options, const Context& context) {
   NameFaults(episodes, context);
   report.document["episodes"] =
       Rows(reader.Alarms(std::move(episodes), NowNs()),
-           [valves = IdentitiesOf(context)](const Alarm& alarm) {
+           [valves = NotesOf(context)](const Alarm& alarm) {
              return EpisodeJson(alarm, valves);
            });
   return report;
@@ -88,7 +88,7 @@ Report LabelEpisode(const EpisodeLabelOptions& options,
   const Alarm alarm = reader.Alarms(std::move(labelled), NowNs()).front();
   const Episode& episode = alarm.episode;
   Report report;
-  report.document = EpisodeJson(alarm, IdentitiesOf(context));
+  report.document = EpisodeJson(alarm, NotesOf(context));
   return report.Line(episode.episode_id + " labelled " +
                      episode.label.value_or(""));
 }

@@ -1,10 +1,12 @@
 // Shared by the verbs: options, JSON values, texts.
+#include <filesystem>
 #include <sstream>
 
 #include "base/error.h"
 #include "base/text.h"
 #include "base/time_units.h"
 #include "diagnosis/model/fault_catalogue.h"
+#include "diagnosis/records/valve_glob.h"
 #include "programs/store/clock.h"
 #include "programs/store/verbs.h"
 #include "report/fault_texts.h"
@@ -142,14 +144,46 @@ Json VafJson(double vaf) {
   return IsVafMeaningful(vaf) ? NumberJson(vaf) : Json();
 }
 
-findings::Identities IdentitiesOf(const Context& context) {
-  return findings::ReadIdentities(DataOf(context).models());
+ValveNotes NotesOf(const Context& context) {
+  const auto models = DataOf(context).models();
+  ValveNotes notes;
+  notes.about = findings::ReadIdentities(models);
+  if (std::filesystem::exists(models)) {
+    notes.repairs = ModelStore(models).Repairs();
+  }
+  return notes;
 }
 
-findings::Identities IdentitiesOf(const PlantOptions& plant,
-                                  const Context& context) {
-  return plant.asked() ? findings::Identities{} : IdentitiesOf(context);
+ValveNotes NotesOf(const PlantOptions& plant, const Context& context) {
+  return plant.asked() ? ValveNotes{} : NotesOf(context);
 }
+
+Json ValveEventJson(const ValveEvent& event) {
+  return {{"epoch", event.epoch},
+          {"kind", ValveEventKindName(event.kind)},
+          {"at_utc", TimeJson(event.at_ns)},
+          {"who", event.who},
+          {"note", event.note},
+          {"order", event.order.empty() ? Json() : Json(event.order)},
+          {"expected_utc", TimeJson(event.expected_ns)}};
+}
+
+namespace {
+
+// What was done to the valve since the episode was detected.
+Json RepairsJson(const Episode& episode, const ValveNotes& valves) {
+  Json repairs = Json::array();
+  for (const auto& [pattern, event] : valves.repairs) {
+    if (event.at_ns >= episode.detected_ns &&
+        (pattern == episode.valve_id ||
+         GlobMatches(pattern, episode.valve_id))) {
+      repairs.push_back(ValveEventJson(event));
+    }
+  }
+  return repairs;
+}
+
+}  // namespace
 
 const std::vector<std::string>& EpisodeKeys() {
   static const std::vector<std::string> keys = {
@@ -180,7 +214,7 @@ void NameFaults(std::vector<Episode>& episodes, const Context& context) {
 }
 
 // A strength is that of a fault: while there is no name, it is null and not 0.
-Json EpisodeJson(const Alarm& alarm, const findings::Identities& valves) {
+Json EpisodeJson(const Alarm& alarm, const ValveNotes& valves) {
   const Episode& episode = alarm.episode;
   const bool named = IsNamed(episode);
   const auto severity = episode.priority ? SeverityOf(*episode.priority)
@@ -188,8 +222,8 @@ Json EpisodeJson(const Alarm& alarm, const findings::Identities& valves) {
   return {
       {"episode_id", episode.episode_id},
       {"valve_id", episode.valve_id},
-      {"about",
-       findings::AboutJson(findings::IdentityOf(valves, episode.valve_id))},
+      {"about", findings::AboutJson(
+                    findings::IdentityOf(valves.about, episode.valve_id))},
       {"detected_utc", episode.detected_utc},
       {"isolated_utc", TextJson(episode.isolated_utc)},
       {"cleared_utc", TextJson(episode.cleared_utc)},
@@ -216,7 +250,8 @@ Json EpisodeJson(const Alarm& alarm, const findings::Identities& valves) {
       {"shelved_until_utc",
        alarm.shelf ? TimeJson(alarm.shelf->until_ns) : Json()},
       {"second", TextJson(episode.second)},
-      {"description", TextJson(episode.description)}};
+      {"description", TextJson(episode.description)},
+      {"repairs", RepairsJson(episode, valves)}};
 }
 
 Json ShelfJson(const Shelf& shelf) {

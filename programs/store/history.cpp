@@ -52,7 +52,7 @@ std::string After(const Json& row, const char* key) {
 }
 
 // Rows of the plant history also have host and monitor.
-Json ListedJson(const Alarm& alarm, const findings::Identities& valves) {
+Json ListedJson(const Alarm& alarm, const ValveNotes& valves) {
   const Episode& e = alarm.episode;
   Json row = EpisodeJson(alarm, valves);
   if (!e.monitor.empty()) {
@@ -79,6 +79,12 @@ std::string FaultText(const Json& row) {
          (second.is_null() ? "" : " and " + second.get<std::string>());
 }
 
+// What was noted last of the valve since the detection: "recalibrated".
+std::string RepairText(const Json& row) {
+  const Json& repairs = row["repairs"];
+  return repairs.empty() ? "-" : repairs.back()["kind"].get<std::string>();
+}
+
 Report ListEpisodes(const HistoryOptions& options, const Context& context) {
   const auto history = OpenHistory(options.plant, context);
   EpisodeFilter filter = options.filter.Filter(context);
@@ -92,7 +98,7 @@ Report ListEpisodes(const HistoryOptions& options, const Context& context) {
       history->Alarms(std::move(episodes), filter.now_ns);
   Report report;
   report.document["as_of_utc"] = FormatTime(filter.now_ns, true);
-  const auto valves = IdentitiesOf(options.plant, context);
+  const auto valves = NotesOf(options.plant, context);
   report.document["episodes"] = Rows(alarms, [&valves](const Alarm& alarm) {
     return ListedJson(alarm, valves);
   });
@@ -139,6 +145,7 @@ Report ListEpisodes(const HistoryOptions& options, const Context& context) {
           5, Align::kRight),
       TextColumn("end", end, 5),
       {"label", "label", Format::kPlain, 0, 6},
+      TextColumn("repaired", RepairText, 7),
       {"acked by", "acked_by", Format::kPlain, 0, 7},
       {"model set", "model_set", Format::kPlain, 0, 8}};
   if (options.plant.asked()) {
@@ -356,7 +363,7 @@ Report ShowEpisode(const ShowOptions& options, const Context& context) {
   const Alarm alarm = history->Alarms(std::move(shown), NowNs()).front();
   const Episode& e = alarm.episode;
   Report report;
-  const auto valves = IdentitiesOf(options.plant, context);
+  const auto valves = NotesOf(options.plant, context);
   report.document = ListedJson(alarm, valves);
   report.document.update(
       {{"source_id", Hex16(e.source_id)},
@@ -371,13 +378,26 @@ Report ShowEpisode(const ShowOptions& options, const Context& context) {
     report.Fields("", {TextField("monitor", e.host + "/" + e.monitor)});
   }
   if (const std::string about =
-          findings::AboutText(findings::IdentityOf(valves, e.valve_id));
+          findings::AboutText(findings::IdentityOf(valves.about, e.valve_id));
       !about.empty()) {
     report.Fields("", {TextField("description", about)});
   }
   report.Fields(
       "", plot::EpisodeFields(alarm, report::LoadFaultTexts(context.options),
                               context.options.utc));
+  for (const Json& repair : report.document["repairs"]) {
+    const auto text = [&repair](const char* key, const char* before) {
+      const Json& value = repair[key];
+      return value.is_string() && value != ""
+                 ? before + value.get<std::string>()
+                 : "";
+    };
+    report.Fields(
+        "", {TextField("work", repair["kind"].get<std::string>() +
+                                   text("at_utc", ", ") + text("who", " by ") +
+                                   text("order", ", order ") +
+                                   text("note", ": "))});
+  }
   AddEvents(history->Events(e.id), context, report);
   AddLook(history->Look(e.id), context, report);
   AddGrowth(e, history->Strengths(e.id), context, report);

@@ -20,6 +20,7 @@
 #include "storage/history/valve_move.h"
 #include "storage/models/models.h"
 #include "storage/models/plant_loops.h"
+#include "storage/models/repairs.h"
 #include "trainer/fleet/plant_rows.h"
 
 namespace fdi::storage {
@@ -84,16 +85,6 @@ Report ListValves(const NoOptions&, const Context& context) {
                   {"finding", "finding", Format::kPlain, 0, 1}});
   }
   return report;
-}
-
-Json ValveEventJson(const ValveEvent& event) {
-  return {{"epoch", event.epoch},
-          {"kind", ValveEventKindName(event.kind)},
-          {"at_utc", TimeJson(event.at_ns)},
-          {"who", event.who},
-          {"note", event.note},
-          {"order", event.order.empty() ? Json() : Json(event.order)},
-          {"expected_utc", TimeJson(event.expected_ns)}};
 }
 
 Json BaselineJson(const BaselineRecord& record) {
@@ -191,7 +182,8 @@ std::vector<CoverageTime> CoverageOf(const std::string& valve_id,
 
 // `fields` come first: they apply to the valve whose entry it is.
 void AddEntry(ModelStore& store, const ValveEntry& entry,
-              std::vector<report::Column> fields, Report& report) {
+              const std::string& valve_id, std::vector<report::Column> fields,
+              Report& report) {
   fields.insert(fields.end(),
                 {{"entry", "valve"},
                  {"type", "type"},
@@ -203,7 +195,7 @@ void AddEntry(ModelStore& store, const ValveEntry& entry,
                  {"epoch", "epoch"},
                  {"baseline", "baseline"}});
   report.Fields("", std::move(fields));
-  const auto events = store.ValveEvents(entry.pattern);
+  const auto events = RepairsOf(store, valve_id);
   const auto baselines = store.Baselines(entry.pattern);
   report.document["events"] = Rows(events, ValveEventJson);
   report.document["baselines"] = Rows(baselines, BaselineJson);
@@ -235,7 +227,7 @@ Report ShowValve(const std::string& valve_id, const Context& context) {
       TextField("diagnosed with",
                 assigned ? ToString(*assigned) : "UNASSIGNED")};
   if (entry) {
-    AddEntry(store, *entry, std::move(fields), report);
+    AddEntry(store, *entry, valve_id, std::move(fields), report);
   } else {
     report.Fields("", std::move(fields));
   }

@@ -24,6 +24,7 @@
 #include "storage/history/episode.h"
 #include "storage/history/history_editor.h"
 #include "storage/history/history_reader.h"
+#include "storage/models/models.h"
 
 /// The verbs of fdi-store, one file per noun. A verb reads its data, fills the
 /// document of a Report, and declares which members the text output shows.
@@ -159,15 +160,20 @@ Json Rows(const Items& items, RowOf row_of) {
   return rows;
 }
 
-/// Who the valves are; nothing for the history of a plant.
-findings::Identities IdentitiesOf(const Context& context);
-findings::Identities IdentitiesOf(const PlantOptions& plant,
-                                  const Context& context);
+/// Who the valves are, and what was done to them.
+struct ValveNotes {
+  findings::Identities about{};
+  std::vector<std::pair<std::string, ValveEvent>> repairs{};
+};
+/// Those of models.db; nothing for the history of a plant.
+ValveNotes NotesOf(const Context& context);
+ValveNotes NotesOf(const PlantOptions& plant, const Context& context);
 /// The columns of the view fault_history, in its order.
 const std::vector<std::string>& EpisodeKeys();
 /// Puts the names of the fault catalogue where the history has none.
 void NameFaults(std::vector<Episode>& episodes, const Context& context);
-Json EpisodeJson(const Alarm& alarm, const findings::Identities& valves);
+Json EpisodeJson(const Alarm& alarm, const ValveNotes& valves);
+Json ValveEventJson(const ValveEvent& event);
 Json ShelfJson(const Shelf& shelf);
 
 /// {"V1": {"LIVE": 12.5, ...}, ...}: hours by valve and quality.

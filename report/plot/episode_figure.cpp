@@ -13,6 +13,7 @@
 #include "diagnosis/model/fault_catalogue.h"
 #include "diagnosis/observers/residual_windows.h"
 #include "storage/models/models.h"
+#include "storage/models/repairs.h"
 
 namespace fdi::plot {
 namespace {
@@ -394,6 +395,11 @@ std::vector<Mark> Marks(const EpisodeEvidence& evidence) {
       marks.push_back({SecondsFrom(event.stamp_ns, origin_ns), text, colour});
     }
   }
+  for (const storage::ValveEvent& repair : evidence.repairs) {
+    marks.push_back({SecondsFrom(repair.at_ns, origin_ns),
+                     std::string(ValveEventKindName(repair.kind)),
+                     ink::kGreen});
+  }
   return marks;
 }
 
@@ -491,8 +497,9 @@ EpisodeEvidence LoadEvidence(storage::History& history, std::string_view id,
   }
   if (std::filesystem::exists(models_path)) {
     try {
-      ModelSet models =
-          storage::ModelStore(models_path).Load(episode.model_set);
+      storage::ModelStore store(models_path);
+      evidence.repairs = storage::RepairsOf(store, episode.valve_id);
+      ModelSet models = store.Load(episode.model_set);
       // NAME@VERSION does not identify a set across databases, and the
       // thresholds of another set would explain the alarm wrongly. The content
       // hash does.

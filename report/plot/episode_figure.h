@@ -9,6 +9,7 @@
 #include "diagnosis/model/model_set.h"
 #include "report/plot/figure.h"
 #include "storage/history/history.h"
+#include "storage/models/models.h"
 
 namespace fdi::plot {
 
@@ -17,8 +18,9 @@ struct EpisodeEvidence {
   storage::Episode episode;
   std::vector<storage::HistoryEntry> events;
   std::vector<TracePoint> trace;
-  std::vector<DataGap> gaps;        ///< Those that overlap the trace.
-  std::optional<EpisodeLook> look;  ///< Its explanation by simulation.
+  std::vector<DataGap> gaps;                 ///< Those that overlap the trace.
+  std::optional<EpisodeLook> look;           ///< Its explanation by simulation.
+  std::vector<storage::ValveEvent> repairs;  ///< Of its valve, at any time.
   /// The set behind the diagnosis: thresholds and T. If missing, not drawn.
   std::optional<ModelSet> models;
 };
@@ -39,8 +41,8 @@ struct EpisodeFigureOptions {
 
 /// Flow, displacement, residuals with their thresholds, the residual windows
 /// that made the detection with their limits, and decision factors with T, over
-/// the time from detection; marks at start, detection, isolation, clearing and
-/// end; times without diagnosis are shaded.
+/// the time from detection; marks at start, detection, isolation, clearing,
+/// end and repairs; times without diagnosis are shaded.
 Figure EpisodeFigure(const EpisodeEvidence& evidence,
                      const EpisodeFigureOptions& options = {});
 

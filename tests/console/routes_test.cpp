@@ -207,11 +207,11 @@ TEST_F(ConsoleRoutesTest, WhatAValveServesComesFromItsEntryAndThePlantsTable) {
   EXPECT_EQ(Get("/api/v1/valves/LV-1/about"),
             Json::parse(R"({"type": "globe DN100", "service": "L", "grade": 1,
                             "description": "Feed", "location": null,
-                            "document": null, "group": null})"));
+                            "document": null, "group": null, "repairs": []})"));
   EXPECT_EQ(Get("/api/v1/valves/FV-1/about"),
             Json::parse(R"({"type": null, "service": null, "grade": null,
                             "description": null, "location": null,
-                            "document": null, "group": null})"));
+                            "document": null, "group": null, "repairs": []})"));
 }
 
 TEST_F(ConsoleRoutesTest, AnEpisodeComesWithItsEvidence) {
@@ -255,6 +255,36 @@ TEST_F(ConsoleRoutesTest, AnEpisodeComesWithItsEvidence) {
   } else {
     EXPECT_EQ(picture->status, 404);
   }
+}
+
+// On the page of the valve, in its trend, and in the episode before it.
+TEST_F(ConsoleRoutesTest, ARepairIsSeenWhereverTheValveIs) {
+  RecordEpisode(writer_, 4);
+  writer_.AppendTrace(Id(), Instants(60, -30.0));
+  writer_.Commit(kDetected);
+  const std::string valve = Event(TransitionKind::kDetected, 0, 0, 0).valve_id;
+  {
+    storage::ModelStore models(directory_.path() / "models.db",
+                               storage::Access::kOccasionalWriter);
+    storage::ValveEvent event;
+    event.kind = storage::ValveEventKind::kRecalibrated;
+    event.who = "bo";
+    event.at_ns = kDetected + 10 * kNsPerSecond;
+    models.AddValveEvent("*", event);
+    event.at_ns = monitor::PlantSample(75).stamp_ns;
+    models.AddValveEvent("V7", event);
+  }
+  Start();
+  const Json answer = Get("/api/v1/episodes/" + IdText());
+  ASSERT_EQ(answer["repairs"].size(), 1U);
+  EXPECT_EQ(answer["repairs"][0]["who"], "bo");
+  EXPECT_EQ(answer["trace"]["marks"].back()["kind"], "recalibrated");
+  EXPECT_EQ(Get("/api/v1/valves/" + valve + "/about")["repairs"].size(), 1U);
+  ShowValve("V7", 80, 0.0);
+  const Json marks = Get("/api/v1/valves/V7/trend?seconds=900")["marks"];
+  EXPECT_TRUE(std::ranges::any_of(marks, [](const Json& mark) {
+    return mark["kind"] == "recalibrated";
+  })) << marks;
 }
 
 TEST_F(ConsoleRoutesTest, HistoryIsPagedNewestFirst) {

@@ -722,6 +722,33 @@ test('the work list has the order of its document, factors, and what nobody ' +
   await close(page);
 });
 
+test('the table of residuals says what is within, beyond and not judged',
+    async () => {
+      const data = trend({state: 'DETECTED', d0: 0, d: [0.5, 0.1]});
+      const last = [2.6, -2.6, 0, null];
+      data.channels = last.map((_, c) =>
+        ({name: `C${c}`, unit: '', low: -2.5, high: 2.5}));
+      data.residuals = last.map((value) => data.t_ms.map(() => value));
+      data.windows = [{channel: 'C2', samples: 60, of: 'mean', value: 1,
+        low: -0.5, high: 0.5}];
+      monitor.reset([tile('V', 'DETECTED')]);
+      monitor.answers['valves/V/trend'] = data;
+      monitor.answers['valves/V/about'] = {type: null, service: null,
+        description: null, location: null, document: null, grade: null,
+        group: null, repairs: [{at_ms: kNowMs, kind: 'recalibrated', who: 'bo',
+          note: null, order: null}]};
+      const page = await openShared(browser, address, '#/valve/V');
+      const rows = page.locator('table', {hasText: 'Residuals now'})
+          .locator('tbody tr');
+      await rows.first().waitFor();
+      assert.deepEqual(await rows.evaluateAll((all) => all.map((row) =>
+        [row.cells[0].textContent, row.cells[3].textContent, row.className])),
+      [['C0', 'above', 'out'], ['C1', 'below', 'out'], ['C2', 'within', ''],
+        ['C2, mean over 60 samples', 'above', 'out'], ['C3', 'abstains', '']]);
+      await page.getByText(/^Last work: recalibrated, .* by bo$/).waitFor();
+      await close(page);
+    });
+
 test('a valve says who it is, and links its data sheet only to the web',
     async () => {
       const about = (document) => ({description: '<i>Feed</i>', service: 'F',

@@ -260,6 +260,18 @@ TEST_F(EpisodeFigureTest, HasTheMarksOfTheEpisodeAndTheGapsOfTheValve) {
   EXPECT_THAT(figure.footnote, HasSubstr("thresholds are not shown"));
 }
 
+TEST_F(EpisodeFigureTest, ARepairIsDrawn) {
+  storage::ValveEvent repair;
+  repair.kind = storage::ValveEventKind::kRepacked;
+  repair.at_ns = kDetected + 25 * kSecond;
+  storage::ModelStore(directory_.path() / "models.db",
+                      storage::Access::kOccasionalWriter)
+      .AddValveEvent("*", repair);
+  const Figure figure = EpisodeFigure(Evidence());
+  EXPECT_EQ(figure.marks.back().text, "repacked");
+  EXPECT_NEAR(figure.marks.back().x, 25.0, 1e-9);
+}
+
 // The monitor was down for 5 s, and its successor settled for 14 s more.
 TEST_F(EpisodeFigureTest, WhatIsMissingIsGreyUntilTheNextSample) {
   EpisodeEvidence evidence = Evidence();

@@ -10,6 +10,7 @@
 
 #include "base/error.h"
 #include "storage/models/model_codec.h"
+#include "storage/models/repairs.h"
 #include "tests/storage/message_of.h"
 #include "tests/storage/model_set_fixture.h"
 #include "tests/storage/temporary_directory.h"
@@ -366,6 +367,9 @@ TEST_F(ModelsTest, ASetThatTheUserAssignsHasNoBaseline) {
   EXPECT_EQ(store_.Repairs()[1].first, "V2");
   EXPECT_EQ(store_.Repairs()[1].second.at_ns, 7);
   EXPECT_FALSE(store_.FindValve("V2"));
+  store_.AddValveEvent("V*", {.at_ns = 9});
+  EXPECT_EQ(RepairsOf(store_, "V2").size(), 2U);
+  EXPECT_EQ(RepairsOf(store_, "W").size(), 0U);
 }
 
 TEST_F(ModelsTest, ValveTypesKeepTheirBytes) {

@@ -52,15 +52,16 @@ TEST_F(FdiStoreHistoryTest, ListedEpisodesHaveTheColumnsOfTheView) {
 
   ASSERT_EQ(listed["episodes"].size(), 1U);
   const json& episode = listed["episodes"][0];
-  EXPECT_THAT(KeysOf(episode),
-              testing::UnorderedElementsAre(
-                  "episode_id", "valve_id", "about", "detected_utc",
-                  "isolated_utc", "cleared_utc", "ended_utc", "returned_utc",
-                  "fault", "peak_factor", "model_set", "end_reason", "label",
-                  "acked_by", "strength", "worst_strength", "severity",
-                  "priority", "unconfirmed_utc", "certainty", "look_alikes",
-                  "fault_name", "acked_utc", "ack_comment", "alarm_state",
-                  "shelved_until_utc", "second", "description", "witness"));
+  EXPECT_THAT(
+      KeysOf(episode),
+      testing::UnorderedElementsAre(
+          "episode_id", "valve_id", "about", "detected_utc", "isolated_utc",
+          "cleared_utc", "ended_utc", "returned_utc", "fault", "peak_factor",
+          "model_set", "end_reason", "label", "acked_by", "strength",
+          "worst_strength", "severity", "priority", "unconfirmed_utc",
+          "certainty", "look_alikes", "fault_name", "acked_utc", "ack_comment",
+          "alarm_state", "shelved_until_utc", "second", "description",
+          "witness", "repairs"));
   EXPECT_EQ(episode["fault_name"], "Flashing or critical flow");
   EXPECT_EQ(episode["fault"], "f7");
   EXPECT_EQ(episode["detected_utc"], "2026-11-20T14:56:11.000Z");
@@ -87,6 +88,26 @@ TEST_F(FdiStoreHistoryTest, WhoAValveIsStandsInEveryList) {
   EXPECT_EQ(about["location"], "Hall 2");
   EXPECT_EQ(StoreJson("worklist")["rows"][0]["grade_factor"], 2.0);
   EXPECT_EQ(StoreJson("valves list")["loops"][0]["about"], about);
+}
+
+TEST_F(FdiStoreHistoryTest, WorkOnAValveStandsInItsEpisode) {
+  const json before = StoreJson("history list")["episodes"][0];
+  EXPECT_TRUE(before["repairs"].empty());
+  const std::string valve = before["valve_id"];
+  ASSERT_EQ(Store("valves repaired '*' recalibrated --by bo --comment zero "
+                  "--at 2026-11-20T15:00:00Z")
+                .code,
+            0);
+  ASSERT_EQ(
+      Store("valves repaired " + valve + " repacked --at 2026-11-20T14:00:00Z")
+          .code,
+      0);
+  const json row = StoreJson("history list")["episodes"][0];
+  ASSERT_EQ(row["repairs"].size(), 1U);  // What came before is of another.
+  EXPECT_EQ(row["repairs"][0]["kind"], "recalibrated");
+  EXPECT_THAT(Store("history list").out, HasSubstr(" recalibrated "));
+  EXPECT_THAT(Store("history show last").out,
+              HasSubstr("recalibrated, 2026-11-20T15:00:00Z by bo: zero"));
 }
 
 // The end of the data is not the end of the fault.

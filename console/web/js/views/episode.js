@@ -77,6 +77,12 @@ function eventText(event) {
   ].filter(Boolean).join(', ');
 }
 
+// What was done to the valve stands among what happened.
+const withRepairs = ({events, repairs}) => [...events, ...(repairs ?? []).map(
+    ({note, order, ...repair}) => ({...repair, comment: note,
+      value: order && `order ${order}`}))]
+    .sort((a, b) => a.at_ms - b.at_ms);
+
 const kEventColumns = [
   {text: 'Time', cell: (event) => timeCell(event.at_ms)},
   {text: 'What', header: true, cell: (event) => markWord(event.kind)},
@@ -203,7 +209,7 @@ class EpisodePage extends View {
         this.#timeline ? this.#timeline.element :
           h('p', {class: 'note'}, 'There is no recording of this episode.'),
         found.look ? lookParts(found.look) : null,
-        dataTable('What happened', kEventColumns, found.events),
+        dataTable('What happened', kEventColumns, withRepairs(found)),
         h('p', {class: 'hint'}, `Times are ${zoneName()}.`));
     if (this.#timeline) this.#timeline.rebuild();
   }

@@ -5,7 +5,7 @@ import {Timeline} from '../charts/timeline.js';
 import {TrendData} from '../charts/trend_data.js';
 import {button, h, replace, setText} from '../dom.js';
 import {certaintyNode, factorTitle, faultName, faultOfTile, faultTitle, inAlarm,
-  isAlarm, members, moreText, notJudgedText, openText, priorityNames, priorityOf, prioritySign,
+  isAlarm, markWord, members, moreText, notJudgedText, openText, priorityNames, priorityOf, prioritySign,
   qualityText, stateWord} from '../faults.js';
 import {durationText, numberText, percentText, strengthText,
   timeText, unitText} from '../format.js';
@@ -69,6 +69,14 @@ function serviceText({service, type, grade, group}) {
     grade && `grade ${grade}`, group && `group ${group}`]
       .filter(Boolean).join(', ');
   return words ? `Service: ${words}. ` : '';
+}
+
+/** ". Last work: recalibrated, 2026-11-20 by bo"; empty without any. */
+function repairText({description, location, document, repairs}) {
+  const last = repairs?.at(-1);
+  return !last ? '' : (description || location || document ? '. ' : '') +
+    `Last work: ${markWord(last.kind)}, ${timeText(last.at_ms)}` +
+    (last.who ? ` by ${last.who}` : '');
 }
 
 const kResidualColumns = [
@@ -240,7 +248,8 @@ class ValvePage extends View {
   async #loadAbout() {
     try {
       this.#about = await getOptional(path('valves', this.id, 'about')) ?? {};
-      replace(this.#who, ...aboutNodes(this.#about));
+      replace(this.#who, h('span', {}, aboutNodes(this.#about)),
+          repairText(this.#about));
       if (!this.gone) this.#showState();
     } catch {
       // What is known without it is shown.
