@@ -53,7 +53,7 @@ std::string GradeText(const Json& row) {
 }
 
 std::string StateText(const Json& row) {
-  return row["open"] == false               ? "ended"
+  return row["open"] == false               ? "returned"
          : row["unconfirmed_utc"].is_null() ? "stands"
                                             : "not confirmed";
 }

@@ -55,7 +55,7 @@ std::string EpisodeText(const Finding& finding, std::int64_t now_ns) {
   std::string text =
       finding.words.name + ": " +
       (finding.ended_ns
-           ? "ended " + SpanText(now_ns - *finding.ended_ns) + " ago"
+           ? "returned " + SpanText(now_ns - *finding.ended_ns) + " ago"
            : "stands for " + SpanText(now_ns - *finding.since_ns));
   if (finding.unconfirmed_ns) {
     text += ", not confirmed for " + SpanText(now_ns - *finding.unconfirmed_ns);

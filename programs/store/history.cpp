@@ -137,7 +137,7 @@ Report ListEpisodes(const HistoryOptions& options, const Context& context) {
       {"now", "strength", Format::kPercent, 0, 2},
       {"worst", "worst_strength", Format::kPercent, 0, 5},
       TextColumn(
-          "isolated after",
+          "named after",
           [](const Json& row) { return After(row, "isolated_utc"); }, 6,
           Align::kRight),
       TextColumn(

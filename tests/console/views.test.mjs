@@ -712,7 +712,7 @@ test('the work list has the order of its document, factors, and what nobody ' +
   const text = await page.locator('main').innerText();
   for (const part of ['As of ', '2 of 3 loops are watched', 'high · 4',
     '1 · 2.0', 'likely · 0.75', '6.00', 'shares cause: air header',
-    'no data came', '25.0 %', 'mechanical or instrument', 'ended',
+    'no data came', '25.0 %', 'mechanical or instrument', 'returned',
     'stands; acknowledged', 'in work, order 4711, expected back 2026-11-26',
     'Done, and watched for their return', 'recalibrated']) {
     assert.ok(text.includes(part), part);

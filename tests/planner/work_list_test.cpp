@@ -128,7 +128,7 @@ TEST_F(WorkListTest, ARowHasItsFactorsAndWhoSawIt) {
   EXPECT_THAT(row["check"].get<std::string>(), Not(IsEmpty()));
   EXPECT_THAT(
       row["why"].get<std::string>(),
-      AllOf(testing::StartsWith("Flow transmitter wrong: ended 24 h ago"),
+      AllOf(testing::StartsWith("Flow transmitter wrong: returned 24 h ago"),
             HasSubstr("severity high")));
 }
 

@@ -114,7 +114,7 @@ export const faultOfTile = (tile) => !inAlarm(tile) ? tile.fault :
 const kStateWords = {
   NORMAL: 'normal', NOT_JUDGED: 'not judged',
   PARTLY_JUDGED: 'partly judged', DETECTED: 'fault detected',
-  ISOLATED: 'fault named', REISOLATED: 'named anew', CLEARED: 'cleared',
+  ISOLATED: 'fault named', REISOLATED: 'named anew', CLEARED: 'returned',
   CLOSED: 'closed',
 };
 export const stateWord = (state) => kStateWords[state] ?? state;

@@ -156,7 +156,7 @@ TEST_F(FdiStoreHistoryTest, TheListFitsATerminalOfAHundredColumns) {
   }
   const std::string piped = Store("history list").out;
   for (const char* column :
-       {"isolated after", "label", "acked by", "model set", "demo@3"}) {
+       {"named after", "label", "acked by", "model set", "demo@3"}) {
     EXPECT_THAT(piped, HasSubstr(column));
   }
   EXPECT_THAT(piped, testing::Not(HasSubstr("too narrow")));

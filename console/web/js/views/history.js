@@ -17,9 +17,9 @@ const kPage = 100;
 const kDayMs = 86400000;
 const kDefaultDays = 30;
 const kStates = [
-  ['', 'any'], ['open', 'open'], ['detected', 'detected, not isolated'],
-  ['isolated', 'isolated'], ['closed', 'ended'], ['unack', 'unacknowledged'],
-  ['rtn_unack', 'returned, unacknowledged'], ['acked', 'acknowledged, active'],
+  ['', 'any'], ['open', 'open'], ['detected', 'detected, not named'],
+  ['isolated', 'named'], ['closed', 'closed'], ['unack', 'unacknowledged'],
+  ['rtn_unack', 'returned'], ['acked', 'acknowledged'],
   ['shelved', 'shelved'],
 ];
 const kColumns = [

@@ -24,7 +24,7 @@ const workText = ({in_work_utc: since, order, expected_utc: back}) => !since ?
   null : ['in work', order && `order ${order}`,
     back && `expected back ${utcText(back)}`].filter(Boolean).join(', ');
 
-const stateText = (row) => [!row.open ? 'ended' : row.unconfirmed_utc ?
+const stateText = (row) => [!row.open ? 'returned' : row.unconfirmed_utc ?
   `not confirmed since ${utcText(row.unconfirmed_utc)}` : 'stands',
 row.acked_by && 'acknowledged', workText(row)].filter(Boolean).join('; ');
 
