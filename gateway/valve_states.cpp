@@ -242,6 +242,8 @@ Json ValveStates::StateOf(const Json& row, bool monitored) const {
   };
   return {{"valve_id", valve_id},
           {"group", GroupOf(valve_id)},
+          {"about",
+           findings::AboutJson(findings::IdentityOf(identities_, valve_id))},
           {"health", health},
           {"reason", reason},
           {"state", state},

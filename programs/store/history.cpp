@@ -4,6 +4,7 @@
 
 #include "base/csv_cells.h"
 #include "base/text.h"
+#include "base/time_units.h"
 #include "programs/store/verbs.h"
 #include "report/fault_texts.h"
 #include "report/plot/episode_figure.h"
@@ -97,7 +98,8 @@ Report ListEpisodes(const HistoryOptions& options, const Context& context) {
   const std::vector<Alarm> alarms =
       history->Alarms(std::move(episodes), filter.now_ns);
   Report report;
-  report.document["as_of_utc"] = FormatTime(filter.now_ns, true);
+  const std::int64_t as_of_ns = filter.now_ns / kNsPerSecond * kNsPerSecond;
+  report.document["as_of_utc"] = FormatTime(as_of_ns, true);
   const auto valves = NotesOf(options.plant, context);
   report.document["episodes"] = Rows(alarms, [&valves](const Alarm& alarm) {
     return ListedJson(alarm, valves);
@@ -153,7 +155,7 @@ Report ListEpisodes(const HistoryOptions& options, const Context& context) {
                                          {"monitor", "monitor"}});
   }
   report.Table("episodes", columns, "no episode matches");
-  return report.Line("as of " + TimeText(filter.now_ns, context));
+  return report.Line("as of " + TimeText(as_of_ns, context));
 }
 
 // Transitions have faults and a factor; operator actions have a who.

@@ -363,11 +363,6 @@ Report AddPlant(const std::string& file, const Context& context) {
 // What is stated replaces what was, and the rest of the loop stays.
 void PutIdentity(const AddOptions& options, const ValveEntry& entry,
                  ModelStore& store) {
-  if (options.pattern.find_first_of("*?[") != std::string::npos) {
-    throw ConfigError(options.pattern +
-                      " is a glob: --description, --location, --document and "
-                      "--grade are of one valve");
-  }
   PlantLoop loop;
   loop.name = options.pattern;
   for (const PlantLoop& each : store.Loops()) {
@@ -392,6 +387,12 @@ Report AddValves(const AddOptions& options, const Context& context) {
   }
   if (options.pattern.empty()) {
     throw ConfigError("valves add: an id or glob, or --plant FILE, is needed");
+  }
+  if (options.about != ValveIdentity{} &&
+      options.pattern.find_first_of("*?[") != std::string::npos) {
+    throw ConfigError(options.pattern +
+                      " is a glob: --description, --location, --document and "
+                      "--grade are of one valve");
   }
   ValveEntry entry;
   entry.pattern = options.pattern;

@@ -205,13 +205,15 @@ TEST_F(ConsoleRoutesTest, WhatAValveServesComesFromItsEntryAndThePlantsTable) {
   Start();
 
   EXPECT_EQ(Get("/api/v1/valves/LV-1/about"),
-            Json::parse(R"({"type": "globe DN100", "service": "L", "grade": 1,
+            Json::parse(R"({"type": "globe DN100", "service": "L",
                             "description": "Feed", "location": null,
-                            "document": null, "group": null, "repairs": []})"));
+                            "document": null, "grade": 1, "group": null,
+                            "repairs": []})"));
   EXPECT_EQ(Get("/api/v1/valves/FV-1/about"),
-            Json::parse(R"({"type": null, "service": null, "grade": null,
+            Json::parse(R"({"type": null, "service": null,
                             "description": null, "location": null,
-                            "document": null, "group": null, "repairs": []})"));
+                            "document": null, "grade": null, "group": null,
+                            "repairs": []})"));
 }
 
 TEST_F(ConsoleRoutesTest, AnEpisodeComesWithItsEvidence) {

@@ -332,7 +332,8 @@ TEST_F(JsonDocumentsTest, ProgramsAndPageHaveTheSameKeys) {
   Printed(page, "valves add", "'PV-*' --type globe");
   Printed(page, "valves repaired", "LV-1 repacked");
   Printed(page, "valves assign", "LV-1 pump@2");
-  Write("plant.csv", "name,op,pv,group\nFIC1,OP,PV,a\nFIC2,OP,PV,a\n,OP,,\n");
+  Write("plant.csv",
+        "name,op,pv,group,grade\nFIC1,OP,PV,a,1\nFIC2,OP,PV,a,\n,OP,,,\n");
   Printed(page, "valves add --plant", "plant.csv");
   std::filesystem::create_directory(directory_.path() / "DIR");
   ModelStore(directory_.path() / "DIR" / "models.db",
