@@ -1,5 +1,6 @@
 #include "monitor/service/service.h"
 
+#include <chrono>
 #include <csignal>
 #include <filesystem>
 #include <iterator>
@@ -14,6 +15,9 @@
 
 #include "base/error.h"
 #include "base/time_text.h"
+#include "diagnosis/model/fault_catalogue.h"
+#include "monitor/bus/bus_valve_states.h"
+#include "report/shared_files.h"
 #include "storage/history/history_database.h"
 #include "storage/history/history_reader.h"
 #include "storage/models/models.h"
@@ -253,6 +257,55 @@ TEST_F(ServiceTest, AReloadThatFailedIsTriedAgain) {
   EXPECT_EQ(Count("reload_failed id=M112"), 1U);
   // At the start, by the reload and by the second retry.
   EXPECT_EQ(Count("models_loaded model_set=first@1"), 3U);
+}
+
+// The audit found that the rod sticks; the episode that took over from it
+// names the flow transmitter. Whoever reads the bus hears of the contradiction.
+TEST(BusValveStatesTest, ANameThatTheAuditContradictsIsOneOfSeveral) {
+  const idl::TestDomain domain;
+  idl::DdsOptions dds;
+  dds.domain = domain.id();
+  idl::Participant participant(dds);
+  BusValveStates states(participant, "monitor",
+                        report::FaultTexts(report::SharedFile("faults.toml")));
+  idl::Subscriber<idl::ValveStateMessage> reader(participant);
+  constexpr std::chrono::seconds kPatience(30);
+  ASSERT_TRUE(reader.WaitForWriters(1, kPatience));
+  // The certainty that is told of `episode_id` once `event` has come.
+  const auto told_after = [&](const FaultEvent& event) {
+    states.OnEvent(event);
+    std::string certainty;
+    const auto end = std::chrono::steady_clock::now() + kPatience;
+    while (certainty.empty() && std::chrono::steady_clock::now() < end) {
+      reader.Take({[&](const idl::ValveStateMessage& state, const auto&) {
+                     if (state.episode_id == event.episode_id) {
+                       certainty = state.certainty;
+                     }
+                   },
+                   {}},
+                  std::chrono::milliseconds(100));
+    }
+    return certainty;
+  };
+  FaultEvent event;
+  event.valve_id = "V1";
+  event.episode_id = 1;
+  event.candidates = {{19, 0.95, 0.5, true}};
+  event.transition.kind = TransitionKind::kIsolated;
+  event.transition.stamp_ns = 1;
+  event.transition.factor = 0.95;
+  event.transition.strength = 0.5;
+  EXPECT_EQ(told_after(event), "sure");
+
+  FaultEvent audit = event;
+  audit.episode_id = 2;
+  audit.candidates = {{kStiction, 0.0, 0.0, true}};
+  audit.transition.kind = TransitionKind::kClosed;
+  audit.transition.reason = EndReason::kSuperseded;
+  audit.transition.layer = Layer::kAudit;
+  states.OnEvent(audit);
+  event.episode_id = 3;
+  EXPECT_EQ(told_after(event), "one of");
 }
 
 }  // namespace
