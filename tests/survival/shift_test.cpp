@@ -1,6 +1,6 @@
-// A shift of twenty valves in fast time: list, page, bus, SQL, PostgreSQL, hook
-// and metrics say the same of every alarm at ten moments; so do the work list,
-// the view of one episode and the dashboard.
+// A shift of twenty valves in fast time: list, page, bus, SQL, PostgreSQL,
+// hook, gateway and metrics say the same of every alarm at eleven moments; so
+// do the work list, the view of one episode and the dashboard.
 #include <array>
 #include <chrono>
 #include <cmath>
@@ -376,11 +376,13 @@ class ShiftTest : public MonitorFixture {
         page, [&told](const auto& item) { return !told.contains(item.first); });
     const std::string ranked =
         ByRank(page) == order ? "" : "the page has another order\n";
-    // A finding that is labelled and over is done.
+    // A finding that is over is done once it is labelled, or the valve
+    // repaired.
     std::erase_if(list, [](const auto& item) {
       const json& row = item.second;
       return row["shelved"] == true ||
-             (!row["label"].is_null() && row["alarm_state"] == "RTN_UNACK");
+             ((!row["label"].is_null() || !row["repairs"].empty()) &&
+              row["alarm_state"] == "RTN_UNACK");
     });
     return ranked + Differences("work list", list, told);
   }
@@ -442,6 +444,44 @@ class ShiftTest : public MonitorFixture {
                : "none";
   }
 
+#ifdef FDI_GATEWAY_PROGRAM
+  // The messages for MQTT, as lines.
+  void StartGateway() {
+    gateway_out_ = std::make_unique<ChildProcess>(std::vector<std::string>{
+        FDI_GATEWAY_PROGRAM, "--data", data_.string(), "--domain",
+        std::to_string(domain_.id()), "--transport", "udp", "out", "--lines",
+        (directory_.path() / "lines").string()});
+  }
+  // The newest state of each valve that a broker would keep.
+  Alarms FromGateway() const {
+    std::map<std::string, json> states;
+    std::ifstream lines(directory_.path() / "lines");
+    for (std::string line; std::getline(lines, line);) {
+      const json message = json::parse(line, nullptr, false);
+      // The last line may be half written.
+      if (message.is_object() && message["topic"].is_string() &&
+          message["topic"].get<std::string>().ends_with("/state")) {
+        states[message["topic"]] = message["payload"];
+      }
+    }
+    Alarms alarms;
+    for (const auto& [topic, state] : states) {
+      for (const json& alarm : state["alarms"]) {
+        alarms[alarm["episode_id"]] = {
+            {"valve_id", state["valve_id"]},
+            {"fault", alarm["fault"]},
+            {"severity", alarm["severity"]},
+            {"alarm_state", alarm["state"]},
+            {"shelved", !alarm["shelved_until_utc"].is_null()},
+            {"unconfirmed", !alarm["unconfirmed_utc"].is_null()},
+            {"acked_by", alarm["acked_by"]},
+            {"ack_comment", alarm["ack_comment"]}};
+      }
+    }
+    return alarms;
+  }
+#endif
+
   // ---- What they disagree about.
   std::string Disagreement(const Alarms& list) const {
     Alarms active;
@@ -481,6 +521,9 @@ class ShiftTest : public MonitorFixture {
         Differences("history show", list, shown) +
         WorkListDifferences(list, page) + Differences("SQL", list, FromSql()) +
         Differences("bus", active, bus) + Differences("hook", announced, hook);
+#ifdef FDI_GATEWAY_PROGRAM
+    text += Differences("gateway", list, FromGateway());
+#endif
     if (server_ != nullptr) {
       text += Differences("PostgreSQL", list, FromPostgres());
       text += Differences("Grafana", list, FromGrafana(list));
@@ -573,6 +616,7 @@ class ShiftTest : public MonitorFixture {
   std::vector<Valve> valves_;
   std::optional<idl::Publisher<idl::ValveSampleMessage>> gateway_;
   std::unique_ptr<ChildProcess> monitor_;
+  std::unique_ptr<ChildProcess> gateway_out_;
   int page_{0};
   int metrics_{0};
   int now_s_{0};
@@ -582,6 +626,9 @@ PrivatePostgres* ShiftTest::server_ = nullptr;
 
 TEST_F(ShiftTest, EverybodySaysTheSameOfEveryAlarm) {
   Start();
+#ifdef FDI_GATEWAY_PROGRAM
+  StartGateway();
+#endif
   Pass(40);
   Moment("all is well", {});
 
@@ -657,6 +704,18 @@ TEST_F(ShiftTest, EverybodySaysTheSameOfEveryAlarm) {
   mended[0] = {"FV-01", "RTN_UNACK", "f1", "critical", 0.9};
   mended[1].strength = 0.9;
   Moment("mended", mended);
+
+  // The work list lets go of it, and every view of the episode has the repair.
+  Store("valves repaired 'FV-0[1]' recalibrated --by bo");
+  Moment("repaired", mended);
+  const json work = json::parse(Store("worklist --json"));
+  ASSERT_EQ(work["done"].size(), 1U) << work["done"];
+  EXPECT_EQ(work["done"][0]["what"], "recalibrated");
+  EXPECT_EQ(json::parse(
+                Store("history show --json " + labelled))["repairs"][0]["who"],
+            "bo");
+  EXPECT_EQ(Get("/api/v1/episodes/" + labelled)["repairs"][0]["who"], "bo");
+  EXPECT_EQ(Get("/api/v1/valves/FV-01/about")["repairs"].size(), 1U);
 
   Store("history ack --valve '*' --by anna --comment 'seen'");
   Store("history shelve FV-06 --off --by jan");
