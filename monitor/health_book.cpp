@@ -106,6 +106,7 @@ void HealthBook::Add(const Sample& sample, const Verdict& verdict,
   const std::int64_t period_ms = std::llround(period_s * 1e3);
   hour.seen_ms += period_ms;
   AddCounts(sample, period_s, hour);
+  loop::CountSingle(verdict.single, hour.counts);
   AddStroke(sample, period_ms, hour);
   // Where no further row may be begun, At() returns another one. Time counts
   // there, too, but residuals and decisions belong to their own model set.

@@ -95,15 +95,36 @@ std::string TrendText(const LimitTrend& trend) {
          ForecastText(trend.forecast);
 }
 
+// What was counted in the last day with data.
+struct DayCounts {
+  loop::ValveCounts counts;
+  std::int64_t seen_ms{0};
+};
+
+// "21 single readings of F in 2 h"
+std::string SingleText(const DayCounts& day) {
+  constexpr std::int64_t kNsPerMs = kNsPerHour / kMsPerHour;
+  const loop::SingleReadings most = loop::MostSingle(day.counts);
+  return std::to_string(most.number) + " single readings of " +
+         std::string(SignalName(most.signal)) + " in " +
+         SpanText(day.seen_ms * kNsPerMs);
+}
+
 // "Dead band of the valve: 1.40 % of travel over the last day, accepted up to
 // 1.00"
-std::string FigureText(const report::FigureText& text, double value) {
+std::string FigureText(loop::Figure figure, const report::FigureText& text,
+                       double value, const DayCounts& day) {
   const bool low = text.lowest && value < *text.lowest;
-  return text.name + ": " + report::FormatNumber(value, 2) +
-         (text.unit.empty() ? "" : " " + text.unit) +
-         " over the last day, accepted " +
+  const std::string unit = text.unit.empty() ? "" : " " + text.unit;
+  const bool single = figure == loop::Figure::kSingle;
+  return text.name + ": " +
+         (single
+              ? SingleText(day)
+              : report::FormatNumber(value, 2) + unit + " over the last day") +
+         ", accepted " +
          (low ? "from " + report::FormatNumber(*text.lowest, 2)
-              : "up to " + report::FormatNumber(*text.highest, 2));
+              : "up to " + report::FormatNumber(*text.highest, 2)) +
+         (single ? unit : "");
 }
 
 // The number of events that a figure is the mean of; a share of the time needs
@@ -118,6 +139,8 @@ std::int64_t EventsOf(loop::Figure figure, const loop::ValveCounts& counts) {
       return counts.turns;
     case loop::Figure::kErrorBand:
       return std::min(counts.opening, counts.closing);
+    case loop::Figure::kSingle:
+      return loop::MostSingle(counts).number;
     case loop::Figure::kDelay:
     case loop::Figure::kT63:
     case loop::Figure::kT86:
@@ -332,21 +355,22 @@ void RowReader::AddFigures(const Finding& of,
                            const std::vector<HealthHour>& hours) {
   constexpr std::int64_t kDayHours = 24;
   constexpr std::int64_t kFewest = 5;
-  loop::ValveCounts counts;
-  std::int64_t seen_ms = 0;
+  DayCounts day;
   for (const HealthHour& hour : hours) {
     if (hour.epoch == hours.back().epoch &&
         hour.hour > hours.back().hour - kDayHours) {
-      counts.Add(hour.counts);
-      seen_ms += hour.seen_ms;
+      day.counts.Add(hour.counts);
+      day.seen_ms += hour.seen_ms;
     }
   }
   for (std::size_t i = 0; i < loop::kFigureCount; ++i) {
     const auto figure = static_cast<loop::Figure>(i);
-    const auto value = loop::FigureOf(figure, counts, seen_ms);
+    const auto value = loop::FigureOf(figure, day.counts, day.seen_ms);
     const report::FigureText& text = texts_.Of(figure);
-    if (value && EventsOf(figure, counts) >= kFewest && text.Exceeded(*value)) {
-      rows_.push_back({Low(of, "figure", text), FigureText(text, *value)});
+    if (value && EventsOf(figure, day.counts) >= kFewest &&
+        text.Exceeded(*value)) {
+      rows_.push_back(
+          {Low(of, "figure", text), FigureText(figure, text, *value, day)});
     }
   }
 }

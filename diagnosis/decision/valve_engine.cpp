@@ -181,6 +181,7 @@ class ValveEngine::Impl {
   void ClearVerdict();
   Checked CheckSample(const Sample& measured, bool begins);
   bool Mend(const Checked& checked, bool begins, Sample& trained);
+  SignalMask Single(const Checked& checked) const;
   void TakeSource(const Sample& sample);
   void Reject(Intake intake);
   void Initialise(const Sample& sample);
@@ -218,6 +219,7 @@ const Verdict& ValveEngine::Impl::Step(const Sample& measured) {
   verdict_.seq = trained.seq;
   verdict_.initialised = false;
   verdict_.transition_count = 0;
+  verdict_.single = 0;
   const SourceOrder::Placement placement = order_.Place(trained);
   verdict_.intake = placement.intake;
   if (OutOfOrder(placement.intake)) {
@@ -246,6 +248,7 @@ const Verdict& ValveEngine::Impl::Step(const Sample& measured) {
     Initialise(trained);
   }
   const Sample& sample = diagnosis_->lone.Step(diagnosis_->bank, trained);
+  verdict_.single = Single(checked);
   diagnosis_->stuck.Push(sample);
   diagnosis_->floor.Push(sample);
   ReadResiduals();
@@ -315,6 +318,17 @@ bool ValveEngine::Impl::Mend(const Checked& checked, bool begins,
   return bridge_.Mend(static_cast<SignalMask>(unusable),
                       diagnosis_->lone.judged(), trained) ||
          checked.unusable == 0;
+}
+
+// What is missing belongs to the transport, and is not counted.
+SignalMask ValveEngine::Impl::Single(const Checked& checked) const {
+  const SignalMask unusable =
+      bridge_.begins() ? checked.unusable : SignalMask{0};
+  unsigned wrong = diagnosis_->lone.wrong();
+  if (models().position_as_command && (wrong & MaskOf(Signal::kCv)) != 0) {
+    wrong = (wrong & ~MaskOf(Signal::kCv)) | MaskOf(Signal::kX);
+  }
+  return static_cast<SignalMask>(unusable | wrong);
 }
 
 // What was known of another source says nothing about this one; a snapshot

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "base/time_units.h"
 #include "diagnosis/loop/step_response.h"
 
 namespace fdi::loop {
@@ -51,10 +52,34 @@ void ValveCounts::Add(const ValveCounts& other) {
   }
 }
 
+constexpr std::array<std::pair<Signal, std::int64_t ValveCounts::*>, 6>
+    kSingleCounts{{{Signal::kCv, &ValveCounts::single_cv},
+                   {Signal::kP1, &ValveCounts::single_p1},
+                   {Signal::kP2, &ValveCounts::single_p2},
+                   {Signal::kT1, &ValveCounts::single_t1},
+                   {Signal::kX, &ValveCounts::single_x},
+                   {Signal::kF, &ValveCounts::single_f}}};
+
+void CountSingle(SignalMask signals, ValveCounts& counts) {
+  for (const auto& [signal, count] : kSingleCounts) {
+    counts.*count += (signals & MaskOf(signal)) != 0 ? 1 : 0;
+  }
+}
+
+SingleReadings MostSingle(const ValveCounts& counts) {
+  SingleReadings most;
+  for (const auto& [signal, count] : kSingleCounts) {
+    if (counts.*count > most.number) {
+      most = {signal, counts.*count};
+    }
+  }
+  return most;
+}
+
 std::string_view FigureName(Figure figure) {
   constexpr std::array<std::string_view, kFigureCount> kNames{
-      "at_limit", "slip_jump", "dead_band", "error_band", "delay",
-      "t63",      "t86",       "overshoot", "travel_gain"};
+      "at_limit", "slip_jump", "dead_band", "error_band",  "delay",
+      "t63",      "t86",       "overshoot", "travel_gain", "single_readings"};
   return kNames[static_cast<std::size_t>(figure)];
 }
 
@@ -85,6 +110,8 @@ std::optional<double> FigureOf(Figure figure, const ValveCounts& counts,
       return MeanSize(counts.overshoot, counts.steps, kQuantum);
     case Figure::kTravelGain:
       return MeanSize(counts.gain, counts.steps, kQuantum);
+    case Figure::kSingle:
+      return MeanSize(MostSingle(counts).number, seen_ms, kMsPerHour);
   }
   return std::nullopt;
 }

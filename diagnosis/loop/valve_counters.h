@@ -8,6 +8,8 @@
 #include <string_view>
 #include <vector>
 
+#include "diagnosis/model/sample.h"
+
 namespace fdi::loop {
 
 /// What instrument people count of a valve in some time: sums in whole quanta,
@@ -32,30 +34,43 @@ struct ValveCounts {
   std::int64_t t86_ms{0};
   std::int64_t overshoot{0};  ///< [% of the realised step]
   std::int64_t gain{0};       ///< Travel gain ΔX/ΔCV.
+  /// Single readings that were wrong or unusable (Verdict::single), by signal.
+  std::int64_t single_cv{0};
+  std::int64_t single_p1{0};
+  std::int64_t single_p2{0};
+  std::int64_t single_t1{0};
+  std::int64_t single_x{0};
+  std::int64_t single_f{0};
 
   void Add(const ValveCounts& other);
   bool operator==(const ValveCounts&) const = default;
 };
 
 /// All numbers of ValveCounts, in the order in which they are stored.
-inline constexpr std::array<std::int64_t ValveCounts::*, 17> kValveCounts{
-    &ValveCounts::auto_ms,
-    &ValveCounts::limit_ms,
-    &ValveCounts::path,
-    &ValveCounts::slips,
-    &ValveCounts::slip_size,
-    &ValveCounts::turns,
-    &ValveCounts::dead_band,
-    &ValveCounts::opening,
-    &ValveCounts::opening_offset,
-    &ValveCounts::closing,
-    &ValveCounts::closing_offset,
-    &ValveCounts::steps,
-    &ValveCounts::delay_ms,
-    &ValveCounts::t63_ms,
-    &ValveCounts::t86_ms,
-    &ValveCounts::overshoot,
-    &ValveCounts::gain};
+inline constexpr std::array<std::int64_t ValveCounts::*, 23> kValveCounts{
+    &ValveCounts::auto_ms,        &ValveCounts::limit_ms,
+    &ValveCounts::path,           &ValveCounts::slips,
+    &ValveCounts::slip_size,      &ValveCounts::turns,
+    &ValveCounts::dead_band,      &ValveCounts::opening,
+    &ValveCounts::opening_offset, &ValveCounts::closing,
+    &ValveCounts::closing_offset, &ValveCounts::steps,
+    &ValveCounts::delay_ms,       &ValveCounts::t63_ms,
+    &ValveCounts::t86_ms,         &ValveCounts::overshoot,
+    &ValveCounts::gain,           &ValveCounts::single_cv,
+    &ValveCounts::single_p1,      &ValveCounts::single_p2,
+    &ValveCounts::single_t1,      &ValveCounts::single_x,
+    &ValveCounts::single_f};
+
+/// How many single readings of a signal `counts` have.
+struct SingleReadings {
+  Signal signal{Signal::kF};
+  std::int64_t number{0};
+};
+
+/// Adds those of `signals`.
+void CountSingle(SignalMask signals, ValveCounts& counts);
+/// The signal with most of them; 0: there are none.
+SingleReadings MostSingle(const ValveCounts& counts);
 
 /// A figure of a valve that has a limit in the catalogue.
 enum class Figure : std::uint8_t {
@@ -68,11 +83,12 @@ enum class Figure : std::uint8_t {
   kT86,         ///< [s]
   kOvershoot,   ///< [% of the realised step]
   kTravelGain,  ///< ΔX/ΔCV [-].
+  kSingle,      ///< MostSingle() [1/h].
 };
-inline constexpr std::size_t kFigureCount = 9;
+inline constexpr std::size_t kFigureCount = 10;
 
 /// "at_limit", "slip_jump", "dead_band", "error_band", "delay", "t63", "t86",
-/// "overshoot" or "travel_gain".
+/// "overshoot", "travel_gain" or "single_readings".
 std::string_view FigureName(Figure figure);
 
 /// The figure as `counts` of `seen_ms` have it; nothing if too little was
@@ -81,8 +97,9 @@ std::string_view FigureName(Figure figure);
 std::optional<double> FigureOf(Figure figure, const ValveCounts& counts,
                                std::int64_t seen_ms);
 
-/// Counts from the samples of one valve, at a cost and a memory that do not
-/// depend on its history. Positions and commands in % of closing.
+/// Counts from the samples of one valve, all but single readings, at a cost and
+/// a memory that do not depend on its history. Positions and commands in % of
+/// closing.
 ///
 /// - Slip jump: X, which has stood (0.1 % in two samples), moves by 0.5 % or
 ///   more from one sample to the next, and by more than twice what CV moved

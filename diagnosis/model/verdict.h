@@ -173,6 +173,9 @@ struct Verdict {
   bool initialised{false};  ///< Observers were re-initialised at this sample.
   Quality quality{Quality::kSettling};
   CoverageReasons uncovered{0};  ///< Why it is not LIVE; 0: other reasons.
+  /// Signals of which a single reading was just found wrong (LoneReadings) or
+  /// unusable (Bridge).
+  SignalMask single{0};
   State state{State::kNormal};
   Unknown unknown{Unknown::kNone};
   bool detected{false};    ///< An episode is open.

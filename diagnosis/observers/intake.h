@@ -66,6 +66,9 @@ class Bridge {
   /// @returns whether nothing unusable is left in `sample`.
   bool Mend(SignalMask unusable, const Sample& past, Sample& sample);
 
+  /// The last sample is the first one in a row that was mended.
+  bool begins() const { return length_ == 1; }
+
  private:
   int length_{0};  // samples in a row
 };

@@ -51,11 +51,13 @@ void LoneReadings::Restart() {
   has_past_ = false;
   beyond_ = 0;
   held_ = 0;
+  wrong_ = 0;
 }
 
 const Sample& LoneReadings::Step(ObserverBank& bank, const Sample& sample) {
   const Sides held = std::exchange(held_, 0);
   residuals_.fill(kNan);
+  wrong_ = 0;
   // An UNCERTAIN past would keep the deciding reading from being judged.
   for (std::size_t k = 0; held != 0 && k < held_count_; ++k) {
     bank.Amend(static_cast<int>(k), last_held_[k].judged.values,
@@ -92,12 +94,46 @@ const Sample& LoneReadings::Step(ObserverBank& bank, const Sample& sample) {
 LoneReadings::Sides LoneReadings::Confirmed(Sides held, std::int64_t stamp_ns) {
   const Sides read = held & ~Unread();
   const Sides confirmed = Beyond() & read;
+  const Sides refuted = read & ~confirmed;
   for (std::size_t c = 0; c < now_.size(); ++c) {
-    if ((read & ~confirmed & SidesOf(c)) != 0) {
+    if ((refuted & SidesOf(c)) != 0) {
       doubted_until_ns_[c] = stamp_ns + kDoubtNs;
     }
   }
+  wrong_ = refuted != 0 ? WrongIn(refuted) : SignalMask{0};
   return confirmed;
+}
+
+// The outputs that jumped with their residuals, or else the input that changed
+// most.
+SignalMask LoneReadings::WrongIn(Sides refuted) const {
+  const HeldOut& held = last_held_[0];
+  const auto change = [&held](std::size_t i) {
+    return held.original.values[i] - held.judged.values[i];
+  };
+  SignalMask outputs = 0;
+  unsigned inputs = 0;
+  for (std::size_t c = 0; c < models_->channels.size(); ++c) {
+    const ChannelSpec& channel = models_->channels[c];
+    if ((refuted & SidesOf(c)) == 0) {
+      continue;
+    }
+    inputs |= doubtful_[c];
+    if (SidesBeyond(channel, change(Index(channel.output))) != 0) {
+      outputs = static_cast<SignalMask>(outputs | MaskOf(channel.output));
+    }
+  }
+  std::size_t most = 0;
+  double largest = 0.0;
+  for (unsigned left = inputs; outputs == 0 && left != 0; left &= left - 1) {
+    const auto i = static_cast<std::size_t>(std::countr_zero(left));
+    const double share = std::abs(change(i) / held.judged.values[i]);
+    if (share > largest) {
+      largest = share;
+      most = i;
+    }
+  }
+  return largest > 0.0 ? MaskOf(static_cast<Signal>(most)) : outputs;
 }
 
 bool LoneReadings::Doubted(Sides sides, std::int64_t stamp_ns) const {

@@ -53,6 +53,10 @@ class LoneReadings {
   /// @returns the sample as it is to be judged; valid until the next call.
   const Sample& Step(ObserverBank& bank, const Sample& sample);
 
+  /// Signals of which the last sample has shown the reading before it to be
+  /// wrong.
+  SignalMask wrong() const { return wrong_; }
+
   /// True if a reading of the last sample is held out.
   bool holds() const { return held_ != 0; }
   /// By channel, the residual of the reading that is held out and counts; else
@@ -74,6 +78,7 @@ class LoneReadings {
   Sides Jumped() const;
   Sides Unread() const;
   Sides Confirmed(Sides held, std::int64_t stamp_ns);
+  SignalMask WrongIn(Sides refuted) const;
   Sides TakeRare(Sides lone);
   bool Doubted(Sides sides, std::int64_t stamp_ns) const;
   void Judge(ObserverBank& bank, const Sample& sample, bool real);
@@ -86,6 +91,7 @@ class LoneReadings {
   std::size_t held_count_{0};  // of last_held_, in a row
   Sides beyond_{0};            // at the last reading of each channel
   Sides held_{0};
+  SignalMask wrong_{0};
   bool has_past_{false};
   std::array<double, kMaxChannels> residuals_;
   std::array<double, kMaxChannels> now_{};   // NaN: not read

@@ -1,5 +1,6 @@
 #include "diagnosis/observers/lone_readings.h"
 
+#include <array>
 #include <cmath>
 #include <memory>
 
@@ -73,9 +74,11 @@ TEST_F(LoneReadingsTest, OneWrongReadingStaysOutOfThePast) {
     EXPECT_EQ(judged_[signal], Resting(0)[signal]);
     EXPECT_FALSE(bank_.measured(1));
     EXPECT_TRUE(bank_.measured(0)) << "of X nothing is wrong";
+    EXPECT_EQ(lone_.wrong(), 0);
     // The past of F has no reading, so F abstains once more.
     Step(signal, 0.0);
     EXPECT_FALSE(lone_.holds());
+    EXPECT_EQ(lone_.wrong(), MaskOf(signal));
     Step(signal, 0.0);
     EXPECT_NEAR(bank_.residual(0, 1), 0.0, 1e-9) << SignalName(signal);
   }
@@ -90,6 +93,7 @@ TEST_F(LoneReadingsTest, TheSecondReadingMakesAStepReal) {
   EXPECT_TRUE(std::isnan(lone_.residuals()[0]));
   Step(Signal::kF, 40.0);
   EXPECT_FALSE(lone_.holds());
+  EXPECT_EQ(lone_.wrong(), 0);
   // As predicted from the reading before, which is in the past again.
   EXPECT_NEAR(bank_.residual(0, 1), 20.0, 1e-9);
 }
@@ -151,6 +155,26 @@ TEST(LoneReadingsEngineTest, AWindowTakesNoLoneReading) {
     sample.values[Index(Signal::kF)] += ++k % 60 == 0 ? 40.0 : 0.0;
   });
   EXPECT_TRUE(seen.transitions.empty());
+}
+
+TEST(LoneReadingsEngineTest, TheVerdictSaysOfWhichSignalAReadingWasWrong) {
+  ValveEngine engine(std::make_shared<const ModelSet>(LinearPlant()));
+  std::array<int, kSignalCount> single{};
+  for (std::uint64_t k = 0; k < 500; ++k) {
+    Sample sample = PlantSample(k, 0.0);
+    if (k % 100 == 20) {
+      sample.values[Index(Signal::kX)] += 40.0;
+    } else if (k % 100 == 60) {
+      sample.values[Index(Signal::kF)] = std::nan("");
+    }
+    const Verdict& verdict = engine.Step(sample);
+    for (std::size_t i = 0; i < kSignalCount; ++i) {
+      single[i] += (verdict.single >> i & 1U) != 0 ? 1 : 0;
+    }
+  }
+  std::array<int, kSignalCount> expected{};
+  expected[Index(Signal::kX)] = expected[Index(Signal::kF)] = 5;
+  EXPECT_EQ(single, expected);
 }
 
 // The first is alone. Later ones are two in a row, or one that is impossible

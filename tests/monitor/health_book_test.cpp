@@ -109,6 +109,20 @@ TEST(HealthBookTest, OnlyLiveSamplesHaveResidualsAllHaveTime) {
   EXPECT_EQ(hours[0].travel, 99'000);
 }
 
+TEST(HealthBookTest, SingleReadingsAreCountedBySignal) {
+  const ModelSet models = LinearModels();
+  HealthBook book;
+  for (int i = 0; i < 4; ++i) {
+    Verdict verdict = Live(0.0);
+    verdict.single = i < 3 ? MaskOf(Signal::kF) : MaskOf(Signal::kX);
+    book.Add(At(i * kSecond, 50.0, 30.0), verdict, &models, 1.0);
+  }
+  const auto hours = Taken(book);
+  EXPECT_EQ(hours.at(0).counts.single_f, 3);
+  EXPECT_EQ(hours.at(0).counts.single_x, 1);
+  EXPECT_EQ(hours.at(0).counts.single_t1, 0);
+}
+
 TEST(HealthBookTest, StrengthIsOfWhatIsIsolated) {
   const ModelSet models = LinearModels();  // f1, f7
   HealthBook book;

@@ -448,6 +448,31 @@ TEST_F(WorkListTest, AFigureBeyondItsLimitIsARow) {
   EXPECT_THROW(Rows(), ConfigError);
 }
 
+TEST_F(WorkListTest, ManySingleReadingsAreARowOfTheInstrument) {
+  HealthHour hour;
+  hour.valve_id = "V9";
+  hour.hour = kDetected / (kDay / 24);
+  hour.seen_ms = 2 * 3'600'000;
+  hour.counts.single_x = 4;
+  hour.counts.single_f = 20;
+  Checkpoint checkpoint;
+  checkpoint.health = {hour};
+  checkpoint.health.front().counts.single_f = 1;
+  writer_.CommitCheckpoint(checkpoint);
+  query_.now_ns = kDetected + kDay / 2;
+  EXPECT_TRUE(Rows().empty());
+
+  checkpoint.health = {hour};
+  writer_.CommitCheckpoint(checkpoint);
+  const Json rows = Rows();
+  ASSERT_EQ(rows.size(), 1u);
+  EXPECT_EQ(rows[0]["why"],
+            "Noisy transmitter or wiring: 21 single readings of F in 4 h, "
+            "accepted up to 2.00 an hour");
+  EXPECT_EQ(rows[0]["severity"], "low");
+  EXPECT_EQ(rows[0]["discipline"], "instrument");
+}
+
 TEST_F(WorkListTest, WhatIsShelvedIsLeftOutUntilTheShelfEnds) {
   RecordEpisode(writer_, 0b100, "A");
   storage::HistoryEditor(path_).Shelve("A", std::nullopt, query_.now_ns + kDay,

@@ -61,6 +61,7 @@ const kCounts = [
   ['error_band', 'Dynamic error band', '%'], ['delay', 'Dead time', 's'],
   ['t63', 'T63', 's'], ['t86', 'T86', 's'], ['overshoot', 'Overshoot', '%'],
   ['travel_gain', 'Travel gain', ''],
+  ['single_readings', 'Single wrong readings', 'an hour'],
 ];
 
 function countsOf(health) {
