@@ -18,7 +18,12 @@ const Verdict& Decision::Step(const Sample& measured) {
   held_readings_.Mark(sample);
   engine_.Suspect(names_->suspects());
   engine_.TakeName(names_->beside());
-  named_ = &names_->Step(sample, engine_.Step(sample), held_);
+  const Verdict& verdict = engine_.Step(sample);
+  // A look takes the readings that the observers took, but for a valve that is
+  // judged at its position, whose samples the engine has changed already.
+  const Sample* const judged =
+      models_->position_as_command ? nullptr : engine_.judged();
+  named_ = &names_->Step(judged != nullptr ? *judged : sample, verdict, held_);
   return *named_;
 }
 

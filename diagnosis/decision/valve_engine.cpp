@@ -104,16 +104,17 @@ Checked CheckValues(const ModelSet& models, SignalMask required,
 
 // What Save() writes and Restore() reads, little endian and without padding:
 //
-//     snapshot = format:u32 content_hash:u64 coverage windows drift
+//     snapshot = format:u32 content_hash:u64 coverage windows drift doubt
 //     coverage = stamped:u8 last_stamp_ns:i64 armed:u8
 //     windows  = (window window)*  residual and CV, by channel and length
 //     window   = length:i32 count:i32 mean:f64 variance:f64
 //     drift    = (count:i64 sum:f64 blocks:u64 mean:f64*)*  by span
+//     doubt    = until_ns:i64*  by channel
 //
 // There are as many windows as the model set has, which content_hash
 // identifies. A change to any part, also in the Save() of ResidualWindow, needs
 // another format number.
-constexpr std::uint32_t kSnapshotFormat = 5;
+constexpr std::uint32_t kSnapshotFormat = 6;
 // Samples in a row, until nothing is known.
 constexpr int kMaxUncertainRun = 60;
 
@@ -175,6 +176,9 @@ class ValveEngine::Impl {
 
   const ModelSet& models() const { return diagnosis_->plan->models(); }
   const Verdict& verdict() const { return verdict_; }
+  const Sample* judged() const {
+    return judged_ ? &diagnosis_->lone.judged() : nullptr;
+  }
   bool episode_open() const { return verdict_.state != State::kNormal; }
 
  private:
@@ -199,6 +203,7 @@ class ValveEngine::Impl {
   bool suspected_{false};
   NameBeside beside_;
   bool has_source_{false};
+  bool judged_{false};  // The last sample has reached the observers.
   bool needs_initialisation_{true};
   bool lost_pressure_{false};  // what looks like another unit is none
   double flow_before_{0.0};
@@ -220,6 +225,7 @@ const Verdict& ValveEngine::Impl::Step(const Sample& measured) {
   verdict_.initialised = false;
   verdict_.transition_count = 0;
   verdict_.single = 0;
+  judged_ = false;
   const SourceOrder::Placement placement = order_.Place(trained);
   verdict_.intake = placement.intake;
   if (OutOfOrder(placement.intake)) {
@@ -248,6 +254,7 @@ const Verdict& ValveEngine::Impl::Step(const Sample& measured) {
     Initialise(trained);
   }
   const Sample& sample = diagnosis_->lone.Step(diagnosis_->bank, trained);
+  judged_ = true;
   verdict_.single = Single(checked);
   diagnosis_->stuck.Push(sample);
   diagnosis_->floor.Push(sample);
@@ -542,6 +549,7 @@ std::vector<std::byte> ValveEngine::Impl::Save() const {
   diagnosis_->coverage.Save(writer);
   diagnosis_->detection.Save(writer);
   diagnosis_->drift.Save(writer);
+  diagnosis_->lone.Save(writer);
   return writer.Take();
 }
 
@@ -553,14 +561,17 @@ bool ValveEngine::Impl::Restore(std::span<const std::byte> bytes) {
   Coverage coverage(models());
   Detection detection(models());
   DriftWatch drift(models());
+  LoneReadings lone(models());
   if (!reader.Get(format, content_hash) || format != kSnapshotFormat ||
       content_hash != models().content_hash || !coverage.Restore(reader) ||
-      !detection.Restore(reader) || !drift.Restore(reader) || !reader.AtEnd()) {
+      !detection.Restore(reader) || !drift.Restore(reader) ||
+      !lone.Restore(reader) || !reader.AtEnd()) {
     return false;
   }
   diagnosis_->coverage = coverage;
   diagnosis_->detection = std::move(detection);
   diagnosis_->drift = std::move(drift);
+  diagnosis_->lone = lone;
   // The initialisation compares the next stamp with the restored one, and
   // discards all of this if too much time has passed.
   needs_initialisation_ = true;
@@ -618,6 +629,10 @@ bool ValveEngine::Restore(std::span<const std::byte> bytes) {
 
 const Verdict& ValveEngine::verdict() const {
   return impl_->verdict();
+}
+
+const Sample* ValveEngine::judged() const {
+  return impl_->judged();
 }
 
 const ModelSet& ValveEngine::models() const {

@@ -65,7 +65,8 @@ class ValveEngine {
   void TakeName(const NameBeside& name);
 
   /// The slow accumulators, for Restore() after a restart of the program:
-  /// windows of detection and whether the valve is armed (Coverage), with the
+  /// windows of detection, whether the valve is armed (Coverage), and which
+  /// channels are doubted (LoneReadings), with the
   /// stamp of the last sample and the content hash of the model set. An open
   /// episode is not among them.
   std::vector<std::byte> Save() const;
@@ -75,6 +76,11 @@ class ValveEngine {
   /// @returns false and changes nothing if the bytes are damaged, of another
   ///   format or of another model set.
   bool Restore(std::span<const std::byte> bytes);
+
+  /// The last sample as the observers took it: readings that were wrong or
+  /// unusable by themselves, and stand there no more, are UNCERTAIN. Null if it
+  /// did not reach them. Until the next call.
+  const Sample* judged() const;
 
   /// What Step() gave last.
   const Verdict& verdict() const;

@@ -54,6 +54,20 @@ void LoneReadings::Restart() {
   wrong_ = 0;
 }
 
+void LoneReadings::Save(SnapshotWriter& writer) const {
+  for (std::size_t c = 0; c < models_->channels.size(); ++c) {
+    writer.Put(doubted_until_ns_[c]);
+  }
+}
+
+bool LoneReadings::Restore(SnapshotReader& reader) {
+  bool all = true;
+  for (std::size_t c = 0; c < models_->channels.size(); ++c) {
+    all = all && reader.Get(doubted_until_ns_[c]);
+  }
+  return all;
+}
+
 const Sample& LoneReadings::Step(ObserverBank& bank, const Sample& sample) {
   const Sides held = std::exchange(held_, 0);
   residuals_.fill(kNan);

@@ -6,6 +6,7 @@
 
 #include "diagnosis/model/model_set.h"
 #include "diagnosis/model/sample.h"
+#include "diagnosis/model/snapshot.h"
 #include "diagnosis/observers/observer_bank.h"
 
 namespace fdi {
@@ -45,6 +46,11 @@ class LoneReadings {
 
   /// After the bank was initialised: there is no reading before.
   void Restart();
+
+  /// Which channels are doubted, and until when.
+  void Save(SnapshotWriter& writer) const;
+  /// @returns false, leaving it undefined, if there is nothing to be read.
+  bool Restore(SnapshotReader& reader);
 
   /// The last sample as it was judged.
   const Sample& judged() const { return judged_; }

@@ -1,5 +1,6 @@
 #include "diagnosis/decision/decision.h"
 
+#include <cmath>
 #include <memory>
 #include <vector>
 
@@ -124,6 +125,28 @@ TEST_F(DecisionTest, AnEndFromOutsideHasTheNameAndForgetsTheLooks) {
                    *TakeLook(*decision_.simulation(), due_.back()));
   FeedF7(kFaultBegins + 200);
   EXPECT_EQ(decision_.verdict().isolated, kBitOfF7) << "of another episode";
+}
+
+// Of X, 20 % is wrong once and nothing comes twice; a look sees neither.
+TEST_F(DecisionTest, ALookTakesNoWrongReadingAndKeepsItsRowsOverMissingOnes) {
+  Feed(30, 0.0);
+  Feed(31, 20.0);
+  for (const std::uint64_t k : {40, 50}) {
+    Feed(k, 0.0);
+    Sample sample = monitor::PlantSample(next_++);
+    sample.present =
+        static_cast<SignalMask>(sample.present & ~MaskOf(Signal::kX));
+    decision_.Step(sample);
+  }
+  Feed(kFaultBegins, 0.0);
+  FeedF7(kFaultBegins + 80);
+  ASSERT_FALSE(due_.empty());
+  const std::vector<RecordRow>& rows = due_.front().window.rows;
+  ASSERT_GT(rows.size(), kFaultBegins);
+  for (std::size_t k = 0; k < kFaultBegins; ++k) {
+    EXPECT_EQ(rows[k].x_measured, k != 30 && k != 40 && k != 50) << k;
+    EXPECT_LT(std::abs(rows[k].x_pct - rows[k].input.cv_pct), 10.0) << k;
+  }
 }
 
 TEST_F(DecisionTest, AnAnswerMayComeManySamplesLater) {

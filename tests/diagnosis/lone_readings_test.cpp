@@ -193,6 +193,25 @@ TEST(LoneReadingsEngineTest, TwoWrongReadingsInARowOpenNoEpisode) {
   EXPECT_EQ(fault.transitions.size(), 1U);
 }
 
+// The channel is doubted since before the restart, so two are held out.
+TEST(LoneReadingsEngineTest, TheDoubtOutlastsARestart) {
+  const auto models = std::make_shared<const ModelSet>(LinearPlant());
+  const auto wrong = [](Sample& sample) {
+    sample.values[Index(Signal::kF)] += 40.0;
+  };
+  ValveEngine before(models);
+  StepRange(before, 0, 100);
+  StepRange(before, 100, 101, wrong);
+  StepRange(before, 101, 110);
+  ValveEngine after(models);
+  ASSERT_TRUE(after.Restore(before.Save()));
+  StepRange(after, 110, 150);
+  Seen seen = StepRange(after, 150, 152, wrong);
+  EXPECT_TRUE(seen.transitions.empty());
+  seen = StepRange(after, 152, 200);
+  EXPECT_TRUE(seen.transitions.empty());
+}
+
 TEST(LoneReadingsEngineTest, AnAbruptFaultIsDetectedAtItsFirstSample) {
   ValveEngine engine(std::make_shared<const ModelSet>(LinearPlant()));
   ASSERT_TRUE(StepRange(engine, 0, 100).transitions.empty());
