@@ -37,6 +37,10 @@ constexpr double kGoodBand = 0.25;
 constexpr double kHalf = 0.5;     // G of a play between OP and X.
 constexpr double kMoves = 1.0;    // Of OP, which calls for an answer [%].
 constexpr double kWindsUp = 5.0;  // The same, whatever the noise of it [%].
+// Share of the mean error by which PV moves at most if it does not answer; so
+// an error of less than 1/kUnmoved noises says nothing.
+constexpr double kUnmoved = 0.05;
+constexpr double kNearEnd = 0.5;  // From an end of the range of OP [%].
 constexpr double kOftenAtLimit = 0.05;
 constexpr double kOtherHalf = 50.0;  // Of the travel, from where OP is [%].
 // Samples further apart than the lag of a rod are alike by chance.
@@ -63,6 +67,19 @@ std::vector<double> Errors(const Window& window) {
     errors[k] = (window.sp.empty() ? level : window.sp[k]) - window.pv[k];
   }
   return errors;
+}
+
+// The deviation of the noise: half of the second differences are within 0.67 of
+// theirs, which is √6 times that of a reading.
+double NoiseOf(std::span<const double> values) {
+  std::vector<double> second;
+  for (std::size_t k = 2; k < values.size(); ++k) {
+    second.push_back(std::abs(values[k] - 2.0 * values[k - 1] + values[k - 2]));
+  }
+  const auto middle =
+      second.begin() + static_cast<std::ptrdiff_t>(second.size() / 2);
+  std::ranges::nth_element(second, middle);
+  return *middle / 0.6745 / std::sqrt(6.0);
 }
 
 struct ControllerFit {
@@ -111,6 +128,27 @@ double Distance(std::span<const double> a, std::span<const double> b) {
   return off > 0.0 ? off / (Spread(a) + Spread(b)) : 0.0;
 }
 
+// Whether OP has stood at its open end for as long as a window needs, and PV,
+// off SP on one side by more than noise, has come no nearer.
+bool IsHelpless(const Window& window) {
+  std::vector<double> errors;
+  for (std::size_t k = 0; k < window.sp.size(); ++k) {
+    if (std::abs(window.op[k] - window.open_op) <= kNearEnd) {
+      errors.push_back(window.sp[k] - window.pv[k]);
+    }
+  }
+  if (errors.size() < kMinSamples || !IsPercent(window.op)) {
+    return false;
+  }
+  const std::size_t third = errors.size() / 3;
+  const std::span all(errors);
+  const double first = Mean(all.first(third));
+  const double last = Mean(all.last(third));
+  return first * last > 0.0 &&
+         std::abs(last) * (1.0 + kUnmoved) >= std::abs(first) &&
+         kUnmoved * std::abs(last) > NoiseOf(window.pv);
+}
+
 bool IsExchanged(const Window& window, double controller) {
   if (window.sp.empty() || Distance(window.pv, window.sp) <= 1.0 ||
       Distance(window.op, window.sp) >= 1.0) {
@@ -124,7 +162,7 @@ bool IsExchanged(const Window& window, double controller) {
 }
 
 bool IsAtLimit(double op) {
-  return op <= 0.5 || op >= 99.5;
+  return op <= kNearEnd || op >= 100.0 - kNearEnd;
 }
 
 // Of an OP that is no percentage, the ends are not known.
@@ -176,10 +214,12 @@ std::size_t LongestRepeat(const Window& window) {
 }
 
 // The longest one-way run of the smoothed OP in which SP - PV has one sign in
-// 95 % of the samples and PV moves by less than 5 % of its mean [% of OP].
+// 95 % of the samples and PV moves by less than 5 % of its mean, which is more
+// than noise [% of OP].
 double UnansweredRun(const Window& window) {
   const std::vector<double> errors = Errors(window);
   const std::size_t n = errors.size();
+  const double noise = NoiseOf(window.pv);
   constexpr std::size_t kSide = 3;  // Samples on either side of the mean.
   std::vector<double> op(n);
   for (std::size_t k = 0; k < n; ++k) {
@@ -201,8 +241,9 @@ double UnansweredRun(const Window& window) {
         std::ranges::count_if(e, [](double v) { return v > 0.0; }));
     const double share = positive / static_cast<double>(e.size());
     const double mean = std::abs(Mean(e));
-    if (run > longest && std::max(share, 1.0 - share) >= 0.95 && mean > 0.0 &&
-        std::abs(window.pv[end] - window.pv[begin]) < 0.05 * mean) {
+    if (run > longest && std::max(share, 1.0 - share) >= 0.95 &&
+        kUnmoved * mean > noise &&
+        std::abs(window.pv[end] - window.pv[begin]) < kUnmoved * mean) {
       longest = run;
     }
     begin = end;
@@ -256,6 +297,13 @@ std::optional<Band> Evidence::band() const {
   }
   return fit ? std::optional(Band{fit->band, fit->band_low, fit->band_high})
              : std::nullopt;
+}
+
+void SetService(char service, Window& window) {
+  window.lags = service == 'T';
+  if (service != '\0' && service != 'T') {
+    window.integrating = service == 'L';
+  }
 }
 
 bool IsPercent(std::span<const double> op) {
@@ -346,6 +394,11 @@ Finding Judge(const Window& window, const Evidence& e) {
   if (e.samples < kMinSamples) {
     return {Verdict::kUndetermined, false, "too few samples"};
   }
+  if (e.helpless && window.x.empty()) {
+    return {Verdict::kNoResponse, true,
+            "OP stands at its end and PV comes no nearer to SP: stuck, shut, "
+            "isolated, or too small"};
+  }
   if (e.op_range <= 0.0) {
     return {Verdict::kUndetermined, false, "OP stands still"};
   }
@@ -359,7 +412,9 @@ Finding Judge(const Window& window, const Evidence& e) {
   if (e.distinct_answer == 1 && e.op_range < kMoves) {
     return {Verdict::kUndetermined, false, "PV stands and OP hardly moves"};
   }
-  if (e.distinct_answer == 1 || e.unanswered >= kWindsUp) {
+  const bool known_slow = window.lags || window.integrating == true;
+  if (e.distinct_answer == 1 || (e.unanswered >= kWindsUp &&
+                                 (!known_slow || e.at_limit > kOftenAtLimit))) {
     return {Verdict::kNoResponse, true,
             "OP moves and PV does not answer: stuck, shut, isolated, or a dead "
             "transmitter"};
@@ -373,7 +428,7 @@ Finding Judge(const Window& window, const Evidence& e) {
   if (e.distinct_answer < 20) {
     return {Verdict::kQuantised, true, "PV has too few values"};
   }
-  if (!e.integrates) {
+  if (!e.integrates && !window.lags) {
     if (const Finding play = JudgePlay(e);
         play.verdict != Verdict::kUndetermined) {
       return play;
@@ -387,6 +442,11 @@ Finding Judge(const Window& window, const Evidence& e) {
     return {Verdict::kUndetermined, false,
             "PV follows the integral of OP, which looks like a play: measure X "
             "or a flow, or step OP in manual"};
+  }
+  if (IsPlay(e) && window.lags) {
+    return {Verdict::kUndetermined, false,
+            "PV follows OP late, which looks like a play: measure X or a flow, "
+            "or step OP in manual"};
   }
   if (IsPlay(e)) {
     return {Verdict::kUndetermined, false,
@@ -463,6 +523,7 @@ Evidence EvidenceOf(const Window& window) {
   e.sp_moves = MovingShare(window.sp);
   e.longest_repeat = LongestRepeat(window);
   e.unanswered = window.sp.empty() ? 0.0 : UnansweredRun(window);
+  e.helpless = IsHelpless(window);
   e.oscillation = FindOscillation(window.op);
   const ControllerFit controller = FitController(window);
   e.controller = controller.r2;

@@ -30,6 +30,9 @@ struct Window {
   int gain_sign{0};
   /// Whether PV is a level or another integral of the flow, if that is known.
   std::optional<bool> integrating;
+  /// PV follows OP late, as a temperature does.
+  bool lags{false};
+  double open_op{100.0};  ///< OP that asks for the open valve [%].
 };
 
 enum class Verdict : std::uint8_t {
@@ -67,6 +70,8 @@ struct Evidence {
   std::size_t distinct_answer{0};  ///< Values of X, else of PV.
   std::size_t longest_repeat{0};   ///< Equal readings of PV while OP moves.
   double unanswered{0.0};  ///< Longest one-way run of OP without answer [%].
+  /// OP stands at its open end, and PV comes no nearer to SP.
+  bool helpless{false};
   std::optional<Oscillation> oscillation;  ///< Of OP; period in samples.
   std::optional<PlayFit> fit;              ///< PV, or X, over OP.
   Standing standing;            ///< Of X, in samples of 2 s and less.
@@ -99,6 +104,9 @@ struct Audit : Finding {
 /// level, of "20LIC101_0405". NUL: there are none.
 char ServiceOf(std::string_view name);
 
+/// Sets what the service of a loop (ServiceOf()) says of its PV.
+void SetService(char service, Window& window);
+
 /// Whether `op` can be % of its span: within -10 to 110.
 bool IsPercent(std::span<const double> op);
 
@@ -115,7 +123,10 @@ bool IsPercent(std::span<const double> op);
 /// - the other causes by what is left: see Verdict and docs/loops.md.
 ///
 /// Of an integrating loop a play is never concluded from PV, because the
-/// integral's quarter period looks like one.
+/// integral's quarter period looks like one. Nor is it where PV is known to
+/// follow OP late: under a slow load the controller keeps PV - SP in step with
+/// dOP/dt, which looks like a play, too. Of either, a run of OP without an
+/// answer means something only if it ends at a limit.
 ///
 /// @throws std::invalid_argument if the series differ in length, a value is not
 ///   finite, or the period is not positive.

@@ -90,10 +90,8 @@ int FindingOf(loop::Verdict verdict) {
 
 LoopWatch::LoopWatch(std::size_t phase,
                      std::shared_ptr<const SeverityCatalogue> severities,
-                     bool pv_integrates)
-    : phase_(phase),
-      pv_integrates_(pv_integrates),
-      severities_(std::move(severities)) {
+                     char service)
+    : phase_(phase), service_(service), severities_(std::move(severities)) {
   verdict_.quality = Quality::kUnassigned;
   verdict_.residuals.fill(kNone);
 }
@@ -230,6 +228,7 @@ std::optional<loop::Window> LoopWatch::TakeWindow() {
   taken_ns_ = verdict_.stamp_ns;
   loop::Window window;
   window.period_s = interval_s_;
+  window.open_op = 0.0;  // CV is % of closing.
   for (std::size_t k = 0; k < kPoints; ++k) {
     const Point& point = ring_[(added_ + k) % kPoints];
     window.op.push_back(double{point.cv});
@@ -263,8 +262,9 @@ void LoopWatch::SetControlled(loop::Window& window) const {
     // Its sense and whether it is an integral are read off the record.
     window.pv = std::move(pv);
     window.gain_sign = 0;
-    if (pv_integrates_) {
-      window.integrating = true;
+    // Another tag is that of the valve: FV101 may be in a level loop.
+    if (service_ == 'L' || service_ == 'T') {
+      loop::SetService(service_, window);
     }
     if (has_gap(window.sp)) {
       window.sp.clear();

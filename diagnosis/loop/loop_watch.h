@@ -54,10 +54,10 @@ class LoopWatch {
   static constexpr double kInterval_s = 10.0;
 
   /// @param phase in 0..kHop-1
-  /// @param pv_integrates PV is known to be a level.
+  /// @param service of the loop, loop::ServiceOf(): what PV is.
   LoopWatch(std::size_t phase,
             std::shared_ptr<const SeverityCatalogue> severities,
-            bool pv_integrates = false);
+            char service = '\0');
 
   /// Takes the next sample. @param period_s of the samples.
   const Verdict& Step(const Sample& sample, double period_s);
@@ -127,7 +127,7 @@ class LoopWatch {
   Severity SeverityOf(const Found& found) const;
 
   std::size_t phase_;
-  bool pv_integrates_;
+  char service_;
   std::shared_ptr<const SeverityCatalogue> severities_;
   std::shared_ptr<const ModelSet> models_;
   Verdict verdict_;

@@ -205,12 +205,6 @@ struct Judged {
   std::string hint;
 };
 
-void SetService(char service, loop::Window& window) {
-  if (service != '\0' && service != 'T') {
-    window.integrating = service == 'L';
-  }
-}
-
 // The loop of `part`; nothing if no PV, F or X is there throughout. It is read
 // off the first of these that is: a change from one to another within a window
 // would look like a step of the process.
@@ -224,13 +218,14 @@ std::optional<loop::Window> WindowOf(Samples part, double period_s,
     window.x = Series(part, Signal::kX);
   }
   const bool of_valve = record.gain_sign != 0;
+  window.open_op = of_valve ? 0.0 : window.open_op;  // Of closing.
   window.pv = Series(part, Signal::kPv);
   if (!window.pv.empty()) {
     // Of a valve's PV only the record tells the sense. Its tag is that of the
     // valve: FV101 may be in a level loop.
     window.sp = Series(part, Signal::kSp);
     if (service == 'L' || !of_valve || !options.service.empty()) {
-      SetService(service, window);
+      loop::SetService(service, window);
     }
     return window;
   }
@@ -249,7 +244,7 @@ std::optional<loop::Window> WindowOf(Samples part, double period_s,
     // F over CV of a valve is no integral, whatever the loop is.
     window.integrating = false;
   } else {
-    SetService(service, window);
+    loop::SetService(service, window);
   }
   return window;
 }

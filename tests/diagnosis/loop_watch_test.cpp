@@ -164,7 +164,7 @@ TEST_F(LoopWatchPvTest, ALevelIsNeverCalledSticky) {
     for (const std::uint64_t seed : {1, 3, 14, 20, 27, 31}) {
       for (const LoopState state : {LoopState::kHealthy, LoopState::kSticky}) {
         Again();
-        watch_ = LoopWatch(0, Severities(), known);
+        watch_ = LoopWatch(0, Severities(), known ? 'L' : '\0');
         FeedPv(loop::Simulate({.state = state,
                                .level = true,
                                .band = 3.0,

@@ -301,8 +301,8 @@ std::string AuditLoop(const PlantJob& job, const std::vector<RowText>& texts,
   if (window.pv.empty()) {
     window.pv = window.x;
   }
-  if (!job.row.service.empty() && job.row.service != "T") {
-    window.integrating = job.row.service == "L";
+  if (!job.row.service.empty()) {
+    loop::SetService(job.row.service.front(), window);
   }
   std::string note =
       window.sp.empty() && window.x.empty()

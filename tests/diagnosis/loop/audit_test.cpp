@@ -85,6 +85,29 @@ TEST(AuditTest, CallsNoLevelLoopSticky) {
   }
 }
 
+// Under a slow load PV - SP goes with dOP/dt, which looks like a play.
+TEST(AuditTest, CallsNoTemperatureUnderASlowLoadStickyOrDead) {
+  for (const LoopState state :
+       {LoopState::kHealthy, LoopState::kSluggish, LoopState::kTight}) {
+    ClosedLoop loop;
+    loop.state = state;
+    loop.slow = true;
+    loop.period_s = 60.0;
+    loop.samples = 360;
+    int as_any = 0;
+    for (std::uint64_t seed = 1; seed <= 100; ++seed) {
+      Window window = Simulate(loop, seed);
+      as_any += AuditWindow(window).verdict == Verdict::kStiction ? 1 : 0;
+      SetService('T', window);
+      const Verdict verdict = AuditWindow(window).verdict;
+      EXPECT_NE(verdict, Verdict::kStiction) << seed;
+      EXPECT_NE(verdict, Verdict::kNoResponse) << seed;
+    }
+    std::cout << "state " << static_cast<int>(state)
+              << ", if nobody says that it is slow: " << as_any << " of 100\n";
+  }
+}
+
 TEST(AuditTest, IsSureOnlyWherePredictionAgrees) {
   ClosedLoop loop;
   loop.state = LoopState::kSticky;
@@ -217,6 +240,22 @@ TEST(AuditTest, SeesThatNothingAnswers) {
   dead.sp.clear();
   dead.pv.assign(dead.pv.size(), 3.5e-44);
   EXPECT_EQ(AuditWindow(dead).verdict, Verdict::kNoResponse);
+}
+
+TEST(AuditTest, SeesAValveThatDoesNothingThoughAskedToOpen) {
+  Window window = Ramp();
+  for (std::size_t k = 0; k < window.op.size(); ++k) {
+    window.op[k] = 100.0;
+    window.pv[k] = 30.0 + 0.1 * std::sin(static_cast<double>(k));
+  }
+  EXPECT_EQ(AuditWindow(window).verdict, Verdict::kNoResponse);
+  window.open_op = 0.0;  // It is asked to close.
+  EXPECT_EQ(AuditWindow(window).verdict, Verdict::kUndetermined);
+  window.open_op = 100.0;
+  for (std::size_t k = 0; k < window.op.size(); ++k) {
+    window.pv[k] += 0.004 * static_cast<double>(k);  // It comes nearer.
+  }
+  EXPECT_EQ(AuditWindow(window).verdict, Verdict::kUndetermined);
 }
 
 TEST(AuditTest, SeesAFrozenReading) {

@@ -16,6 +16,7 @@ enum class LoopState { kHealthy, kSluggish, kTight, kExternalSine, kSticky };
 struct ClosedLoop {
   LoopState state{LoopState::kHealthy};
   bool level{false};
+  bool slow{false};    ///< A temperature, under a load that swings slowly.
   double band{0.0};    ///< Of the play [% of OP], if kSticky.
   double noise{0.05};  ///< Standard deviation of PV's reading [%].
   bool steps{false};   ///< Of the set point, every 20 to 40 min.
@@ -31,7 +32,7 @@ inline Window Simulate(const ClosedLoop& loop, std::uint64_t seed) {
   };
   std::normal_distribution<double> normal;
   const double gain = uniform(0.5, 2.0);
-  const double lag_s = uniform(5.0, 40.0);
+  const double lag_s = uniform(5.0, 40.0) * (loop.slow ? 30.0 : 1.0);
   const int delay_s = static_cast<int>(uniform(1.0, 15.0));
   const double fill_s = uniform(200.0, 1500.0);  // Of a level, at 1 % of OP.
   // PI by lambda: λ of 1 to 3 lags in sound loops.
@@ -57,8 +58,9 @@ inline Window Simulate(const ClosedLoop& loop, std::uint64_t seed) {
   const double sine =
       loop.state == LoopState::kExternalSine ? uniform(0.5, 3.0) : 0.0;
   const double sine_s = uniform(120.0, 900.0);
-  const double load_noise = uniform(0.02, 0.1);
-  const double load_memory = std::exp(-1.0 / uniform(200.0, 1500.0));
+  const double load_noise = uniform(0.02, 0.1) * (loop.slow ? 20.0 : 1.0);
+  const double load_memory =
+      std::exp(-1.0 / (uniform(200.0, 1500.0) * (loop.slow ? 10.0 : 1.0)));
   double sp = 50.0;
   double op = 50.0;
   double stem = 50.0;
