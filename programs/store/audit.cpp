@@ -45,6 +45,7 @@ struct AuditOptions {
 // of the loop, from OP to what is judged: 0 if only the record can tell.
 struct LoopRecord {
   std::string loop;
+  std::string tag{};  // Column of OP.
   std::string source;
   bool dated{false};
   bool has_sp{true};  // In the unit of F.
@@ -100,6 +101,9 @@ LoopRecord ReadLoop(const std::string& file, const AuditOptions& options,
   };
   // The contract's CV is % of closing: flow falls with it.
   record.gain_sign = has("CV_pct") && !has("PV") ? -1 : 0;
+  for (const importer::ColumnMapping& column : csv.map.columns) {
+    record.tag = column.signal == Signal::kCv ? column.column : record.tag;
+  }
   record.stretches = std::move(table.runs);
   return record;
 }
@@ -277,6 +281,18 @@ std::string HintOf(const Judged& one, bool has_sp) {
   return {};
 }
 
+// What the loop is for, by its name, or by the tag of OP where the name tells
+// nothing: a file has any name.
+char ServiceOf(const LoopRecord& record) {
+  if (const char service = loop::ServiceOf(record.loop); service != '\0') {
+    return service;
+  }
+  const char service = loop::ServiceOf(record.tag);
+  return std::string_view("FLPT").find(service) == std::string_view::npos
+             ? '\0'
+             : service;
+}
+
 // Cuts the stretches in automatic into windows and judges each. A slow record
 // gets windows longer than `--window`, because an audit takes a number of
 // samples, not of seconds. Parts that are too short are counted, and told once
@@ -285,7 +301,7 @@ void JudgeRecord(const LoopRecord& record, const AuditOptions& options,
                  std::vector<Judged>& judged, Json& skipped) {
   const char service =
       options.service.empty()
-          ? loop::ServiceOf(record.loop)
+          ? ServiceOf(record)
           : static_cast<char>(std::toupper(
                 static_cast<unsigned char>(options.service.front())));
   std::size_t short_ones = 0;

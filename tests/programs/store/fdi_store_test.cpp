@@ -84,6 +84,16 @@ TEST_F(FdiStoreTest, AuditJudgesLoopsAndGoesOnAfterWhatItCannotRead) {
   EXPECT_THAT(Store("audit").err, HasSubstr("nothing to read"));
 }
 
+// A file may have any name; its columns are tags.
+TEST_F(FdiStoreTest, AuditTakesTheServiceFromTheTagOfOp) {
+  std::string text = StickyLoop(0.0);
+  for (std::size_t at; (at = text.find("FIC7")) != std::string::npos;) {
+    text[at] = 'T';
+  }
+  Write("trend_1.csv", text);
+  EXPECT_EQ(StoreJson("audit trend_1.csv")["windows"][0]["service"], "T");
+}
+
 // Verbs and options of earlier versions answer with what to do instead.
 TEST_F(FdiStoreTest, RemovedVerbsAndOptionsNameWhatReplacesThem) {
   const std::vector<std::pair<std::string, std::string>> removed{
