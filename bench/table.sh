@@ -73,7 +73,7 @@ version+=", seeds +$seeds"
   exit 2
 }
 
-# What differs from the first pass over the data: `again` names the runs of
+# These differ from the first pass over the data: `again` names the runs of
 # second seeds, `variant` the sets of another rate or another training.
 again=""
 variant=""

@@ -78,7 +78,7 @@ struct Api {
   /// @throws storage::HistoryAwayError immediately while that of a plant is
   ///   away.
   std::unique_ptr<storage::History> History() const;
-  /// What was noted of the valve by `valves repaired`; nothing on the page of a
+  /// Work noted of the valve by `valves repaired`; nothing on the page of a
   /// plant.
   std::vector<storage::ValveEvent> Repairs(const std::string& valve_id) const;
   /// Explain(), with the fault names of the catalogue.

@@ -95,7 +95,7 @@ std::string TrendText(const LimitTrend& trend) {
          ForecastText(trend.forecast);
 }
 
-// What was counted in the last day with data.
+// The counts of the last day with data.
 struct DayCounts {
   loop::ValveCounts counts;
   std::int64_t seen_ms{0};

@@ -327,7 +327,7 @@ bool ValveEngine::Impl::Mend(const Checked& checked, bool begins,
          checked.unusable == 0;
 }
 
-// What is missing belongs to the transport, and is not counted.
+// A missing reading belongs to the transport, and is not counted.
 SignalMask ValveEngine::Impl::Single(const Checked& checked) const {
   const SignalMask unusable =
       bridge_.begins() ? checked.unusable : SignalMask{0};

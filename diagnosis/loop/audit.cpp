@@ -128,7 +128,7 @@ double Distance(std::span<const double> a, std::span<const double> b) {
   return off > 0.0 ? off / (Spread(a) + Spread(b)) : 0.0;
 }
 
-// Whether OP has stood at its open end for as long as a window needs, and PV,
+// True if OP has stood at its open end for as long as a window needs, and PV,
 // off SP on one side by more than noise, has come no nearer.
 bool IsHelpless(const Window& window) {
   std::vector<double> errors;

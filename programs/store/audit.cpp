@@ -281,7 +281,7 @@ std::string HintOf(const Judged& one, bool has_sp) {
   return {};
 }
 
-// What the loop is for, by its name, or by the tag of OP where the name tells
+// The service of the loop by its name, or by the tag of OP where that tells
 // nothing: a file has any name.
 char ServiceOf(const LoopRecord& record) {
   if (const char service = loop::ServiceOf(record.loop); service != '\0') {

@@ -170,7 +170,7 @@ Json ValveEventJson(const ValveEvent& event) {
 
 namespace {
 
-// What was done to the valve since the episode was detected.
+// Work on the valve since the episode was detected.
 Json RepairsJson(const Episode& episode, const ValveNotes& valves) {
   Json repairs = Json::array();
   for (const auto& [pattern, event] : valves.repairs) {

@@ -80,7 +80,7 @@ std::string FaultText(const Json& row) {
          (second.is_null() ? "" : " and " + second.get<std::string>());
 }
 
-// What was noted last of the valve since the detection: "recalibrated".
+// The last work noted of the valve since the detection: "recalibrated".
 std::string RepairText(const Json& row) {
   const Json& repairs = row["repairs"];
   return repairs.empty() ? "-" : repairs.back()["kind"].get<std::string>();

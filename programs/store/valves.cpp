@@ -360,7 +360,7 @@ Report AddPlant(const std::string& file, const Context& context) {
   return report;
 }
 
-// What is stated replaces what was, and the rest of the loop stays.
+// Stated parts replace those of before, and the rest of the loop stays.
 void PutIdentity(const AddOptions& options, const ValveEntry& entry,
                  ModelStore& store) {
   PlantLoop loop;

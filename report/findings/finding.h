@@ -83,11 +83,11 @@ double GradeFactor(std::optional<int> grade);
 /// same facts give the same list.
 bool IsWorse(const Finding& a, const Finding& b);
 
-/// What models.db says of the loops of the plant. @param models its file; need
+/// The loops of the plant as models.db has them. @param models its file; need
 ///   not exist.
 /// @throws storage::SqliteError, DataError
 Identities ReadIdentities(const std::filesystem::path& models);
-/// That of a valve; an empty one if nothing is stated.
+/// The identity of a valve; an empty one if nothing is stated.
 ValveIdentity IdentityOf(const Identities& valves, const std::string& valve_id);
 /// {"description", "service", "location", "document", "grade"}; null if nothing
 /// is stated.

@@ -9,7 +9,7 @@
 
 namespace fdi::storage {
 
-/// What was noted of one valve, by its id or by a glob, in order of time.
+/// Work noted of one valve, by its id or by a glob, in order of time.
 inline std::vector<ValveEvent> RepairsOf(ModelStore& store,
                                          std::string_view valve_id) {
   std::vector<ValveEvent> repairs;

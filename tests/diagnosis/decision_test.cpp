@@ -127,7 +127,7 @@ TEST_F(DecisionTest, AnEndFromOutsideHasTheNameAndForgetsTheLooks) {
   EXPECT_EQ(decision_.verdict().isolated, kBitOfF7) << "of another episode";
 }
 
-// Of X, 20 % is wrong once and nothing comes twice; a look sees neither.
+// X is 20 % wrong once, and one sample has none; a look sees neither.
 TEST_F(DecisionTest, ALookTakesNoWrongReadingAndKeepsItsRowsOverMissingOnes) {
   Feed(30, 0.0);
   Feed(31, 20.0);

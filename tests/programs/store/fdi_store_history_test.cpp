@@ -79,7 +79,7 @@ TEST_F(FdiStoreHistoryTest, WhoAValveIsStandsInEveryList) {
   ASSERT_EQ(Store("valves add " + valve + " --location 'Hall 2'").code, 0);
   EXPECT_EQ(Store("valves add 'FV-*' --location 'Hall 2'").code, 2);
   EXPECT_EQ(StoreJson("valves list")["valves"].size(), 1U);
-  // What is said of the valve leaves its entry as it was.
+  // A description leaves the entry of the valve as it was.
   EXPECT_EQ(StoreJson("valves show " + valve)["type"], "globe");
   for (const char* verb : {"history list", "history show last", "worklist"}) {
     EXPECT_THAT(Store(verb).out, HasSubstr("Feed to C-101")) << verb;

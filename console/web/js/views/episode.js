@@ -77,7 +77,7 @@ function eventText(event) {
   ].filter(Boolean).join(', ');
 }
 
-// What was done to the valve stands among what happened.
+// Work on the valve stands among what happened.
 const withRepairs = ({events, repairs}) => [...events, ...(repairs ?? []).map(
     ({note, order, ...repair}) => ({...repair, comment: note,
       value: order && `order ${order}`}))]
