@@ -199,6 +199,7 @@ struct TopicWriter : dds::DataWriterListener {
   // asks for 256 numbers at a time. It would be kept waiting for minutes. A
   // history of a stream that reaches far back is emptied: by a live writer
   // while a reader is new, by a lossless one once everything is acknowledged.
+  // Live, the other readers may miss what was sent within their round trip.
   void ForgetSilentValves() REQUIRES(mutex) {
     const bool comes = has_newcomer.exchange(false);
     if (comes) {

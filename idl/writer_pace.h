@@ -37,8 +37,8 @@ class WriterPace {
   bool Admit(const WriterGuid& writer, std::int64_t number,
              std::int64_t left_out, Clock::time_point now);
   /// Takes back the price of numbers left out that were admitted in a datagram
-  /// which was refused later on: the library does not see them, and they come
-  /// again with each heartbeat.
+  /// which then leaves out too many: the library does not see them, and they
+  /// come again with each heartbeat.
   void Refund(const WriterGuid& writer, std::int64_t left_out);
 
  private:

@@ -129,24 +129,34 @@ double Distance(std::span<const double> a, std::span<const double> b) {
 }
 
 // True if OP has stood at its open end for as long as a window needs, and PV,
-// off SP on one side by more than noise, has come no nearer.
+// off SP on one side by more than noise, has not moved towards it meanwhile.
 bool IsHelpless(const Window& window) {
-  std::vector<double> errors;
-  for (std::size_t k = 0; k < window.sp.size(); ++k) {
-    if (std::abs(window.op[k] - window.open_op) <= kNearEnd) {
-      errors.push_back(window.sp[k] - window.pv[k]);
+  std::size_t longest = 0;
+  std::size_t end = 0;
+  for (std::size_t k = 0, length = 0; k < window.sp.size(); ++k) {
+    length =
+        std::abs(window.op[k] - window.open_op) <= kNearEnd ? length + 1 : 0;
+    if (length > longest) {
+      longest = length;
+      end = k + 1;
     }
   }
-  if (errors.size() < kMinSamples || !IsPercent(window.op)) {
+  if (longest < kMinSamples || !IsPercent(window.op)) {
     return false;
   }
-  const std::size_t third = errors.size() / 3;
-  const std::span all(errors);
-  const double first = Mean(all.first(third));
-  const double last = Mean(all.last(third));
-  return first * last > 0.0 &&
-         std::abs(last) * (1.0 + kUnmoved) >= std::abs(first) &&
-         kUnmoved * std::abs(last) > NoiseOf(window.pv);
+  const std::size_t third = longest / 3;
+  const auto mean = [&](const std::vector<double>& values, std::size_t from) {
+    return Mean(std::span(values).subspan(from, third));
+  };
+  const std::size_t begin = end - longest;
+  const double pv = mean(window.pv, begin);
+  const double first = mean(window.sp, begin) - pv;
+  const double last =
+      mean(window.sp, end - third) - mean(window.pv, end - third);
+  const double approach = mean(window.pv, end - third) - pv;
+  return first * last > 0.0 && approach * first <= kUnmoved * first * first &&
+         kUnmoved * std::min(std::abs(first), std::abs(last)) >
+             NoiseOf(window.pv);
 }
 
 bool IsExchanged(const Window& window, double controller) {
@@ -575,6 +585,7 @@ Audit AuditValve(Window window) {
   window.x.clear();
   Audit by_flow = by_x;
   by_flow.evidence.standing = {};
+  by_flow.evidence.helpless = false;  // X tells where the rod is.
   AddAnswer(window, by_flow.evidence);
   judge(by_flow);
   // A play that X does not show is none of the valve.

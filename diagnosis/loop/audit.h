@@ -32,7 +32,8 @@ struct Window {
   std::optional<bool> integrating;
   /// PV follows OP late, as a temperature does.
   bool lags{false};
-  double open_op{100.0};  ///< OP that asks for the open valve [%].
+  /// OP that asks for the open valve [%]; NaN: not known.
+  double open_op{100.0};
 };
 
 enum class Verdict : std::uint8_t {

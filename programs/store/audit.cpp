@@ -7,6 +7,7 @@
 #include <cmath>
 #include <filesystem>
 #include <iterator>
+#include <limits>
 #include <map>
 #include <span>
 #include <utility>
@@ -50,6 +51,7 @@ struct LoopRecord {
   bool dated{false};
   bool has_sp{true};  // In the unit of F.
   int gain_sign{0};
+  double open_op{100.0};  // As in loop::Window.
   std::vector<SampleSeries> stretches;
 };
 
@@ -101,8 +103,15 @@ LoopRecord ReadLoop(const std::string& file, const AuditOptions& options,
   };
   // The contract's CV is % of closing: flow falls with it.
   record.gain_sign = has("CV_pct") && !has("PV") ? -1 : 0;
+  // Mapped, OP is % of closing where the map states its sense.
+  const bool is_mapped = !options.table.Read(false).columns.empty();
   for (const importer::ColumnMapping& column : csv.map.columns) {
-    record.tag = column.signal == Signal::kCv ? column.column : record.tag;
+    if (column.signal == Signal::kCv) {
+      record.tag = column.column;
+      record.open_op = has("CV_pct") || column.sense == Sense::kOpening ? 0.0
+                       : is_mapped ? std::numeric_limits<double>::quiet_NaN()
+                                   : record.open_op;
+    }
   }
   record.stretches = std::move(table.runs);
   return record;
@@ -115,6 +124,7 @@ LoopRecord ReadRun(const std::string& selector, RunStore& store) {
   record.source = "run " + run.info.id;
   record.dated = true;
   record.gain_sign = -1;
+  record.open_op = 0.0;
   // Beside F, the set point of a valve's loop is in %.
   record.has_sp = false;
   for (const StoredSample& stored : run.samples) {
@@ -222,7 +232,7 @@ std::optional<loop::Window> WindowOf(Samples part, double period_s,
     window.x = Series(part, Signal::kX);
   }
   const bool of_valve = record.gain_sign != 0;
-  window.open_op = of_valve ? 0.0 : window.open_op;  // Of closing.
+  window.open_op = record.open_op;
   window.pv = Series(part, Signal::kPv);
   if (!window.pv.empty()) {
     // Of a valve's PV only the record tells the sense. Its tag is that of the

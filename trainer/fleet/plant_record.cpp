@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 #include <map>
 #include <optional>
 #include <span>
@@ -294,6 +295,10 @@ std::string AuditLoop(const PlantJob& job, const std::vector<RowText>& texts,
            " samples in a row in AUTO with op and pv";
   }
   window.op = SeriesOf(part, Signal::kCv);
+  // CV is % of closing; a row without a sense may have meant another.
+  window.open_op = job.row.sense == Sense::kOpening
+                       ? 0.0
+                       : std::numeric_limits<double>::quiet_NaN();
   window.x = SeriesOf(part, Signal::kX);
   window.pv = SeriesOf(part, Signal::kF);
   window.sp = SeriesOf(part, Signal::kSp);

@@ -258,6 +258,45 @@ TEST(AuditTest, SeesAValveThatDoesNothingThoughAskedToOpen) {
   EXPECT_EQ(AuditWindow(window).verdict, Verdict::kUndetermined);
 }
 
+TEST(AuditTest, SeesADeadTemperatureLoopThatWindsUp) {
+  Window window = Ramp();
+  for (std::size_t k = 0; k < window.op.size(); ++k) {
+    window.op[k] = std::min(100.0, 20.0 + 0.25 * static_cast<double>(k));
+  }
+  SetService('T', window);
+  EXPECT_EQ(AuditWindow(window).verdict, Verdict::kNoResponse);
+}
+
+// A loop that heats up at full output answers, each time anew, and so does one
+// that follows its set point behind a lag.
+TEST(AuditTest, AnAnswerAtTheOpenEndIsOne) {
+  Window heating = Ramp();
+  Window following = heating;
+  for (std::size_t k = 0; k < heating.op.size(); ++k) {
+    const bool heats = k % 60 < 30;
+    heating.op[k] = heats ? 100.0 : 20.0;
+    heating.sp[k] = 90.0;
+    heating.pv[k] = heats ? 20.0 + 2.0 * static_cast<double>(k % 60) : 80.0;
+    following.op[k] = 100.0;
+    following.pv[k] = 30.0 + 0.1 * static_cast<double>(k);
+    following.sp[k] = following.pv[k] + 5.0;
+  }
+  EXPECT_NE(AuditWindow(heating).verdict, Verdict::kNoResponse);
+  EXPECT_NE(AuditWindow(following).verdict, Verdict::kNoResponse);
+}
+
+// The position follows, so the valve is not stuck, whatever PV does.
+TEST(AuditTest, APositionAtItsEndRefutesAStuckValve) {
+  Window window = Ramp();
+  for (std::size_t k = 0; k < window.op.size(); ++k) {
+    window.op[k] = 100.0;
+    window.pv[k] = 30.0 + 0.1 * std::sin(static_cast<double>(k));
+  }
+  EXPECT_EQ(AuditValve(window).verdict, Verdict::kNoResponse);
+  window.x = window.op;
+  EXPECT_NE(AuditValve(window).verdict, Verdict::kNoResponse);
+}
+
 TEST(AuditTest, SeesAFrozenReading) {
   Window window = Simulate({}, 5);
   for (std::size_t k = 200; k < 520; ++k) {
