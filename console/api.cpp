@@ -79,13 +79,18 @@ std::unique_ptr<storage::History> Api::History() const {
   return history;
 }
 
+// None where they cannot be read: a trend without them is better than none.
 std::vector<storage::ValveEvent> Api::Repairs(
     const std::string& valve_id) const {
   if (sources.plant_history || !std::filesystem::exists(sources.models)) {
     return {};
   }
-  storage::ModelStore store(sources.models);
-  return storage::RepairsOf(store, valve_id);
+  try {
+    storage::ModelStore store(sources.models);
+    return storage::RepairsOf(store, valve_id);
+  } catch (const std::exception&) {
+    return {};
+  }
 }
 
 Json RepairsJson(const std::vector<storage::ValveEvent>& repairs,
@@ -106,10 +111,11 @@ Json RepairsJson(const std::vector<storage::ValveEvent>& repairs,
 void AddRepairs(const std::vector<storage::ValveEvent>& repairs,
                 std::int64_t from_ns, std::int64_t to_ns, Json& marks) {
   for (const storage::ValveEvent& repair : repairs) {
-    if (repair.at_ns >= from_ns && repair.at_ns <= to_ns) {
+    if (repair.kind != storage::ValveEventKind::kOrdered &&
+        repair.at_ns >= from_ns && repair.at_ns <= to_ns) {
       marks.push_back({{"t_ms", Ms(repair.at_ns)},
                        {"kind", storage::ValveEventKindName(repair.kind)},
-                       {"text", repair.order}});
+                       {"text", ""}});
     }
   }
 }

@@ -124,7 +124,7 @@ Json PlantJson(const Api& api);
 /// [{"at_ms", "kind", "who", "note", "order"}] of those from `from_ns` on.
 Json RepairsJson(const std::vector<storage::ValveEvent>& repairs,
                  std::int64_t from_ns);
-/// Adds those within a trend to its marks.
+/// Adds what was done within a trend to its marks.
 void AddRepairs(const std::vector<storage::ValveEvent>& repairs,
                 std::int64_t from_ns, std::int64_t to_ns, Json& marks);
 

@@ -80,10 +80,26 @@ std::string FaultText(const Json& row) {
          (second.is_null() ? "" : " and " + second.get<std::string>());
 }
 
-// The last work noted of the valve since the detection: "recalibrated".
-std::string RepairText(const Json& row) {
-  const Json& repairs = row["repairs"];
-  return repairs.empty() ? "-" : repairs.back()["kind"].get<std::string>();
+// The last work done on the valve since the detection: "recalibrated". An
+// order and what is noted ahead of time are not done.
+auto LastWorkBy(std::int64_t now_ns) {
+  return [now_ns](const Json& row) {
+    std::string text = "-";
+    for (const Json& repair : row["repairs"]) {
+      const std::string kind = repair["kind"];
+      if (kind != ValveEventKindName(ValveEventKind::kOrdered) &&
+          ParseTime(repair["at_utc"].get<std::string>(), true) <= now_ns) {
+        text = kind;
+      }
+    }
+    return text;
+  };
+}
+
+std::string EndText(const Json& row) {
+  return !row["unconfirmed_utc"].is_null() ? "not confirmed"
+         : row["end_reason"].is_null()     ? "open"
+                                       : row["end_reason"].get<std::string>();
 }
 
 Report ListEpisodes(const HistoryOptions& options, const Context& context) {
@@ -118,11 +134,6 @@ Report ListEpisodes(const HistoryOptions& options, const Context& context) {
   meaning.least_width = kLeastName;
   Column alarm = TextColumn("alarm", AlarmText);
   alarm.tone = ToneOf;
-  const auto end = [](const Json& row) {
-    return !row["unconfirmed_utc"].is_null() ? "not confirmed"
-           : row["end_reason"].is_null()     ? "open"
-                                         : row["end_reason"].get<std::string>();
-  };
   std::vector<Column> columns = {
       {"episode", "episode_id"},
       {"valve", "valve_id"},
@@ -145,9 +156,9 @@ Report ListEpisodes(const HistoryOptions& options, const Context& context) {
       TextColumn(
           "lasted", [](const Json& row) { return After(row, "returned_utc"); },
           5, Align::kRight),
-      TextColumn("end", end, 5),
+      TextColumn("end", EndText, 5),
       {"label", "label", Format::kPlain, 0, 6},
-      TextColumn("repaired", RepairText, 7),
+      TextColumn("repaired", LastWorkBy(filter.now_ns), 7),
       {"acked by", "acked_by", Format::kPlain, 0, 7},
       {"model set", "model_set", Format::kPlain, 0, 8}};
   if (options.plant.asked()) {
@@ -394,11 +405,13 @@ Report ShowEpisode(const ShowOptions& options, const Context& context) {
                  ? before + value.get<std::string>()
                  : "";
     };
+    const std::int64_t at_ns =
+        ParseTime(repair["at_utc"].get<std::string>(), true);
     report.Fields(
-        "", {TextField("work", repair["kind"].get<std::string>() +
-                                   text("at_utc", ", ") + text("who", " by ") +
-                                   text("order", ", order ") +
-                                   text("note", ": "))});
+        "", {TextField("work",
+                       repair["kind"].get<std::string>() + ", " +
+                           TimeText(at_ns, context) + text("who", " by ") +
+                           text("order", ", order ") + text("note", ": "))});
   }
   AddEvents(history->Events(e.id), context, report);
   AddLook(history->Look(e.id), context, report);

@@ -396,9 +396,11 @@ std::vector<Mark> Marks(const EpisodeEvidence& evidence) {
     }
   }
   for (const storage::ValveEvent& repair : evidence.repairs) {
-    marks.push_back({SecondsFrom(repair.at_ns, origin_ns),
-                     std::string(ValveEventKindName(repair.kind)),
-                     ink::kGreen});
+    if (repair.kind != storage::ValveEventKind::kOrdered) {
+      marks.push_back({SecondsFrom(repair.at_ns, origin_ns),
+                       std::string(ValveEventKindName(repair.kind)),
+                       ink::kGreen});
+    }
   }
   return marks;
 }

@@ -2,6 +2,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <filesystem>
+#include <fstream>
 #include <limits>
 #include <thread>
 
@@ -275,6 +277,8 @@ TEST_F(ConsoleRoutesTest, ARepairIsSeenWhereverTheValveIs) {
     models.AddValveEvent("*", event);
     event.at_ns = monitor::PlantSample(75).stamp_ns;
     models.AddValveEvent("V7", event);
+    event.kind = storage::ValveEventKind::kOrdered;
+    models.AddValveEvent("V7", event);
   }
   Start();
   const Json answer = Get("/api/v1/episodes/" + IdText());
@@ -287,6 +291,14 @@ TEST_F(ConsoleRoutesTest, ARepairIsSeenWhereverTheValveIs) {
   EXPECT_TRUE(std::ranges::any_of(marks, [](const Json& mark) {
     return mark["kind"] == "recalibrated";
   })) << marks;
+  EXPECT_TRUE(std::ranges::none_of(marks, [](const Json& mark) {
+    return mark["kind"] == "ordered";
+  })) << marks;
+
+  // The trend goes on without what cannot be read.
+  std::filesystem::remove(directory_.path() / "models.db");
+  std::ofstream(directory_.path() / "models.db") << "damaged";
+  EXPECT_FALSE(Get("/api/v1/valves/V7/trend?seconds=900")["t_ms"].empty());
 }
 
 TEST_F(ConsoleRoutesTest, HistoryIsPagedNewestFirst) {

@@ -736,7 +736,10 @@ test('the table of residuals says what is within, beyond and not judged',
       monitor.answers['valves/V/about'] = {type: null, service: null,
         description: null, location: null, document: null, grade: null,
         group: null, repairs: [{at_ms: kNowMs, kind: 'recalibrated', who: 'bo',
-          note: null, order: null}]};
+          note: null, order: null},
+        {at_ms: kNowMs, kind: 'ordered', who: 'al', note: null, order: '7'},
+        {at_ms: kNowMs + 1e9, kind: 'replaced', who: 'al', note: null,
+          order: null}]};
       const page = await openShared(browser, address, '#/valve/V');
       const rows = page.locator('table', {hasText: 'Residuals now'})
           .locator('tbody tr');

@@ -264,9 +264,12 @@ TEST_F(EpisodeFigureTest, ARepairIsDrawn) {
   storage::ValveEvent repair;
   repair.kind = storage::ValveEventKind::kRepacked;
   repair.at_ns = kDetected + 25 * kSecond;
-  storage::ModelStore(directory_.path() / "models.db",
-                      storage::Access::kOccasionalWriter)
-      .AddValveEvent("*", repair);
+  storage::ModelStore models(directory_.path() / "models.db",
+                             storage::Access::kOccasionalWriter);
+  models.AddValveEvent("*", repair);
+  repair.kind = storage::ValveEventKind::kOrdered;
+  ++repair.at_ns;
+  models.AddValveEvent("*", repair);
   const Figure figure = EpisodeFigure(Evidence());
   EXPECT_EQ(figure.marks.back().text, "repacked");
   EXPECT_NEAR(figure.marks.back().x, 25.0, 1e-9);

@@ -91,6 +91,50 @@ TEST_F(FdiStoreHistoryTest, WhoAValveIsStandsInEveryList) {
   EXPECT_EQ(StoreJson("valves list")["loops"][0]["about"], about);
 }
 
+TEST_F(FdiStoreHistoryTest, WhoAValveIsChangesNoEntry) {
+  ModelStore(directory_.path() / "models.db", Access::kOccasionalWriter)
+      .Save(RandomModelSet("pump"));
+  for (const char* verb :
+       {"add 'FV-*' --type any --sense opening",
+        "add FV-101 --type globe --sense opening", "assign FV-101 pump@1",
+        "repaired FV-101 replaced"}) {
+    ASSERT_EQ(Store(std::string("valves ") + verb).code, 0) << verb;
+  }
+  const json entries = StoreJson("valves list")["valves"];
+  ASSERT_EQ(entries[1]["model_set"], "pump@1");
+  ASSERT_EQ(entries[1]["epoch"], 1);
+  EXPECT_EQ(StoreJson("valves add FV-101 --grade 1"), entries[1]);
+  EXPECT_EQ(StoreJson("valves add FV-102 --description Feed"), entries[0]);
+  EXPECT_EQ(StoreJson("valves list")["valves"], entries);
+  json loops = StoreJson("valves list")["loops"];
+  ASSERT_EQ(loops.size(), 2U);
+  EXPECT_EQ(loops[0]["state"], "onboarded");
+  EXPECT_EQ(loops[1]["state"], "expected");
+  EXPECT_EQ(loops[1]["about"]["description"], "Feed");
+
+  ASSERT_EQ(Store("valves add FV-102 --description ''").code, 0);
+  EXPECT_EQ(StoreJson("valves list")["valves"], entries);
+  EXPECT_TRUE(StoreJson("valves list")["loops"][1]["about"].is_null());
+  ASSERT_EQ(Store("valves remove FV-102").code, 0);
+  ASSERT_EQ(Store("valves remove FV-101").code, 0);
+  EXPECT_TRUE(StoreJson("valves list")["loops"].empty());
+  EXPECT_NE(Store("valves remove FV-102").code, 0);
+}
+
+TEST_F(FdiStoreHistoryTest, WhatTheTableDoesNotStateStays) {
+  Write("plant.csv", "name,op,pv,grade\nFIC1,OP,PV,1\nFIC2,OP,PV,\n");
+  for (const char* verb :
+       {"--plant plant.csv", "FIC1 --grade 3 --location Hall",
+        "FIC2 --grade 3 --description Feed", "--plant plant.csv"}) {
+    ASSERT_EQ(Store(std::string("valves add ") + verb).code, 0) << verb;
+  }
+  const json loops = StoreJson("valves list")["loops"];
+  EXPECT_EQ(loops[0]["about"]["grade"], 1);
+  EXPECT_EQ(loops[0]["about"]["location"], "Hall");
+  EXPECT_EQ(loops[1]["about"]["grade"], 3);
+  EXPECT_EQ(loops[1]["about"]["description"], "Feed");
+}
+
 TEST_F(FdiStoreHistoryTest, WorkOnAValveStandsInItsEpisode) {
   const json before = StoreJson("history list")["episodes"][0];
   EXPECT_TRUE(before["repairs"].empty());

@@ -71,9 +71,10 @@ function serviceText({service, type, grade, group}) {
   return words ? `Service: ${words}. ` : '';
 }
 
-/** ". Last work: recalibrated, 2026-11-20 by bo"; empty without any. */
+/** ". Last work: recalibrated, 2026-11-20 by bo"; empty while none is done. */
 function repairText({description, location, document, repairs}) {
-  const last = repairs?.at(-1);
+  const last = repairs?.filter(({kind, at_ms: at}) =>
+    kind !== 'ordered' && at <= store.nowMs()).at(-1);
   return !last ? '' : (description || location || document ? '. ' : '') +
     `Last work: ${markWord(last.kind)}, ${timeText(last.at_ms)}` +
     (last.who ? ` by ${last.who}` : '');
