@@ -146,7 +146,7 @@ std::vector<PlannedLoop> LoopsOf(const std::filesystem::path& models) {
   for (const storage::PlantLoop& row : store.Loops()) {
     PlannedLoop& loop = loops.emplace_back();
     loop.valve_id = row.name;
-    loop.about = row;
+    loop.about = static_cast<const ValveIdentity&>(row);
     // The finding of other rows is a verdict, or how the set was made.
     if (row.state == storage::LoopState::kRefused ||
         row.finding.starts_with("not judged")) {

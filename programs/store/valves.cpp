@@ -6,6 +6,7 @@
 #include <fstream>
 #include <iterator>
 #include <map>
+#include <set>
 
 #include "base/csv_cells.h"
 #include "base/error.h"
@@ -257,7 +258,15 @@ struct AddOptions {
   std::string plant;
   // These say who it is; with none of the others an entry stays as it is.
   ValveIdentity about;
+  std::vector<std::pair<const CLI::Option*, std::string ValveIdentity::*>>
+      texts;
   std::vector<const CLI::Option*> of_entry;
+
+  bool says_who() const {
+    return about.grade || std::ranges::any_of(texts, [](const auto& each) {
+             return each.first->count() > 0;
+           });
+  }
 };
 
 // The first line of a file of groups that may be written again.
@@ -314,8 +323,10 @@ Report AddPlant(const std::string& file, const Context& context) {
   }
   Json rows = Json::array();
   for (const importer::PlantRow& row : table.rows) {
-    PlantLoop loop = trainer::LoopOf(row);
-    if (const auto found = before.find(row.name); found != before.end()) {
+    const auto found = before.find(row.name);
+    PlantLoop loop = trainer::LoopOf(
+        row, found == before.end() ? PlantLoop{} : found->second);
+    if (found != before.end()) {
       loop.watch = found->second.watch;
       loop.state = found->second.state;
       loop.finding = found->second.finding;
@@ -361,24 +372,36 @@ Report AddPlant(const std::string& file, const Context& context) {
 }
 
 // Stated parts replace those of before, and the rest of the loop stays.
-void PutIdentity(const AddOptions& options, const ValveEntry& entry,
-                 ModelStore& store) {
-  PlantLoop loop;
+void PutIdentity(const AddOptions& options, ModelStore& store) {
+  PlantLoop loop = FindLoop(store, options.pattern).value_or(PlantLoop{});
   loop.name = options.pattern;
-  for (const PlantLoop& each : store.Loops()) {
-    if (each.name == loop.name) {
-      loop = each;
-    }
-  }
-  for (const auto member :
-       {&ValveIdentity::description, &ValveIdentity::location,
-        &ValveIdentity::document}) {
-    if (!(options.about.*member).empty()) {
+  for (const auto& [option, member] : options.texts) {
+    if (option->count() > 0) {
       loop.*member = options.about.*member;
     }
   }
   loop.grade = options.about.grade ? options.about.grade : loop.grade;
-  store.PutLoop(loop, entry);
+  if (loop.state == LoopState::kExpected && store.AssignedModelSet(loop.name)) {
+    loop.state = LoopState::kOnboarded;
+  }
+  store.PutLoop(loop, {});
+}
+
+// The entry that applies to the valve, if it is only said who it is. One with a
+// glob stays the only one: an entry of the valve would replace what it says.
+std::optional<ValveEntry> EntryThatStays(const AddOptions& options,
+                                         ModelStore& store) {
+  if (!options.says_who() ||
+      std::ranges::any_of(options.of_entry,
+                          [](const auto* each) { return each->count() > 0; })) {
+    return std::nullopt;
+  }
+  for (ValveEntry& entry : store.Valves()) {
+    if (entry.pattern == options.pattern) {
+      return std::move(entry);
+    }
+  }
+  return store.FindValve(options.pattern);
 }
 
 Report AddValves(const AddOptions& options, const Context& context) {
@@ -388,7 +411,7 @@ Report AddValves(const AddOptions& options, const Context& context) {
   if (options.pattern.empty()) {
     throw ConfigError("valves add: an id or glob, or --plant FILE, is needed");
   }
-  if (options.about != ValveIdentity{} &&
+  if (options.says_who() &&
       options.pattern.find_first_of("*?[") != std::string::npos) {
     throw ConfigError(options.pattern +
                       " is a glob: --description, --location, --document and "
@@ -402,18 +425,13 @@ Report AddValves(const AddOptions& options, const Context& context) {
   entry.signals = report::ParseSignals(options.signals);
   entry.period_s = options.period_s;
   ModelStore store = WritableModels(context);
-  const auto before = store.FindValve(options.pattern);
-  const bool is_there = before && before->pattern == options.pattern;
-  if (is_there && options.about != ValveIdentity{} &&
-      std::ranges::none_of(options.of_entry, [](const auto* each) {
-        return each->count() > 0;
-      })) {
-    entry = *before;
+  if (const auto stays = EntryThatStays(options, store)) {
+    entry = *stays;
   } else {
     store.PutValve(entry);
   }
-  if (options.about != ValveIdentity{}) {
-    PutIdentity(options, entry, store);
+  if (options.says_who()) {
+    PutIdentity(options, store);
   }
   return Changed(entry);
 }
@@ -558,12 +576,20 @@ Report Move(const MoveOptions& options, const Context& context) {
   ModelStore models_there(to.models(), Access::kOccasionalWriter);
   Report report;
   Json rows = Json::array();
+  std::set<std::string> listed;
+  for (const ValveEntry& entry : models.Valves()) {
+    listed.insert(entry.pattern);
+  }
   for (const std::string& valve : valves) {
     const auto hash = history.QueryInt64(
         "SELECT model_hash FROM accumulator WHERE valve_id = ?", valve);
     const auto set = models_there.TakeValve(
         models, valve,
         hash ? std::optional(static_cast<std::uint64_t>(*hash)) : std::nullopt);
+    if (const auto loop = FindLoop(models, valve)) {
+      models_there.PutLoop(*loop, {});
+      listed.insert(valve);
+    }
     const MovedHistory moved =
         CopyProgress(there, from.history(), valve, NowNs());
     rows.push_back({{"valve_id", valve},
@@ -574,8 +600,7 @@ Report Move(const MoveOptions& options, const Context& context) {
   }
   for (const std::string& valve : valves) {
     RemoveProgress(history, valve, NowNs());
-    const auto entry = models.FindValve(valve);
-    if (entry && entry->pattern == valve) {
+    if (listed.contains(valve)) {
       models.RemoveValve(valve);
     }
   }
@@ -622,11 +647,15 @@ void AddAdd(report::Program& program, CLI::App& group) {
       verb.add_option("--signals", options.signals, "Signals it delivers"),
       verb.add_option("--period", options.period_s, "Sample period in s")
           ->check(CLI::PositiveNumber)};
-  verb.add_option("--description", options.about.description,
-                  "What it serves: \"Feed to column C-101\"");
-  verb.add_option("--location", options.about.location, "Where it stands");
-  verb.add_option("--document", options.about.document,
-                  "Address or number of its data sheet");
+  options.texts = {
+      {verb.add_option("--description", options.about.description,
+                       "What it serves: \"Feed to column C-101\""),
+       &ValveIdentity::description},
+      {verb.add_option("--location", options.about.location, "Where it stands"),
+       &ValveIdentity::location},
+      {verb.add_option("--document", options.about.document,
+                       "Address or number of its data sheet"),
+       &ValveIdentity::document}};
   verb.add_option("--grade", options.about.grade,
                   "How much the plant depends on it: 1 counts 2 in the rank of "
                   "its findings, 2 or none 1, 3 a half")
@@ -673,8 +702,9 @@ void AddValvesVerbs(report::Program& program) {
       ->required();
   AddRepaired(program, group);
   AddMove(program, group);
-  auto [remove, removed] =
-      AddVerb(program, group, "remove", "Remove an entry", Remove);
+  auto [remove, removed] = AddVerb(
+      program, group, "remove",
+      "Remove an entry, and the loop of the plant of that name", Remove);
   remove.add_option("valve", removed, "Id, or the glob of an entry")
       ->required();
 }

@@ -68,7 +68,7 @@ Identities ReadIdentities(const std::filesystem::path& models) {
   Identities valves;
   if (std::filesystem::exists(models)) {
     for (const storage::PlantLoop& loop : storage::ModelStore(models).Loops()) {
-      valves[loop.name] = loop;
+      valves[loop.name] = static_cast<const ValveIdentity&>(loop);
     }
   }
   return valves;

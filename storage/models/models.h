@@ -221,7 +221,7 @@ class ModelStore {
   std::vector<ValveEntry> Valves();
   /// Appends an entry, or replaces the one with that pattern.
   void PutValve(const ValveEntry& entry);
-  /// @throws NotFoundError if there is no entry with that pattern.
+  /// Its loop goes, too. @throws NotFoundError if there is neither.
   void RemoveValve(std::string_view pattern);
   /// Assigns a model set, or none, to the entry with `pattern`, which is added
   /// if it does not exist. A different set has no baseline.
@@ -280,7 +280,7 @@ class ModelStore {
   /// transaction. @returns the set as Save() would.
   std::optional<ModelSet> Store(const ValveResult& result);
   /// Adds a loop or replaces the one of that name, with `entry` for its valve
-  /// unless it has one.
+  /// unless it has one; without a pattern it gets none.
   void PutLoop(const PlantLoop& loop, const ValveEntry& entry);
   /// The loops of the plant by name.
   std::vector<PlantLoop> Loops();

@@ -92,9 +92,13 @@ void ModelStore::PutLoop(const PlantLoop& loop, const ValveEntry& entry) {
       {.entry = entry, .models = {}, .baseline = {}, .type = {}, .loop = loop});
 }
 
-std::vector<PlantLoop> ModelStore::Loops() {
+namespace {
+
+std::vector<PlantLoop> ReadLoops(Database& database,
+                                 std::optional<std::string_view> name) {
   std::vector<PlantLoop> loops;
-  Statement rows = database_.Prepare(sql::loops);
+  Statement rows = database.Prepare(sql::loops);
+  rows.Bind(name);
   while (rows.Step()) {
     PlantLoop& loop = loops.emplace_back();
     rows.Read(0, loop.name, loop.service, loop.type, loop.grade, loop.group,
@@ -102,6 +106,17 @@ std::vector<PlantLoop> ModelStore::Loops() {
               loop.checked_ns, loop.description, loop.location, loop.document);
   }
   return loops;
+}
+
+}  // namespace
+
+std::vector<PlantLoop> ModelStore::Loops() {
+  return ReadLoops(database_, std::nullopt);
+}
+
+std::optional<PlantLoop> FindLoop(ModelStore& store, std::string_view name) {
+  const auto loops = ReadLoops(store.database(), name);
+  return loops.empty() ? std::nullopt : std::optional(loops.front());
 }
 
 std::size_t ModelStore::TakeLoops(ModelStore& other) {

@@ -4,6 +4,7 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "diagnosis/model/valve_identity.h"
 #include "storage/models/models.h"
@@ -53,5 +54,8 @@ struct ValveResult {
   std::optional<PlantLoop> loop;
   Lineage lineage{};  ///< Of `models`.
 };
+
+/// The loop of that name.
+std::optional<PlantLoop> FindLoop(ModelStore& store, std::string_view name);
 
 }  // namespace fdi::storage

@@ -117,4 +117,4 @@ ON CONFLICT (name) DO UPDATE SET service = excluded.service,
 -- name: loops
 SELECT name, service, type, grade, loop_group, watch, state, finding,
   input_hash, checked_ns, description, location, document
-FROM plant_loop ORDER BY name
+FROM plant_loop WHERE ?1 IS NULL OR name = ?1 ORDER BY name

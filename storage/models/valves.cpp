@@ -171,7 +171,9 @@ void ModelStore::StoreEntry(const ValveEntry& entry) {
 void ModelStore::RemoveValve(std::string_view pattern) {
   Transaction transaction(database_);
   database_.Run("DELETE FROM valve WHERE pattern = ?", pattern);
-  if (database_.Changes() == 0) {
+  const int entries = database_.Changes();
+  database_.Run("DELETE FROM plant_loop WHERE name = ?", pattern);
+  if (entries + database_.Changes() == 0) {
     throw NotFoundError("there is no valve entry \"" + std::string(pattern) +
                         "\" in " + database_.path().string());
   }

@@ -4,9 +4,19 @@ namespace fdi::trainer {
 
 using importer::LoopTag;
 
-storage::PlantLoop LoopOf(const importer::PlantRow& row) {
+storage::PlantLoop LoopOf(const importer::PlantRow& row,
+                          const ValveIdentity& before) {
   storage::PlantLoop loop;
-  static_cast<ValveIdentity&>(loop) = row;
+  ValveIdentity& identity = loop;
+  identity = static_cast<const ValveIdentity&>(row);
+  identity.grade = identity.grade ? identity.grade : before.grade;
+  for (const auto member :
+       {&ValveIdentity::description, &ValveIdentity::location,
+        &ValveIdentity::document}) {
+    if ((identity.*member).empty()) {
+      identity.*member = before.*member;
+    }
+  }
   loop.name = row.name;
   loop.type = row.type;
   loop.group = row.group;

@@ -30,6 +30,7 @@ namespace {
 
 using storage::LoopState;
 using storage::LoopWatch;
+using storage::PlantLoop;
 
 // A name of a model set: what it may not have becomes _.
 std::string Storable(std::string name) {
@@ -170,14 +171,15 @@ class PlantRun {
   void FindChange(std::size_t i) {
     const PlantJob& job = jobs_[i];
     PlantOutcome& outcome = outcomes_[i];
-    outcome.loop = LoopOf(job.row);
+    const auto before = stored_.find(job.row.name);
+    outcome.loop =
+        LoopOf(job.row, before == stored_.end() ? PlantLoop{} : before->second);
     if (!job.error.empty()) {
       throw DataError(job.error);
     }
     outcome.loop.input_hash =
         Hex16(InputHash(job, TextsOf(job, files_),
                         BasisText(TypeOfRow(i), settings_.onboarding)));
-    const auto before = stored_.find(job.row.name);
     if (before == stored_.end() ||
         before->second.input_hash != outcome.loop.input_hash ||
         before->second.type != outcome.loop.type) {
@@ -185,11 +187,11 @@ class PlantRun {
       return;
     }
     outcome.unchanged = true;
-    const storage::PlantLoop listed = std::move(outcome.loop);
+    const PlantLoop listed = std::move(outcome.loop);
     outcome.loop = before->second;
     ValveIdentity& identity = outcome.loop;
     if (identity != listed || listed.group != outcome.loop.group) {
-      identity = listed;
+      identity = static_cast<const ValveIdentity&>(listed);
       outcome.loop.group = listed.group;
       const MutexLock lock(mutex_);
       store_.PutLoop(outcome.loop, EntryOf(job.row));

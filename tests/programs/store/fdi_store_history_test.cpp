@@ -6,8 +6,10 @@
 
 #include "base/time_text.h"
 #include "storage/database/locks.h"
+#include "storage/models/models.h"
 #include "storage/runs/run_recorder.h"
 #include "tests/programs/store/store_program_fixture.h"
+#include "tests/storage/model_set_fixture.h"
 #include "tests/storage/small_disk.h"
 
 namespace fdi::storage {
@@ -148,11 +150,20 @@ TEST_F(FdiStoreHistoryTest, WorkOnAValveStandsInItsEpisode) {
           .code,
       0);
   const json row = StoreJson("history list")["episodes"][0];
-  ASSERT_EQ(row["repairs"].size(), 1U);  // What came before is of another.
+  ASSERT_EQ(row["repairs"].size(), 1U);  // The one before is of another.
   EXPECT_EQ(row["repairs"][0]["kind"], "recalibrated");
   EXPECT_THAT(Store("history list").out, HasSubstr(" recalibrated "));
-  EXPECT_THAT(Store("history show last").out,
+  EXPECT_THAT(Store("--utc history show last").out,
               HasSubstr("recalibrated, 2026-11-20T15:00:00Z by bo: zero"));
+  EXPECT_THAT(Store("history show last", "TZ=Asia/Tokyo").out,
+              HasSubstr("recalibrated, 2026-11-21T00:00:00"));
+  ASSERT_EQ(Store("valves repaired '*' ordered --order 4711").code, 0);
+  ASSERT_EQ(
+      Store("valves repaired '*' replaced --at 2199-01-01T00:00:00Z").code, 0);
+  const std::string list = Store("history list").out;
+  EXPECT_THAT(list, HasSubstr(" recalibrated "));
+  EXPECT_THAT(list, testing::Not(HasSubstr("ordered")));
+  EXPECT_THAT(list, testing::Not(HasSubstr("replaced")));
 }
 
 // The end of the data is not the end of the fault.

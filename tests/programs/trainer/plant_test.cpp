@@ -6,6 +6,7 @@
 
 #include <gmock/gmock.h>
 
+#include "storage/models/plant_loops.h"
 #include "tests/programs/trainer/fixture.h"
 
 namespace fdi::trainer {
@@ -131,6 +132,30 @@ TEST_F(PlantTest, ASecondRunDoesOnlyRowsThatChanged) {
   const auto again = Onboard("A,,,,,,,,,\nB,,,,,,,,300,\n");
   EXPECT_EQ(again.at("A")["unchanged"], true);
   EXPECT_EQ(again.at("B")["unchanged"], false);
+}
+
+// `valves add` states it for one valve; the table may say nothing of it.
+TEST_F(PlantTest, WhatTheTableDoesNotStateStays) {
+  Onboard("A,,,,,,,,,\n");
+  const auto described = [this] {
+    storage::ModelStore store(Path("data") / "models.db");
+    return storage::FindLoop(store, "A");
+  };
+  {
+    storage::ModelStore store(Path("data") / "models.db",
+                              storage::Access::kOccasionalWriter);
+    auto loop = *storage::FindLoop(store, "A");
+    loop.description = "Feed";
+    loop.grade = 1;
+    store.PutLoop(loop, {});
+  }
+  for (const char* from : {"", "300"}) {
+    const auto again = Onboard("A,,,,,,,," + std::string(from) + ",\n");
+    EXPECT_EQ(again.at("A")["unchanged"], from == std::string());
+    EXPECT_EQ(described()->description, "Feed");
+    EXPECT_EQ(described()->grade, 1);
+    EXPECT_EQ(described()->service, "F");
+  }
 }
 
 TEST_F(PlantTest, ADryRunStoresNothingAndListsTags) {
