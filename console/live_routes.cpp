@@ -125,14 +125,12 @@ Json About(const Api& api, const httplib::Request& request) {
       entry && !entry->type.empty()) {
     about["type"] = entry->type;
   }
-  for (const storage::PlantLoop& loop : store.Loops()) {
-    if (loop.name == valve_id) {
-      if (const Json identity = findings::AboutJson(loop);
-          identity.is_object()) {
-        about.update(identity);
-      }
-      about["group"] = loop.group.empty() ? Json() : Json(loop.group);
+  if (const auto loop = storage::FindLoop(store, valve_id)) {
+    if (const Json identity = findings::AboutJson(*loop);
+        identity.is_object()) {
+      about.update(identity);
     }
+    about["group"] = loop->group.empty() ? Json() : Json(loop->group);
   }
   return about;
 }

@@ -227,9 +227,14 @@ void Service::ListAfterCommit() {
 // Nothing where it cannot be read: an alarm without it is better than none.
 ValveIdentity Service::IdentityOf(const std::string& valve_id) {
   try {
-    return findings::IdentityOf(findings::ReadIdentities(data_.models()),
-                                valve_id);
+    if (!identity_reader_) {
+      identity_reader_ = std::make_unique<storage::ModelStore>(data_.models());
+    }
+    identity_reader_->database().Refresh();
+    const auto loop = storage::FindLoop(*identity_reader_, valve_id);
+    return loop ? static_cast<const ValveIdentity&>(*loop) : ValveIdentity{};
   } catch (const std::exception&) {
+    identity_reader_.reset();
     return {};
   }
 }

@@ -124,6 +124,7 @@ class Service {
   std::unique_ptr<EventHook> hook_;  // Null: no event hook.
   // Of the step "on_event", one event at a time; null: not open.
   std::unique_ptr<storage::HistoryReader> shelf_reader_;
+  std::unique_ptr<storage::ModelStore> identity_reader_;
   // The thread of Run() alone uses it; null: not open.
   std::unique_ptr<storage::HistoryReader> alarm_reader_;
   idl::Participant participant_;
