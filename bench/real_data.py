@@ -168,7 +168,7 @@ class Study:
 
 
 def lines(study):
-    """What is asked, of which record, and how it is answered."""
+    """Yields each question with its record and the function that answers it."""
     yield ("40 minutes, fitted on one half, scored on the other; then vice versa",
            LUBLIN, study.halves)
     for day, kind, truth in (("10-30", "healthy", ""), ("10-30", "other_valve", ""),

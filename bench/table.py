@@ -374,7 +374,7 @@ class Table:
                      str(sum(len(r.set) == 1 for r in runs)))
 
     def layers(self):
-        """What changes if a layer is left out."""
+        """Counts that change if a layer is left out."""
         self.lines += ["", "## What does a layer buy?", "",
                        "What changes without it: runs that are detected / whose "
                        "answer holds the fault / is the fault / is one wrong name, and "
@@ -470,7 +470,7 @@ class Table:
             self.row(*row)
 
     def compare(self, data, method, first, second):
-        """Whether each count stays inside, and both as text."""
+        """Says of each count if it stays inside, and gives both as text."""
         if data.endswith("-hours"):
             counts = [sum(r.episodes for r in runs) for runs in (first, second)]
             low, high = poisson(counts[0])
@@ -590,7 +590,7 @@ class Table:
             self.lines += file.read().splitlines()
 
     def short(self):
-        """What README says: every line of its table is a line of this one."""
+        """The short table, from which README takes its lines."""
         self.lines += ["", "## In short", ""]
         self.heads("question", "answer")
 

@@ -206,11 +206,11 @@ struct TopicWriter : dds::DataWriterListener {
       newcomer_until = Clock::now() + kNewcomer;
     }
     if (!forgets || (!comes && writes % kWritesBetweenLooks != 0) ||
+        (!lossless && Clock::now() >= newcomer_until) ||
         SpanOfHistory() < kMaxSpan) {
       return;
     }
-    if (lossless ? WaitForAcknowledged(std::chrono::milliseconds(0))
-                 : Clock::now() < newcomer_until) {
+    if (!lossless || WaitForAcknowledged(std::chrono::milliseconds(0))) {
       std::size_t removed = 0;
       writer->clear_history(&removed);
       forgotten = writes;

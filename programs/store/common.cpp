@@ -6,7 +6,6 @@
 #include "base/text.h"
 #include "base/time_units.h"
 #include "diagnosis/model/fault_catalogue.h"
-#include "diagnosis/records/valve_glob.h"
 #include "programs/store/clock.h"
 #include "programs/store/verbs.h"
 #include "report/fault_texts.h"
@@ -14,6 +13,7 @@
 #include "storage/history/foreign_history.h"
 #include "storage/history/history_reader.h"
 #include "storage/models/models.h"
+#include "storage/models/repairs.h"
 
 namespace fdi::storage {
 
@@ -175,8 +175,7 @@ Json RepairsJson(const Episode& episode, const ValveNotes& valves) {
   Json repairs = Json::array();
   for (const auto& [pattern, event] : valves.repairs) {
     if (event.at_ns >= episode.detected_ns &&
-        (pattern == episode.valve_id ||
-         GlobMatches(pattern, episode.valve_id))) {
+        IsAbout(pattern, episode.valve_id)) {
       repairs.push_back(ValveEventJson(event));
     }
   }

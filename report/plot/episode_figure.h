@@ -20,7 +20,7 @@ struct EpisodeEvidence {
   std::vector<TracePoint> trace;
   std::vector<DataGap> gaps;                 ///< Those that overlap the trace.
   std::optional<EpisodeLook> look;           ///< Its explanation by simulation.
-  std::vector<storage::ValveEvent> repairs;  ///< Of its valve, at any time.
+  std::vector<storage::ValveEvent> repairs;  ///< Work on the valve, ever.
   /// The set behind the diagnosis: thresholds and T. If missing, not drawn.
   std::optional<ModelSet> models;
 };
