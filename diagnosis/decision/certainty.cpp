@@ -85,7 +85,7 @@ std::vector<std::string> LookAlikesBeside(
       add(other.fault, other.sign);
     }
   }
-  // Not so to a simulation, which sees what the loop does.
+  // Not so to a simulation, which sees the answer of the loop.
   if (weak && facts.acts_on == ActsOn::kFlowReading) {
     add(kExternalLeak, 0);
   }

@@ -54,7 +54,7 @@ std::vector<std::string> KnownFaults(const std::vector<int>& faults,
 }
 
 /// Faults that look like `faults`, where these are a single one, to observers
-/// whose set does not know them: of one shape whatever the size, as long as
+/// whose set does not know them: with one shape whatever the size, as long as
 /// both are weak, or with a sign that the set does not know. Empty for a name
 /// by a simulation of the valve, which knows all faults.
 /// @param strength of the fault; signed [-].
@@ -70,20 +70,20 @@ inline Certainty WithLookAlikes(Certainty certainty,
   return look_alikes.empty() ? certainty : Certainty::kOneOf;
 }
 
-/// `certainty` of a name of whose loop the audit finds `audit` at the same
-/// time: where the rod does not answer the command, or sticks, no fault that
-/// leaves the rod alone is likely. @param audit as FaultName(); empty: nothing.
+/// The certainty of a name if the loop audit reports `audit` at the same time.
+/// If the rod sticks or does not answer the command, a fault that does not act
+/// on the rod is unlikely. @param audit as FaultName(); empty: no finding.
 Certainty WithAudit(Certainty certainty, std::string_view faults,
                     std::string_view audit);
 
-/// Those of the name that `event` gives; none if it came from the bus.
+/// The look-alikes of the name that `event` gives; none if it is from the bus.
 std::vector<std::string> LookAlikesOf(const FaultEvent& event);
 
 /// The faults that `event` isolates, joined by |; empty if none.
 std::string IsolatedFaults(const FaultEvent& event);
 
-/// Of the episode after `event`. On the bus, which does not carry
-/// Transition::unknown, the candidates tell.
+/// The certainty of the episode after `event`. The bus does not carry
+/// Transition::unknown, so there it is derived from the candidates.
 Certainty CertaintyOf(const FaultEvent& event);
 
 }  // namespace fdi

@@ -17,7 +17,7 @@ namespace fdi {
 /// strong and how bad it is, when it ends, and when a simulation is to look at
 /// it. Nothing else makes a transition of an episode that the observers, the
 /// floor or a look have found. The monitor and `fdi-trainer evaluate` run this
-/// very class. Of a sample, in this order:
+/// very class. Each sample is handled in this order:
 ///
 /// 0. repeats of a transmitter that is polled are marked (HeldReadings);
 /// 1. the engine judges it, with the name and the suspicion of the sample
@@ -26,8 +26,8 @@ namespace fdi {
 /// 3. its episode is named, and the strengths are followed (EpisodeName,
 ///    EpisodeStrengths).
 ///
-/// No clock, no I/O, no thread: what it says depends on the order of the calls
-/// alone. As ValveEngine, one thread at a time for all that share EngineParts.
+/// No clock, no I/O, no thread: the results depend only on the order of calls.
+/// One thread at a time for all that share EngineParts, as for ValveEngine.
 class Decision {
  public:
   /// @param simulation null: no looks are due.

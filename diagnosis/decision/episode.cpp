@@ -263,9 +263,9 @@ void Episode::Step(const Sample& sample, const ObserverBank& bank,
     over_.fill(0);
     kept_.fill(models_->decision.isolation_samples * 3 / 2);
   }
-  // The floor may open an episode before the observers have settled. What they
-  // show meanwhile is a transient that the evidence would carry for the length
-  // of its memory, so no fault has a factor until then.
+  // The floor may open an episode before the observers have settled. Until then
+  // they show a transient, which would stay in the evidence for the length of
+  // its memory, so no fault has a factor yet.
   if (findings.settled && !begun_) {
     faults_.Restart();
     isolation_.Restart();
@@ -407,7 +407,7 @@ void Episode::ApplyToName(Rule rule, Proposal& p) {
       }
       break;
     default:
-      break;  // Of another stage.
+      break;  // Handled at another stage.
   }
 }
 
@@ -485,11 +485,11 @@ void Episode::NameFloor(Verdict& verdict) {
   Name(floor_, verdict);
 }
 
-// What the floor found is what an episode is about for as long as it is there.
-// Where it has been over for longer than a fault may misfit, and normal
-// operation does not explain what is seen instead, the episode shows something
-// else by now. One that comes and goes takes twice as long each time. A valve
-// that looks healthy keeps the name of what it had.
+// A finding of the floor names the episode for as long as it is present. If it
+// has been absent for longer than a fault may misfit, and normal operation does
+// not explain the samples either, the episode now shows something else. A
+// finding that comes and goes is kept twice as long each time. A valve that
+// looks healthy keeps its name.
 void Episode::ForgetFindings(FaultSet present, const Verdict& verdict) {
   const DecisionParameters& decision = models_->decision;
   const bool abnormal = verdict.normal_factor < decision.isolation_threshold;
@@ -559,7 +559,7 @@ FaultSet Episode::WithGroups(FaultSet set, const Verdict& verdict) const {
 // likelihood ratio to every other one and to normal operation is more than m/α,
 // with m faults (findings of the floor have none), so that a name without the
 // fault has at most the probability α where the models are right. They err most
-// in the first moments of a fault, so what was left in any of more than n_d
+// in the first moments of a fault, so a fault left in any of more than n_d
 // samples counts; an input that has moved with the fault is evidence beside the
 // models, and n_d samples are enough.
 FaultSet Episode::Proven(const Verdict& verdict) {
@@ -600,10 +600,10 @@ void Episode::Name(FaultSet faults, Verdict& verdict) {
        verdict.stamp_ns, verdict);
 }
 
-// What was seen on this valve before, and was named by a person then, stands
+// A taught condition, seen on this valve before and named by a person, stands
 // for the faults that look like it: of all explanations that the data leave, it
-// is the one that has happened here. It has to fit, and to be as good an
-// explanation as any, in nearly all of t_k samples; once it is recognised, it
+// is the one that has happened here. It must fit, and be as good an explanation
+// as any other, in nearly all of t_k samples; once it is recognised, it
 // stays so until the evidence refutes it.
 void Episode::Recognise() {
   if (!is_taught_) {
@@ -671,8 +671,8 @@ void Episode::CountMisfits(FaultSet misfits, const Verdict& verdict) {
 }
 
 // Fit does not choose among faults, evidence does. But where all of a name are
-// refuted, the name is taken back: what the episode shows is outside all that
-// is known.
+// refuted, the name is taken back: the episode is outside all faults that are
+// known.
 void Episode::Withdraw(Verdict& verdict) {
   if (!IsAllOf(verdict.isolated, misfit_counts_.refuted())) {
     return;
@@ -692,7 +692,7 @@ bool Episode::IsAllOf(FaultSet faults, FaultSet misfits) const {
   return known != 0 && (known & ~misfits) == 0;
 }
 
-// Of an episode without a name, what does not fit is no candidate.
+// While an episode has no name, faults that do not fit are no candidates.
 void Episode::ApplyMisfits(Verdict& verdict) const {
   constexpr double kShare = 0.25;  // of T; a candidate has 0.5
   const double most = kShare * models_->decision.isolation_threshold;
@@ -704,7 +704,7 @@ void Episode::ApplyMisfits(Verdict& verdict) const {
 }
 
 // Before t_k, and whether the line has lost its flow once there is a name. The
-// floor takes its time: what it is about to find holds an early name back.
+// floor takes its time: findings about to come hold back an early name.
 void Episode::NameEarly(const Sample& sample, FaultSet beginning,
                         Verdict& verdict) {
   const FaultSet proven = Proven(verdict);
@@ -766,7 +766,7 @@ FaultSet Episode::Lasting(FaultSet supported, const Verdict& verdict) const {
   return std::popcount(both) > kMaxFaultSetSize ? joining : both;
 }
 
-// What the name does not explain comes on top of it, or may.
+// Whatever the name does not explain is, or may be, due to a second fault.
 void Episode::HoldName(Proposal& proposal) {
   if (hold_ == NameHold::kNone) {
     return;

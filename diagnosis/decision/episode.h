@@ -111,7 +111,7 @@ class ClearingWindow {
   std::array<double, kMaxChannels> sums_{};
 };
 
-/// Those of the floor, and a drift.
+/// Number of findings: those of the floor, and a drift.
 inline constexpr std::size_t kFindings = Floor::kTests + 1;
 
 /// Findings in one sample.
@@ -120,7 +120,7 @@ struct Findings {
   bool abnormal{false};                  ///< Some limit is exceeded at present.
   FaultSet stuck{0};      ///< Faults of stuck transmitters: certain.
   FaultSet floor{0};      ///< Findings of the floor.
-  FaultSet beginning{0};  ///< Those that some more such samples would make.
+  FaultSet beginning{0};  ///< Would be findings after some more such samples.
   std::array<double, kFindings> sizes{};  ///< Their sizes.
   bool drift{false};   ///< One of them, instead of any fault.
   bool settled{true};  ///< The observers have settled.
@@ -149,11 +149,11 @@ class Episode {
   /// Ends an open episode from outside. @returns its kClosed transition.
   Transition Close(EndReason reason, std::int64_t stamp_ns, Verdict& verdict);
 
-  /// What SecondFaultWatch makes of the next sample of a named episode.
+  /// Instruction of SecondFaultWatch for the next sample of a named episode.
   enum class NameHold : std::uint8_t {
     kNone,
     kName,       ///< Its name does not change.
-    kExplained,  ///< Nor does what a second fault causes count against it.
+    kExplained,  ///< Nor do effects of a second fault count against it.
   };
   void HoldName(NameHold hold) { hold_ = hold; }
 
@@ -237,7 +237,7 @@ class Episode {
   int contender_run_{0};  // samples that supported it and no other since
   FaultSet misfits_{0};   // do not fit the last t_k samples, or refuted
   MisfitCounts misfit_counts_;
-  // What the evidence refutes; counted in sets without a second look, which
+  // Faults refuted by the evidence. Counted in sets without a second look: they
   // have no other rule for a name that changes with a growing strength.
   bool names_last_;
   MisfitCounts contradictions_;

@@ -44,8 +44,8 @@ EpisodeLooks::EpisodeLooks(const LookSimulation& simulation, bool at_position)
       slowness_(SlownessOf(simulation.usual().period_s)),
       at_position_(at_position) {}
 
-// One row a period; up to three missing ones are held, a longer gap begins
-// anew. So does another set of signals, because a window has one for all rows.
+// One row per period. Up to three missing ones are held. The rows start over
+// after a longer gap or with other signals, as all rows of a window share them.
 void EpisodeLooks::AddRow(const Sample& sample) {
   constexpr std::int64_t kMaxHeldSteps = 3;
   const std::int64_t step =
@@ -130,7 +130,7 @@ std::optional<LookTask> EpisodeLooks::Task(std::int64_t detection_ns) const {
   task.window.at_position = at_position_;
   task.slowness = slowness_;
   const std::int64_t begin_ns = detection_ns - set_back_ns_;
-  // A routine look finds what has been there for minutes.
+  // A routine look finds a fault that has been there for minutes.
   const bool by_routine = by_routine_ && detection_ns == detection_ns_;
   const std::int64_t from_ns =
       by_routine
@@ -199,8 +199,8 @@ std::optional<LookTask> EpisodeLooks::GrowthTask(
   return task;
 }
 
-// Only as long as the window begins with the standing fault alone: from there
-// it is known what is usual with it.
+// Only while the window begins with rows of the standing fault alone: they show
+// what is usual with it.
 std::optional<LookTask> EpisodeLooks::SecondTask(const Verdict& verdict) {
   constexpr std::size_t kLeastBefore = 60;
   const SecondFault& second = verdict.second;
@@ -280,8 +280,8 @@ std::optional<LookTask> EpisodeLooks::Step(const Sample& sample,
   if (detection_ns_ && !due) {
     due = SecondTask(verdict);
   }
-  // If there are not more rows than were judged before, AddRow() has begun
-  // anew, and so does the count: all rows of a routine look have been judged.
+  // If there are not more rows than were judged before, AddRow() has started
+  // over, and so does the count: all rows of a routine look have been judged.
   rows_.back().covered = verdict.quality == Quality::kLive;
   const bool judged = (verdict.quality == Quality::kLive ||
                        verdict.quality == Quality::kUncovered) &&

@@ -19,11 +19,11 @@ std::int64_t LookPeriodNs(const LookSimulation& simulation);
 /// should look at an episode that is open: 20 (early), 40, 150 and 300 s after
 /// its detection, then at twice the age each time. While there is none, or
 /// one that a routine look opened, a routine look is due every 300 s, at the
-/// same stamps whenever a program was started; it does not compare what lies
-/// outside the commands and pressures that the set was taught. What comes on
-/// top of the fault of an episode is looked at 40, 150 and 300 s after it was
-/// detected, with that fault as it stood before. All of these are longer by
-/// SlownessOf() the period. Keeps the last 420 samples.
+/// same stamps whenever a program was started; it skips samples outside the
+/// commands and pressures that the set was taught. A second fault, on top of
+/// that of the episode, is looked at 40, 150 and 300 s after it was detected,
+/// with the first fault as it stood before. SlownessOf() the period lengthens
+/// all of these times. Keeps the last 420 samples.
 class EpisodeLooks {
  public:
   /// `simulation` must outlive it.
@@ -60,8 +60,8 @@ class EpisodeLooks {
   bool at_position_;
   SignalMask signals_{0};
   std::deque<Row> rows_{};
-  // About the last time that the rows began anew: when, if nothing was read for
-  // five minutes or more before; the last stamp and FlowShare() before that.
+  // The last time that the rows started over: when, if nothing was read for
+  // five minutes or more before; and the last stamp and FlowShare() before it.
   std::int64_t outage_end_ns_{0};
   std::int64_t before_ns_{0};
   std::optional<double> share_before_{};
@@ -69,7 +69,7 @@ class EpisodeLooks {
   std::int64_t next_age_ns_{0};
   std::int64_t set_back_ns_{0};    // See LookTask.
   bool by_routine_{false};         // The open episode.
-  std::int64_t second_ns_{0};      // Detection of what is on top.
+  std::int64_t second_ns_{0};      // Detection of the second fault.
   std::int64_t second_age_ns_{0};  // At which the next look at it is due.
   std::size_t judged_{0};  // Rows in a row that a routine look may hold.
   std::int64_t slot_{0};   // Five minutes that the last sample was in.

@@ -89,7 +89,7 @@ const Verdict& EpisodeName::Step(const Inputs& inputs) {
   verdict_.transition_count = 0;
   // In order: from a new source, one sample ends an episode and opens another.
   for (Transition transition : inputs.engine.Transitions()) {
-    // Those that name faults are left out: Announce() has those of the name.
+    // Skips the isolations of the engine: Announce() reports those of the name.
     if (IsIsolation(transition.kind)) {
       continue;
     }
@@ -144,7 +144,7 @@ void EpisodeName::FollowLook(const Inputs& inputs) {
 }
 
 // The engine knows nothing on top of a name that is not its own.
-// A look that counts is the better judge of what is on top: observers know each
+// A look that counts is the better judge of a second fault: observers know each
 // fault by itself, the physics simulates both at once.
 void EpisodeName::FollowSecond(const Inputs& inputs) {
   SecondFault& second = verdict_.second;
@@ -251,8 +251,8 @@ bool EpisodeName::InheritedStands(const Inputs& inputs) const {
          TakesTwoForOne(observed);
 }
 
-// A second fault has to be found anew, and until then both faults together
-// may look like either of them, at another strength, like a third one or none.
+// The second fault has to be found again; until then both faults together may
+// look like either of them, at another strength, like a third one or none.
 bool EpisodeName::TakesTwoForOne(FaultSet faults) const {
   if (!inherited_ || !inherited_->second.open) {
     return false;

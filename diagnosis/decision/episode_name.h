@@ -21,7 +21,7 @@ enum class Rule : std::uint8_t;
 /// Who gave an episode its name.
 enum class NameSource : std::uint8_t {
   kNone,       ///< It has no name.
-  kFloor,      ///< Limits alone found it.
+  kFloor,      ///< A limit of the floor.
   kObservers,  ///< The observers.
   kLook,       ///< A simulation of the valve.
   kRestart,    ///< An earlier session; it still stands.
@@ -40,7 +40,7 @@ struct EpisodeNow {
   FaultSet faults{0};               ///< Empty: no name.
   Unknown unknown{Unknown::kNone};  ///< Why there is none.
   NameSource source{NameSource::kNone};
-  Layer layer{Layer::kObservers};       ///< What named `faults` first.
+  Layer layer{Layer::kObservers};       ///< Layer that first named `faults`.
   std::vector<NamedFault> estimates{};  ///< One a fault, likeliest first.
   /// The gravest of `faults`, each at its own strength.
   Severity severity{Severity::kMedium};
@@ -157,7 +157,7 @@ std::optional<EpisodeName::Look> LookThatCounts(const Verdict& engine,
                                                 const ModelSet& models,
                                                 const LookAnswer* answer);
 
-/// The same of what comes on top of the fault of the episode.
+/// The same for a second fault, on top of the one of the episode.
 std::optional<EpisodeName::Look> SecondThatCounts(const Verdict& engine,
                                                   const ModelSet& models,
                                                   const LookAnswer* answer);

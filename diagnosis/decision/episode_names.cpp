@@ -70,7 +70,7 @@ const Verdict& EpisodeNames::Step(const Sample& sample, const Verdict& engine,
 }
 
 // The looks see the verdict of the engine, not the name that counts: their own
-// answers would otherwise become what the observers say.
+// answers would otherwise become those of the observers.
 void EpisodeNames::StepLooks(const Sample& sample, const Verdict& engine) {
   auto due = looks_->Step(sample, engine);
   if (due && !held_) {

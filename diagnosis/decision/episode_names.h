@@ -52,7 +52,7 @@ class EpisodeNames {
   /// Whether the engine should have an episode: ValveEngine::Suspect().
   bool suspects() const { return looks_ && looks_->suspects() && !held_; }
 
-  /// What the open episode is called as of the last Step().
+  /// The name of the open episode as of the last Step().
   const EpisodeNow& now() const { return name_.now(); }
 
   /// A look spoke in the place of the engine at the last Step().
@@ -90,7 +90,7 @@ class EpisodeNames {
   std::shared_ptr<const LookSimulation> simulation_;
   EpisodeName name_;
   EpisodeStrengths strengths_;
-  std::optional<ValveLooks> looks_;  // Begun anew at an end from outside.
+  std::optional<ValveLooks> looks_;  // Restarted by an end from outside.
   std::vector<LookTask> due_;
   std::int64_t detection_ns_{0};
   bool open_{false};
@@ -101,7 +101,7 @@ class EpisodeNames {
   std::optional<EpisodeLook> look_;
   std::vector<Explanation> known_;  // The faults that it is named after.
   std::vector<StrengthPoint> strength_points_;
-  std::vector<StrengthPoint> told_;  // Those of the last Step().
+  std::vector<StrengthPoint> told_;  // Reported by the last Step().
 };
 
 }  // namespace fdi

@@ -20,7 +20,7 @@ enum class StrengthDue : std::uint8_t {
 
 /// Says when it is time to note how strong the faults of an open episode are:
 /// 450 s after its detection, then at 1.5 times the age each, but an hour later
-/// at most. Gives what the observers say.
+/// at most. Gives the estimates of the observers.
 class EpisodeStrengths {
  public:
   /// The next verdict of the engine, and the faults that the episode is named

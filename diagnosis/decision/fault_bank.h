@@ -56,8 +56,8 @@ class FaultBank {
   /// Applies the evidence so far to the factors set by Score().
   void ApplyEvidence(Verdict& verdict) const;
 
-  /// Of the faults that suit P1, P2 and T1, those that the evidence does not
-  /// refute: L_best − L_f − a < `margin`; nothing while it does not refute
+  /// The faults that suit P1, P2 and T1 and that the evidence does not refute:
+  /// L_best − L_f − a < `margin`. None while the evidence does not refute
   /// normal operation, or while the best one does not account for what is seen
   /// or does not fit it so far.
   FaultSet Unrefuted(double margin) const;
@@ -91,7 +91,7 @@ class FaultBank {
   /// Raises the evidence of every explanation to at least `least`.
   void RaiseTo(double least);
 
-  /// P1, P2 and T1 may be unusual by what stands beside the faults.
+  /// P1, P2 and T1 may be unusual because of causes beside the faults.
   void Excuse(SignalMask inputs) { excused_ = inputs; }
 
  private:

@@ -11,9 +11,9 @@
 namespace fdi {
 namespace {
 
-// Those of P1, P2 and T1 that `fault` changes by itself; the others stay as in
-// normal operation, but for what the flow does to them. f17 moves either
-// pressure; of every other fault only a reading hides what acts on the valve.
+// Inputs (P1, P2, T1) that `fault` changes by itself; the others stay as in
+// normal operation, but for effects of the flow on them. f17 moves either
+// pressure; with any other fault, one reading hides the value at the valve.
 SignalMask InputsOf(int fault) {
   const FaultFacts& facts = FaultFactsOf(fault);
   if (facts.acts_on != ActsOn::kInputs) {

@@ -42,8 +42,8 @@ struct StrengthPath {
   std::size_t fault_index{0};
   double sign{1.0};
   SignalMask inputs{0};  ///< P1, P2, T1 that the fault acts on.
-  SignalMask moved{0};   ///< Those that it moved at every trained strength.
-  bool taught{false};    ///< Of an observer that a label has taught, alone.
+  SignalMask moved{0};   ///< Inputs moved at every trained strength.
+  bool taught{false};    ///< Known only from an observer taught by a label.
   double lowest{0.0};    ///< Range of |s|.
   double highest{0.0};
   std::vector<Node> nodes;

@@ -28,7 +28,7 @@ struct LookWindow {
   std::size_t detection{0};     ///< Row of the first abnormal sample; 0 if it
                                 ///< lies before the window.
   SignalMask signals{0};        ///< That were measured.
-  /// A fault that acts all the time: what is sought comes on top of it. 0:
+  /// A fault that acts all the time; the one sought comes on top of it. 0:
   /// none.
   int standing{0};
   double standing_strength{0.0};  ///< Signed [-].
@@ -85,7 +85,7 @@ enum class LookOccasion : std::uint8_t {
   kRoutine,  ///< There is no episode: should there be one?
   kStill,    ///< A routine look opened it: is the valve abnormal still?
   kGrowth,   ///< There is a name: how strong are its faults by now?
-  kSecond,   ///< To name what comes on top of the fault of an open episode.
+  kSecond,   ///< To name a second fault, on top of the one of an open episode.
 };
 
 /// A look that is due: at what, and for which episode.
@@ -130,7 +130,7 @@ inline bool Explains(const std::vector<Explanation>& explanations, int fault) {
 
 /// How a second look answers.
 enum class LookOutcome : std::uint8_t {
-  kNamed,     ///< The set stands: what the data do not separate is in it.
+  kNamed,     ///< The set stands; inseparable faults are in it together.
   kUnclear,   ///< More than four faults explain the window: a shortlist.
   kNothing,   ///< No fault, or a constant shift, explains it as well.
   kNoneFits,  ///< No hypothesis follows the record: outside what is known.
@@ -139,9 +139,9 @@ enum class LookOutcome : std::uint8_t {
 struct LookAnswer {
   LookOutcome outcome{LookOutcome::kNoneFits};
   std::vector<Explanation>
-      faults;  ///< One each, best first; of kNoneFits none.
-  /// Those beyond the margin by no more than the errors of a simulation that
-  /// lacks X or a pressure; none where it has them.
+      faults;  ///< One each, best first; none for kNoneFits.
+  /// Faults beyond the margin, but within the errors of a simulation that lacks
+  /// X or a pressure; empty if it has them.
   std::vector<Explanation> beside{};
   /// The other faults, each with its best explanation, best first.
   std::vector<Explanation> others{};
@@ -157,7 +157,7 @@ struct LookAnswer {
   /// The valve's answer under the best explanation, a row each.
   std::vector<RecordAnswer> simulated;
   std::int64_t stamp_ns{0};  ///< Stamp of the last row.
-  /// Misfit without any fault, of a routine look alone.
+  /// Misfit without any fault; set by a routine look only.
   double without_fault{0.0};
 };
 

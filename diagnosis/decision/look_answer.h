@@ -46,7 +46,7 @@ bool ObserversName(const ModelSet& models, FaultSet isolated);
 using FaultGroups = std::vector<std::vector<int>>;
 
 /// Adds to the faults of the answer those beside them that are of their groups:
-/// what is known to look alike binds a look that is not sure to know better.
+/// known look-alikes bind a look that is not sure to know better.
 void BindGroups(const FaultGroups& groups, LookAnswer& answer);
 
 /// Where the flow has changed while nothing was read, and the look names

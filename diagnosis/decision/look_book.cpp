@@ -8,7 +8,7 @@
 namespace fdi {
 
 void LookBook::Enter(const LookTask& task, LookAnswer answer) {
-  // Only one episode is open at a time: what is not of this one is over.
+  // Only one episode is open at a time: entries of any other one are over.
   const auto others = std::erase_if(entries_, [&](const Entry& entry) {
     return entry.detection_stamp_ns != task.detection_stamp_ns;
   });

@@ -12,7 +12,7 @@ namespace fdi {
 ///
 /// A fault that fits only some of the time, at another strength each time, is
 /// not the one that acts: the command swings, a strength does not. So a misfit
-/// counts twice as much as a fit, and what is refuted stays so until it has
+/// counts twice as much as a fit, and a refuted fault stays so until it has
 /// fitted for long.
 class MisfitCounts {
  public:

@@ -16,7 +16,7 @@ struct NameBeside {
   };
 
   FaultSet faults{0};                 ///< Empty: there is none.
-  std::array<Fault, kMost> likely{};  ///< Those faults, likeliest first.
+  std::array<Fault, kMost> likely{};  ///< The same faults, likeliest first.
 };
 
 }  // namespace fdi

@@ -77,8 +77,8 @@ struct RuleRow {
   /// In `fdi-study ablate` and its table. Empty: without it there is no name at
   /// all, so that nothing is learnt by leaving it out.
   std::string_view name;
-  std::string_view may;        ///< What it may change.
-  std::string_view overrides;  ///< What it has precedence over.
+  std::string_view may;        ///< The change it may make.
+  std::string_view overrides;  ///< Decisions over which it has precedence.
   std::string_view constants;  ///< Each with where its value comes from.
   std::string_view test;       ///< Fails without it.
 };
@@ -254,8 +254,8 @@ inline constexpr auto kRulesOf = [] {
 }();
 
 #ifdef FDI_RULE_SWITCHES
-// The study alone is built with it: no program that is installed can leave a
-// rule out.
+// Only the study is built with it: an installed program cannot leave out a
+// rule.
 inline namespace switched {
 /// The rules that are left out, by bit. Set before any engine runs.
 inline constinit std::uint64_t rules_off = 0;

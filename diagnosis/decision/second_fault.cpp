@@ -13,7 +13,7 @@ namespace fdi {
 namespace {
 
 constexpr int kSteadySamples = 60;  // with one name, before it is watched
-constexpr int kLearnSamples = 200;  // to see what the name leaves
+constexpr int kLearnSamples = 200;  // for the residuals of the name
 constexpr int kQuietSamples = 100;  // inside the limits after that
 constexpr int kFittingSamples = 150;
 constexpr int kMisfitWeight = 4;
@@ -21,15 +21,15 @@ constexpr double kMargin = 1.25;           // of the largest that was left
 constexpr double kStrengthMemory = 100.0;  // samples
 constexpr double kMaxSpread = 0.1;         // of a strength that does not move
 constexpr double kAhead = 3.0;             // supports of the evidence
-constexpr double kMemory = 8.0;            // the same, of what is refuted
+constexpr double kMemory = 8.0;            // the same, for refuted ones
 constexpr double kLikelyShare = 0.1;
 constexpr int kMostLikely = 4;     // faults; more are no name
-constexpr double kFarAhead = 6.0;  // the same, of a fault that fits
+constexpr double kFarAhead = 6.0;  // the same, for a fault that fits
 constexpr int kDoubtWindows = 10;  // of t_k samples: the longest doubt
 
 }  // namespace
 
-// A fault of the name as the one that stands: what it leaves of the readings.
+// A fault of the name as the standing one, and the residuals that it leaves.
 struct SecondFaultWatch::Member {
   struct Left {
     Left(const EnginePlan& plan, InstructionSet instructions)
@@ -71,8 +71,8 @@ void SecondFaultWatch::Member::Judge(const Sample& sample,
   left->detection.Push(left->composed, sample, {margins.data(), channels});
 }
 
-// A model of a fault errs more than one of normal operation. What it leaves
-// before the fault is settled, it may leave later on.
+// The model of a fault errs more than that of normal operation. Residuals from
+// before the fault is settled may also occur later on.
 void SecondFaultWatch::Member::LearnMargins(std::size_t channels) {
   if (watched >= kLearnSamples) {
     return;
@@ -89,7 +89,7 @@ void SecondFaultWatch::Member::LearnMargins(std::size_t channels) {
   }
 }
 
-// Of a settled fault, what may be a second one does not move the strength.
+// While a second fault may be present, the strength of a settled one is kept.
 void SecondFaultWatch::Member::FollowStrength(double strength) {
   ++run;
   if (settled && pending()) {
@@ -101,8 +101,8 @@ void SecondFaultWatch::Member::FollowStrength(double strength) {
   spread += gain * (off * off - spread);
 }
 
-// What the limits, with their margins, have caught since these are known does
-// not count: another look is taken at what the fault leaves.
+// A detection once the margins are known does not count as a second fault yet:
+// the margins are learnt again from the residuals that the fault leaves.
 void SecondFaultWatch::Member::Settle(bool fits) {
   fitting =
       std::clamp(fitting + (fits ? 1 : -kMisfitWeight), 0, 2 * kFittingSamples);
@@ -124,7 +124,7 @@ void SecondFaultWatch::Member::Unsettle() {
   settled = false;
 }
 
-// What only an episode with a settled fault needs.
+// Needed only by an episode with a settled fault.
 struct SecondFaultWatch::Rivals {
   explicit Rivals(const EnginePlan& plan)
       : pair(plan.faults()),
@@ -236,8 +236,8 @@ void SecondFaultWatch::Compete(const Sample& sample, const ObserverBank& bank) {
   ++age_;
 }
 
-// What was refuted long ago may be true by now, of pairs and of single faults:
-// neither falls further behind the other than it has to for a decision.
+// A pair or a single fault that was refuted long ago may be true by now, so
+// neither falls further behind the other than a decision requires.
 void SecondFaultWatch::Balance() {
   const double most = kMemory * plan_->models().decision.evidence_support;
   const double pair = rivals_->pair.LeaderOf(known_ & ~name_).evidence;
@@ -283,15 +283,15 @@ void SecondFaultWatch::Decide() {
   }
 }
 
-// What one fault has to be ahead of a pair by, in supports. One that is said to
-// be second is over where the standing one explains as much by itself.
+// The lead over a pair that a single fault needs, in supports. A second fault
+// that was reported is over once the standing one explains as much by itself.
 double SecondFaultWatch::Handicap(bool own) const {
   return !own ? 1.0 : phase_ == Phase::kOpen ? -1.0 : 0.0;
 }
 
-// The pair has a name and is far ahead of the standing fault at any strength,
-// of what this doubt has shown. It is also ahead of every other single fault;
-// but of the one that is in the pair, it need not be: that a fault has gone as
+// The pair has a name and, on the evidence of this doubt, is far ahead of the
+// standing fault at any strength. It is also ahead of every other single fault,
+// though not necessarily of the one in the pair: that a fault has gone as
 // the other one came is less likely than both of them.
 bool SecondFaultWatch::IsPair(const FaultBank::Leader& pair) const {
   const double support = plan_->models().decision.evidence_support;
@@ -309,7 +309,7 @@ bool SecondFaultWatch::IsPair(const FaultBank::Leader& pair) const {
          pair.evidence - other.evidence > (same ? -1.0 : kAhead) * support;
 }
 
-// What is known of the standing fault stays so, and may be exceeded again.
+// Keeps what was learnt about the standing fault; its limits may trip again.
 void SecondFaultWatch::WatchOn() {
   phase_ = Phase::kWatching;
   for (const auto& member : members_) {
@@ -327,7 +327,7 @@ void SecondFaultWatch::GiveUp() {
   }
 }
 
-// What is settled is the name that counts, and one without findings.
+// The faults to settle: those of the name that counts, if it has no finding.
 FaultSet SecondFaultWatch::NameOf(const NameBeside& beside,
                                   const Verdict& verdict) const {
   const FaultSet name = beside.faults != 0                  ? beside.faults
@@ -391,7 +391,7 @@ SecondFaultWatch::Likeliest SecondFaultWatch::Present(
   return present;
 }
 
-// One that does not stand is no name for what it leaves: it settles anew.
+// A fault that leaves a residual and is not the standing one must settle again.
 void SecondFaultWatch::Watch(Member& member, bool fits) {
   if (member.settled && &member != standing_ &&
       member.left->detection.stamp_ns()) {
@@ -451,8 +451,8 @@ void SecondFaultWatch::Follow(const Episode& episode, const NameBeside& beside,
   Write(verdict);
 }
 
-// Where no pair fits either, those that stand out of all pairs: by a share of
-// what the best is ahead, because models err by a share of an effect.
+// If no pair fits either: the faults of the best pairs, within a share of the
+// lead of the best one, because models err by a share of an effect.
 FaultSet SecondFaultWatch::Likely() const {
   const double support = plan_->models().decision.evidence_support;
   const double best = rivals_->pair.LeaderOf(known_ & ~name_).evidence;
@@ -465,7 +465,7 @@ FaultSet SecondFaultWatch::Likely() const {
       likely |= fault;
     }
   }
-  // What does not fit is no name of its own.
+  // No pair fits, so a single fault is not named.
   const int count = std::popcount(likely);
   return lead > kFarAhead * support && count > 1 && count <= kMostLikely
              ? likely

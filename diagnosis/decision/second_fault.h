@@ -13,21 +13,21 @@
 
 namespace fdi {
 
-/// Finds what comes on top of the fault that an open episode is named after.
+/// Finds a second fault on top of the one that an open episode is named after.
 ///
-/// 1. Watching: the fault at its strength belongs to what is expected. Once
-///    what is left has been inside the limits of normal operation for long, the
-///    fault is settled. Of a name of several faults by a simulation, each is
-///    watched for itself: the one that stands is the likeliest that is settled,
-///    and it may change places with another one without beginning anew.
+/// 1. Watching: the fault at its strength is part of the expected values. Once
+///    the residuals have long been inside the limits of normal operation, the
+///    fault is settled. If a simulation names several faults, each is watched
+///    separately: the standing one is the likeliest of those settled, and
+///    another one may take its place without a new start.
 /// 2. In doubt: the limits are exceeded, as a detection asks for. The name is
 ///    held. Pairs of the settled fault and another one compete with every
 ///    single fault at every strength, both on the evidence from here on.
 /// 3. Open: no single fault fits, and a pair does or none does either.
 ///
-/// Of a set that does not judge the fit (FitBounds) nothing is ever second.
-/// Memory of its own is taken with a name, most of it where that has stayed for
-/// some time, and given back with the episode.
+/// A set that does not judge the fit (FitBounds) never has a second fault.
+/// Memory is allocated with a name, most of it once that has stayed for
+/// some time, and freed with the episode.
 class SecondFaultWatch {
  public:
   SecondFaultWatch(std::shared_ptr<const EnginePlan> plan,
@@ -89,7 +89,7 @@ class SecondFaultWatch {
   int decided_{0};  // samples in a row that one fault explains
   int paired_{0};   // samples in a row that only a pair does
   bool outlived_{false};
-  std::int64_t stamp_ns_{0};  // of the detection of what is second
+  std::int64_t stamp_ns_{0};  // of the detection of the second fault
 };
 
 }  // namespace fdi

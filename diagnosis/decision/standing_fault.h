@@ -14,15 +14,15 @@ struct StandingFault {
   double strength{0.0};               ///< |s|
 };
 
-/// What a standing fault makes of the predictions for one sample, by channel.
+/// How a standing fault changes the predictions for one sample, by channel.
 ///
 /// Effects on rod and flow multiply, those on every other output add up,
 ///
 ///     X_fg = X_g X_f/X_0,   F_fg = F_g F_f/F_0,   y_fg = y_g + (y_f - y_0),
 ///
-/// because what narrows a valve passes a share of the flow, a position
-/// transmitter that is wrong reads a share of wherever the rod stands, and what
-/// shifts another reading shifts it whatever else acts.
+/// because a narrowed valve passes a share of the flow, a faulty position
+/// transmitter reads a share of the true position, and an offset of another
+/// reading is the same whatever else acts.
 class StandingEffect {
  public:
   /// @param bank with the predictions of every observer for this sample.

@@ -92,8 +92,8 @@ double StrengthTracker::TrackedInterpolation() const {
   return std::min(1.0, std::abs(4.0 * h * (1.0 - h)));
 }
 
-// What is forgiven is the contradiction of the channel that objects most; the
-// others keep what they have gathered. In the first samples this lasts until
+// Forgives the contradiction of the channel that objects most; the others keep
+// what they have gathered. In the first samples this lasts until
 // the next one, because Search() sums the cells again.
 void StrengthTracker::RaiseEvidence(double least) {
   const double lacking = least - total_;
@@ -225,7 +225,7 @@ void StrengthTracker::SearchChannel(const ObserverBank& bank,
 //
 //     s ← s + ṡ,   P ← F P Fᵀ / λ,   F = [1 1; 0 1].
 //
-// Division by λ replaces process noise: what is n samples old counts λⁿ. The
+// Division by λ replaces process noise: a sample that is n old counts λⁿ. The
 // channels correct the state in turn, which for independent errors equals a
 // joint correction but needs no matrix inverse. Each gains its evidence before
 // it corrects the state: an innovation is the error of a prediction, and after

@@ -57,12 +57,12 @@ class StrengthTracker {
   /// The same of the tracked strength, whichever explains better.
   double TrackedInterpolation() const;
 
-  /// Of the first t_k samples, of the best explanation, tracked or trained:
-  /// whether it accounts for what is seen. Call after Step().
+  /// Judges, over the first t_k samples, whether the best explanation, tracked
+  /// or trained, accounts for what is seen. Call after Step().
   void JudgeAccount(const ObserverBank& bank, const ObserverEvidence& trained);
   /// Where the normal observer is furthest off, in deviations, the residual is
-  /// less than half of its one. Else the fault only tolerates it, as a rod that
-  /// sticks does nearly all.
+  /// less than half as large. Else the fault only tolerates the readings, as a
+  /// sticking rod does with nearly any.
   bool accounts() const { return accounts_; }
 
   /// Smallest membership over the active channels of the residual at the

@@ -14,8 +14,8 @@
 
 namespace fdi {
 
-/// Diagnoses one valve. Pure: what Step() returns depends on the samples given
-/// so far alone; no clock, no I/O, and no allocation after construction but
+/// Diagnoses one valve. Pure: the result of Step() depends only on the samples
+/// so far; no clock, no I/O, and no allocation after construction but
 /// for what a named fault needs (SecondFaultWatch). The monitor and
 /// `fdi-trainer evaluate` run this very class.
 ///
@@ -39,7 +39,7 @@ class ValveEngine {
   const Verdict& Step(const Sample& sample);
 
   /// Ends an open episode for a reason from outside (stream ended, stale,
-  /// ...); the engine settles anew. @returns its kClosed transition, or
+  /// ...); the engine settles again. @returns its kClosed transition, or
   /// nothing if no episode was open.
   std::optional<Transition> EndEpisode(EndReason reason);
 
@@ -55,13 +55,13 @@ class ValveEngine {
   /// See SourceOrder::ForgetSuperseded().
   void ForgetSuperseded();
 
-  /// What is known of the valve outside of the engine is abnormal, or is not
-  /// any more: while it is, a valve that is judged has an episode, which does
+  /// Sets whether information from outside the engine calls the valve abnormal.
+  /// While it does, a valve that is judged has an episode, which does
   /// not clear. Ends with EndEpisode() and Adopt().
   void Suspect(bool suspected);
 
-  /// What the open episode is called where that is not the engine's name: a
-  /// second fault is on top of it (SecondFaultWatch).
+  /// Takes the name of the open episode if it is not the engine's own, as the
+  /// basis on which a second fault is sought (SecondFaultWatch).
   void TakeName(const NameBeside& name);
 
   /// The slow accumulators, for Restore() after a restart of the program:
@@ -82,7 +82,7 @@ class ValveEngine {
   /// did not reach them. Until the next call.
   const Sample* judged() const;
 
-  /// What Step() gave last.
+  /// The result of the last Step().
   const Verdict& verdict() const;
   const ModelSet& models() const;
   bool episode_open() const;

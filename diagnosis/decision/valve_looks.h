@@ -25,14 +25,14 @@ class ValveLooks {
   /// The next sample, whatever its intake, and what the engine said about it.
   std::optional<LookTask> Step(const Sample& sample, const Verdict& verdict);
 
-  /// The answer to a look that was due; of an earlier episode it counts for
+  /// The answer to a look that was due; for an earlier episode it counts for
   /// nothing.
   void Enter(const LookTask& task, LookAnswer answer);
 
   /// The answer that counts for the open episode at the last sample, if there
   /// is one.
   const LookAnswer* Answer() const;
-  /// The same for what is on top of the fault of that episode.
+  /// The same for a second fault, on top of the one of that episode.
   const LookAnswer* SecondAnswer() const;
 
   /// See EpisodeLooks::GrowthTask(). Its answer is not for Enter().
@@ -51,11 +51,11 @@ class ValveLooks {
   TrainedSignals trained_;
   std::int64_t period_ns_;
   LookBook book_;
-  LookBook second_book_;  // About what is on top.
+  LookBook second_book_;  // About the second fault.
   Suspicion suspicion_;
   std::int64_t stamp_ns_{0};
   std::int64_t detection_ns_{0};
-  std::int64_t second_ns_{0};  // Detection of what is on top; 0: nothing is.
+  std::int64_t second_ns_{0};  // Detection of a second fault; 0: there is none.
   bool open_{false};
 };
 

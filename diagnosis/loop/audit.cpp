@@ -35,21 +35,21 @@ constexpr double kPoorFit = 0.1;  // r² of a disturbance's.
 // A good valve with positioner has a dead band of 0.25 to 0.5 %.
 constexpr double kGoodBand = 0.25;
 constexpr double kHalf = 0.5;     // G of a play between OP and X.
-constexpr double kMoves = 1.0;    // Of OP, which calls for an answer [%].
+constexpr double kMoves = 1.0;    // Change of OP that calls for an answer [%].
 constexpr double kWindsUp = 5.0;  // The same, whatever the noise of it [%].
 // Share of the mean error by which PV moves at most if it does not answer; so
 // an error of less than 1/kUnmoved noises says nothing.
 constexpr double kUnmoved = 0.05;
 constexpr double kNearEnd = 0.5;  // From an end of the range of OP [%].
 constexpr double kOftenAtLimit = 0.05;
-constexpr double kOtherHalf = 50.0;  // Of the travel, from where OP is [%].
+constexpr double kOtherHalf = 50.0;  // Distance from OP, in % of the travel.
 // Samples further apart than the lag of a rod are alike by chance.
 constexpr double kFast_s = 2.0;
-constexpr std::size_t kOftenStands = 5;  // Of X: so often,
+constexpr std::size_t kOftenStands = 5;  // X stands at least so often,
 constexpr double kLongStands = 0.01;     // and for such a share of the time.
 constexpr double kUnrelated = 0.05;      // r² of X over OP: it is all noise.
 constexpr std::size_t kFrozenSamples = 300;
-constexpr double kBlock_s = 30.0;  // Of the second witness.
+constexpr double kBlock_s = 30.0;  // Block length of the second witness.
 
 std::vector<double> BlockMeans(std::span<const double> values,
                                std::size_t block) {
@@ -122,7 +122,7 @@ double Spread(std::span<const double> values) {
   return std::sqrt(squares / static_cast<double>(values.size()));
 }
 
-// The distance of the means of two series, of the sum of their spreads.
+// The distance of the means of two series, over the sum of their spreads.
 double Distance(std::span<const double> a, std::span<const double> b) {
   const double off = std::abs(Mean(a) - Mean(b));
   return off > 0.0 ? off / (Spread(a) + Spread(b)) : 0.0;
@@ -175,7 +175,7 @@ bool IsAtLimit(double op) {
   return op <= kNearEnd || op >= 100.0 - kNearEnd;
 }
 
-// Of an OP that is no percentage, the ends are not known.
+// The ends of an OP that is no percentage are not known.
 double ShareAtLimit(std::span<const double> op) {
   if (!IsPercent(op)) {
     return 0.0;
@@ -361,7 +361,7 @@ Finding JudgePosition(const Evidence& e) {
 
 Finding JudgePlay(const Evidence& e) {
   // A play that leaves most of PV unexplained has to predict it all the more:
-  // where the load alone moves PV, the integral of the controller lags like
+  // where only the load moves PV, the integral of the controller lags like
   // one.
   if (!IsPlay(e) ||
       e.prediction_gain <= (e.fit->explained() > kHalf ? 0.0 : kChanceGain)) {

@@ -58,7 +58,7 @@ struct Band {
   double high{0.0};
 };
 
-/// What is known of a window. Shares are of its samples.
+/// Evidence from a window. Shares are of its samples.
 struct Evidence {
   std::size_t samples{0};
   int gain_sign{0};
@@ -73,27 +73,27 @@ struct Evidence {
   double unanswered{0.0};  ///< Longest one-way run of OP without answer [%].
   /// OP stands at its open end, and PV comes no nearer to SP.
   bool helpless{false};
-  std::optional<Oscillation> oscillation;  ///< Of OP; period in samples.
+  std::optional<Oscillation> oscillation;  ///< In OP; period in samples.
   std::optional<PlayFit> fit;              ///< PV, or X, over OP.
-  Standing standing;            ///< Of X, in samples of 2 s and less.
+  Standing standing;            ///< How X stands, for samples of 2 s or less.
   bool unrelated{false};        ///< X is noise, whatever OP does.
   double prediction_gain{0.0};  ///< LLR, the second witness.
   double increments{0.0};       ///< r² of PV as the integral of OP.
-  double correlation{0.0};      ///< Of OP and PV, times the sign of the gain.
+  double correlation{0.0};      ///< Between OP and PV, times the gain's sign.
   bool integrates{false};       ///< As known, else by the increments.
   /// OP and PV seem exchanged: SP stays at OP and not at PV, and the
   /// controller's law fits better the other way round.
   bool exchanged{false};
 
-  /// Of the play, or, where it explains little of X, of the standing; nothing
-  /// if neither was found.
+  /// The band of the play or, if that explains little of X, of the standing;
+  /// nothing if neither was found.
   std::optional<Band> band() const;
 };
 
-/// What a window says.
+/// The verdict on a window.
 struct Finding {
   Verdict verdict{Verdict::kUndetermined};
-  bool sure{false};           ///< Of stiction: two witnesses, or X, agree.
+  bool sure{false};           ///< For stiction: two witnesses, or X, agree.
   std::string_view reason{};  ///< One sentence.
 };
 
@@ -121,12 +121,12 @@ bool IsPercent(std::span<const double> op);
 ///   if a play explains half of what a straight line leaves of X over OP, or if
 ///   X stands five times and 1 % of the time while OP moves (Standing): where
 ///   OP is restless, friction holds X for seconds and is no play.
-/// - the other causes by what is left: see Verdict and docs/loops.md.
+/// - the other causes by the rest: see Verdict and docs/loops.md.
 ///
-/// Of an integrating loop a play is never concluded from PV, because the
+/// In an integrating loop, play is never concluded from PV, because the
 /// integral's quarter period looks like one. Nor is it where PV is known to
 /// follow OP late: under a slow load the controller keeps PV - SP in step with
-/// dOP/dt, which looks like a play, too. Of either, a run of OP without an
+/// dOP/dt, which looks like a play, too. In both cases a run of OP without an
 /// answer means something only if it ends at a limit.
 ///
 /// @throws std::invalid_argument if the series differ in length, a value is not

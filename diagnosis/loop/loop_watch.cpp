@@ -13,7 +13,7 @@ namespace fdi {
 namespace {
 
 constexpr double kGapIntervals = 3.0;
-constexpr double kOpMoves = 1.0;  // Of a loop whose window says something [%].
+constexpr double kOpMoves = 1.0;  // Least motion of OP in a telling window [%].
 // Factors of a finding that is sure and one that is likely, as CertaintyOf()
 // reads them.
 constexpr double kSureFactor = 1.0;
@@ -22,9 +22,9 @@ constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 // The interval [ms] is in the low half of the hash.
 constexpr std::uint64_t kHashBase = 0xA0D1'7000'0000'0000ULL;
 constexpr double kMsPerSecond = 1e3;
-constexpr double kOtherInterval = 0.2;  // Of the interval: it is another one.
+constexpr double kOtherInterval = 0.2;  // Share by which another one differs.
 
-// What the evidence says of the size of a finding, in shares of the span.
+// The size of a finding according to the evidence, in shares of the span.
 Estimate SizeOf(const loop::Audit& audit) {
   const loop::Evidence& e = audit.evidence;
   constexpr double kPerCent = 0.01;
@@ -243,8 +243,8 @@ std::optional<loop::Window> LoopWatch::TakeWindow() {
   return window;
 }
 
-// Decides between PV, F (which is in window.pv) and X, of which what is not
-// there throughout does not count.
+// Decides between PV, F (which is in window.pv) and X; one that is missing
+// anywhere does not count.
 void LoopWatch::SetControlled(loop::Window& window) const {
   const auto has_gap = [](const std::vector<double>& values) {
     return std::ranges::any_of(values, [](double v) { return std::isnan(v); });
@@ -309,8 +309,8 @@ void LoopWatch::Count(const loop::Audit& audit) {
   found_normal_ = finding == 0 && vote_.times == kConfirmations;
 }
 
-// What the votes make of the episode. Detection and name are a point apart: a
-// trace restarts with the name, and what was before belongs to the detection.
+// Turns the votes into transitions. Detection and name are a point apart: a
+// trace restarts with the name, and earlier points belong to the detection.
 void LoopWatch::Tell() {
   const bool confirmed = vote_.times >= kConfirmations;
   const int voted = vote_.found.finding;

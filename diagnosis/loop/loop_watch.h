@@ -23,7 +23,7 @@ std::shared_ptr<const ModelSet> AuditModels(double interval_s);
 /// The set of AuditModels() with this hash; null if it is none of them.
 std::shared_ptr<const ModelSet> AuditModels(std::uint64_t content_hash);
 
-/// What an audit finds, as a finding of the catalogue; 0: nothing that opens an
+/// The verdict of an audit as a finding of the catalogue; 0 if it opens no
 /// episode (undetermined, quantised).
 int FindingOf(loop::Verdict verdict);
 
@@ -32,7 +32,7 @@ int FindingOf(loop::Verdict verdict);
 /// samples.
 ///
 /// - A point each 10 s, or each sample if these are slower; 720 points are a
-///   window, two hours or more. It begins anew at a change of mode, source or
+///   window, two hours or more. It starts over at a change of mode, source or
 ///   epoch, at a gap of three intervals, and where CV, or PV, F and X, are
 ///   missing.
 /// - The controlled variable is PV with SP, else F, else X. A PV that follows
@@ -42,8 +42,8 @@ int FindingOf(loop::Verdict verdict);
 ///   the loops of a plant take turns.
 /// - Three windows in a row with the same finding begin an episode, or rename
 ///   it; three in which OP moves by 1 % and nothing is found end it. Each
-///   window says anew how large the finding is; where that is more severe than
-///   told, it is told again (TransitionKind::kChanged).
+///   window estimates the size of the finding again; if it is more severe than
+///   last reported, it is reported again (TransitionKind::kChanged).
 ///
 /// No thread, no clock; Step() costs a comparison and, at each point, a store.
 class LoopWatch {
@@ -76,7 +76,7 @@ class LoopWatch {
   std::optional<Transition> End(EndReason reason);
 
   const Verdict& verdict() const { return verdict_; }
-  /// Of the verdicts; null until the first audit.
+  /// Model set of the verdicts; null until the first audit.
   const std::shared_ptr<const ModelSet>& models() const { return models_; }
   bool episode_open() const { return verdict_.detected; }
   /// The last sample was a point of the window.
@@ -107,7 +107,7 @@ class LoopWatch {
     Estimate size{};
     double factor{0.0};
   };
-  // What the last windows have said, as the last of them.
+  // The agreeing verdicts of the last windows, with the latest finding.
   struct Vote {
     Found found{};
     int times{0};
@@ -144,8 +144,8 @@ class LoopWatch {
   std::optional<loop::Audit> answer_;
   Vote vote_;
   bool named_{false};                 // The open episode is told as isolated.
-  Found found_;                       // What it is of.
-  Severity told_{Severity::kMedium};  // As told last.
+  Found found_;                       // Cause of the open episode.
+  Severity told_{Severity::kMedium};  // As reported last.
   std::int64_t detection_ns_{0};
   bool at_point_{false};
   bool found_normal_{false};

@@ -50,7 +50,7 @@ std::vector<double> Crossings(const std::vector<double>& signal) {
   return crossings;
 }
 
-// Without its mean and without what is above the 7th harmonic of 1/T.
+// Without its mean and without frequencies above the 7th harmonic of 1/T.
 std::vector<double> LowPassed(const std::vector<double>& signal,
                               double period) {
   const std::size_t n = signal.size();
@@ -84,7 +84,7 @@ ShapeErrors FitShapes(std::span<const double> y) {
   double yy = 0.0;
   double sine_y = 0.0;
   double sines = 0.0;
-  // Of the falling side, here all of it: Σ y (1 - x), Σ (1 - x)².
+  // Sums for the falling side, here all of it: Σ y (1 - x), Σ (1 - x)².
   double fall_y = 0.0;
   double falls = 0.0;
   for (std::size_t k = 0; k < n; ++k) {

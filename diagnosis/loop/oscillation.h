@@ -17,9 +17,9 @@ struct Oscillation {
 };
 
 /// From the zero crossings of the autocorrelation of the signal without its
-/// linear trend: T_i = 2 × their spacings, of the first 11 crossings up to half
+/// linear trend: T_i = 2 × the spacings of the first 11 crossings up to half
 /// of the window. The shape is fitted between zero crossings of the signal
-/// without what is beyond the 7th harmonic.
+/// without frequencies beyond the 7th harmonic.
 ///
 /// @returns nothing if there are fewer than four crossings: no oscillation, or
 ///   a window of less than about four periods.

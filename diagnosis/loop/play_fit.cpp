@@ -14,9 +14,9 @@ namespace fdi::loop {
 namespace {
 
 constexpr int kWidths = 24;
-constexpr double kNarrowest = 0.04;  // Of the range of OP.
+constexpr double kNarrowest = 0.04;  // Share of the range of OP.
 constexpr double kWidest = 0.90;
-constexpr std::array kSides{-0.5, 0.0, 0.5};  // Of the width: where a play is.
+constexpr std::array kSides{-0.5, 0.0, 0.5};  // Start of a play, in widths.
 constexpr std::size_t kFewestSamples = 20;
 
 double WidthShare(int i) {
@@ -54,7 +54,7 @@ double FitLine(std::span<const double> x, std::span<const double> y,
   return xx <= 0.0 || yy <= 0.0 || xy * sign <= 0.0 ? 0.0 : xy * xy / (xx * yy);
 }
 
-constexpr std::array kLags{0, 2, 6};  // Of the filter, in samples.
+constexpr std::array kLags{0, 2, 6};  // Lags of the filter [samples].
 constexpr std::size_t kDelays = 3;    // 0, 1 and 2 samples.
 
 // A lane for each of kSides; the fourth fills up the registers.
@@ -129,7 +129,7 @@ std::optional<PlayFit> FitPlay(std::span<const double> op,
     return std::nullopt;
   }
   PlayFit fit;
-  std::vector<std::pair<double, double>> errors;  // Of each width, 1 - r².
+  std::vector<std::pair<double, double>> errors;  // Errors 1 - r², by width.
   // About their means, so that the sums of squares lose nothing.
   const double op_level = Mean(op);
   const double pv_level = Mean(pv);
@@ -192,8 +192,8 @@ double PlayPredictionGain(std::span<const double> op,
       RangeOf(pv) <= 0.0) {
     return 0.0;
   }
-  // Columns: PV(k-1..k-4), 1, u(k-1..k-4). What OP adds to the normal equations
-  // is new for each play.
+  // Columns: PV(k-1..k-4), 1, u(k-1..k-4). The terms of OP in the normal
+  // equations are new for each play.
   using Table = Eigen::Matrix<double, Eigen::Dynamic, 2 * kOrder + 1>;
   const auto lagged = [rows](const Eigen::VectorXd& series, int i) {
     return series.segment(kOrder - i, rows);

@@ -13,8 +13,8 @@ struct PlayFit {
   double band_low{0.0};   ///< The widths whose squared error is within 5 % of
   double band_high{0.0};  ///< the least.
   double step{0.0};       ///< Between the widths that were tried.
-  double start{0.0};      ///< Of the play.
-  int lag{0};             ///< Of the first-order filter [samples].
+  double start{0.0};      ///< Initial output of the play.
+  int lag{0};             ///< First-order lag [samples].
   int delay{0};           ///< [samples]
   double offset{0.0};     ///< PV ≈ offset + slope · z.
   double slope{0.0};

@@ -11,8 +11,8 @@ namespace {
 
 constexpr std::size_t kLeastSamples = 3;
 constexpr std::size_t kLongestDelay = 1;  // Samples; records differ by one.
-constexpr double kStill = 0.5;            // Of X [%].
-constexpr double kOpMoves = 4.0;          // Of OP [%].
+constexpr double kStill = 0.5;            // X stays within this [%].
+constexpr double kOpMoves = 4.0;          // OP moves by this [%].
 constexpr double kStop = 3.0;     // Nearer to an end X stands anyway [%].
 constexpr double kFollows = 0.1;  // r² of the lag.
 

@@ -10,7 +10,7 @@ namespace fdi::loop {
 /// and more: a rod that sticks and slips.
 struct Standing {
   std::size_t times{0};
-  double share{0.0};  ///< Of the samples.
+  double share{0.0};  ///< Share of the samples.
   /// Quartiles of what OP moves meanwhile [%].
   double low{0.0};
   double middle{0.0};
@@ -20,7 +20,7 @@ struct Standing {
 /// The lag is that of dX(k) = a (OP(k-d) - X(k-1)) + c by least squares, d = 0
 /// or 1: records differ in whether OP stands with the X before it or after it.
 ///
-/// @param op, x [%], of one length.
+/// @param op, x [%], equally long.
 /// @returns none if X follows OP in no such way (r² below 0.1), or is read
 ///   more seldom than OP: it repeats more than half of its readings.
 Standing FindStanding(std::span<const double> op, std::span<const double> x);

@@ -8,7 +8,7 @@
 namespace fdi::loop {
 namespace {
 
-constexpr double kMoved = 0.02;  // Of the realised step.
+constexpr double kMoved = 0.02;  // Share of the realised step.
 
 // When x has come to `level` from `begin`, 0 to 1 of the way [samples].
 double Crossing(std::span<const float> x, double begin, double level) {

@@ -11,27 +11,27 @@ namespace fdi::loop {
 namespace {
 
 constexpr double kAtEnd = 0.5;  // [%]
-constexpr double kStood = 0.1;  // Of a rod, or a command [%].
+constexpr double kStood = 0.1;  // A rod or a command that stands [%].
 constexpr double kSlip = 0.5;   // [%]
 constexpr double kRecentS = 10.0;
 constexpr double kUsualS = 60.0;
-constexpr double kUnusual = 5.0;    // Of the mean |ΔX|.
+constexpr double kUnusual = 5.0;    // Times the mean |ΔX|.
 constexpr double kTurn = 0.25;      // [%]
 constexpr double kFollowed = 0.25;  // [%]
 constexpr double kFast = 1.0;       // [%/s]
 constexpr double kRateS = 10.0;
 constexpr double kSlowest = 0.01;  // Ramps [%/s].
 constexpr double kSteepest = 0.25;
-constexpr double kRampBegin = 2.0;  // Of a leg [%].
-// Of the largest change between two samples of late: noise has less in its
-// mean, and would be selected by the noise of the very sample that is counted.
+constexpr double kRampBegin = 2.0;  // Skipped part of a leg [%].
+// Least mean slope, as a share of the largest recent step between samples: the
+// mean has less noise. Else noise of the counted sample itself would select it.
 constexpr double kStraight = 0.25;
 constexpr std::int64_t kRampSamples = 60;
 constexpr double kStep = 2.0;  // [%]
 constexpr double kHoldS = 10.0;
 constexpr double kLongestS = 60.0;
-constexpr double kLeaves = 0.1;     // Of the step of CV.
-constexpr double kRealised = 0.25;  // Of the step of CV.
+constexpr double kLeaves = 0.1;     // Share of the step of CV.
+constexpr double kRealised = 0.25;  // Share of the step of CV.
 
 std::int64_t Quanta(double value) {
   return std::llround(value / ValveCounts::kQuantum);

@@ -12,14 +12,14 @@
 
 namespace fdi::loop {
 
-/// What instrument people count of a valve in some time: sums in whole quanta,
-/// so that parts add up exactly in any order. What needs X is 0 without it.
+/// Counts of a valve over some time, in the terms of instrument engineers. Sums
+/// of whole quanta, so parts add up exactly in any order. 0 where X is lacking.
 struct ValveCounts {
-  static constexpr double kQuantum = 1e-3;  ///< Of % and of the gain [-].
+  static constexpr double kQuantum = 1e-3;  ///< In % and in units of gain [-].
 
   std::int64_t auto_ms{0};    ///< In automatic.
   std::int64_t limit_ms{0};   ///< CV within 0.5 % of 0 or 100 %.
-  std::int64_t path{0};       ///< Travel without a dead band, of X, else CV.
+  std::int64_t path{0};       ///< Travel of X, else of CV, without a dead band.
   std::int64_t slips{0};      ///< Jumps of a rod that stood,
   std::int64_t slip_size{0};  ///< and Σ of their sizes.
   std::int64_t turns{0};      ///< Turns of CV that X followed,
@@ -107,8 +107,8 @@ std::optional<double> FigureOf(Figure figure, const ValveCounts& counts,
 ///   five times what X usually moves (a mean of a minute), which noise does
 ///   not: a rod that stuck and let go.
 /// - Dead band: when CV turns (by 0.25 %) at c*, where X is x*, until X has
-///   followed by 0.25 %: |CV − c*| − |X − x*|. Of a play that is its width,
-///   whatever the sample at which it is told. Turns in which CV moves by more
+///   followed by 0.25 %: |CV − c*| − |X − x*|. With a play this is its width,
+///   whichever sample shows it. Turns in which CV moves by more
 ///   than 1 %/s say nothing, because X lags.
 /// - Dynamic error band: the mean of X − CV while CV falls, minus the mean
 ///   while it rises, on ramps of 0.01 to 0.25 %/s, once CV has moved 2 % one
@@ -122,7 +122,7 @@ std::optional<double> FigureOf(Figure figure, const ValveCounts& counts,
 ///
 /// One thread at a time.
 ///
-/// Source: terms after ISA-75.25.01 and the positioners that count (docs/
+/// Source: terms of ISA-75.25.01 and of positioners that count (docs/
 /// loops.md).
 class ValveCounters {
  public:
@@ -168,9 +168,9 @@ class ValveCounters {
   void FinishStep(double period_s, ValveCounts& counts) const;
 
   bool measurable_{false};  // The last reading had CV and X.
-  double cv_{kNone};        // Of the last reading, like the next.
+  double cv_{kNone};        // In the last reading, like the next.
   double x_{kNone};
-  double x_before_{kNone};  // Of the one before it.
+  double x_before_{kNone};  // In the reading before.
   double recent_cv_{0.0};   // Decaying maximum of |ΔCV| [%].
   double usual_x_{0.0};     // Leaky mean of |ΔX| [%],
   double usual_s_{0.0};     // of so long.

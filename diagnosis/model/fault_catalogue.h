@@ -12,11 +12,11 @@
 
 namespace fdi {
 
-/// What a fault changes first.
+/// Where a fault acts first.
 enum class ActsOn : std::uint8_t {
   kRod,          ///< Actuator, positioner or a stop: X, and F with it.
   kFlow,         ///< The flow at the same X.
-  kFlowReading,  ///< The reading of F alone.
+  kFlowReading,  ///< Only the reading of F.
   kInputs,       ///< P1, P2 or T1, or the readings of them.
 };
 
@@ -39,7 +39,7 @@ enum class Alike : std::uint8_t {
 struct LookAlike {
   int fault{0};  ///< Its number; 0: none.
   Alike when{Alike::kWithinItsSize};
-  int sign{0};  ///< Of its strength; 0: either.
+  int sign{0};  ///< Sign of its strength; 0: either.
 };
 
 inline constexpr SignalMask kRodSignals =
@@ -212,7 +212,7 @@ inline constexpr int kExcessFlow = 203;
 inline constexpr int kPositionStuck = 204;
 inline constexpr int kFlowStuck = 205;
 inline constexpr int kLowFlow = 206;
-/// Those of the floor end here, and those of the audit follow.
+/// The last finding of the floor; those of the audit follow.
 inline constexpr int kLastFloorFinding = kLowFlow;
 inline constexpr int kFirstLoopFinding = 207;
 inline constexpr int kStiction = kFirstLoopFinding;
@@ -239,7 +239,7 @@ constexpr bool IsFinding(int number) {
   return number >= kFirstFinding && number <= kLastFinding;
 }
 
-/// What the audit of a loop finds.
+/// Whether `number` is a finding of a loop audit.
 constexpr bool IsLoopFinding(int number) {
   return number >= kFirstLoopFinding && number <= kLastLoopFinding;
 }

@@ -24,8 +24,8 @@ struct ReadEvery {
 /// that stands is the command.
 int* EveryOf(ReadEvery& every, Signal signal);
 
-/// Tells new readings from repeats. A transmitter that is polled changes at
-/// multiples of one number of samples alone, whatever it measures. Its repeats
+/// Tells new readings from repeats. A polled transmitter changes only at
+/// multiples of a fixed number of samples, whatever it measures. Its repeats
 /// become UNCERTAIN: they stay in the past of the observers and are no evidence
 /// of anything. After the time of a poll an unchanged value is a new reading.
 /// O(1) a sample.

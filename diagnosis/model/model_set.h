@@ -45,7 +45,7 @@ struct WindowLimits {
   int length{30};              ///< N [samples].
   double lower_mean{0.0};      ///< < 0 [unit].
   double upper_mean{0.0};      ///< > 0 [unit].
-  double upper_log_rms{0.0};   ///< Of the deviation in units of the output.
+  double upper_log_rms{0.0};   ///< The deviation is in units of the output.
   double activity_slope{0.0};  ///< In [0, 1] [-].
   double log_activity{0.0};    ///< Value of a in training [log %].
   SignalRange command{kUnbounded};  ///< Means of CV for which it applies [%].
@@ -61,12 +61,12 @@ struct ChannelSpec {
       windows{};  ///< Slow and small faults; may be empty.
 };
 
-/// What the residual of a fault observer, in its deviations, shows over the
+/// Limits on the residual of a fault observer, in its deviations, over the
 /// last t_k samples of its own condition (FitWindow); zeros: not known.
 struct FitBounds {
   double lower_mean{0.0};    ///< < 0
   double upper_mean{0.0};    ///< > 0
-  double upper_square{0.0};  ///< Of the mean square; > 0.
+  double upper_square{0.0};  ///< Limit on the mean square; > 0.
 
   bool operator==(const FitBounds&) const = default;
 };
@@ -80,7 +80,7 @@ struct ChannelObserver {
   bool difference{false};
   Trapezoid membership;          ///< Over r = y − ŷ [unit of the output].
   double residual_sd{1.0};       ///< On validation data [unit], > 0.
-  double correlation_time{1.0};  ///< Of the residual [samples], ≥ 1.
+  double correlation_time{1.0};  ///< In the residual [samples], ≥ 1.
   /// κ: interpolating this observer from its neighbours in strength has an
   /// error of κ times the distance from the interpolation to the nearer one
   /// [-].
@@ -93,11 +93,11 @@ struct ChannelObserver {
 struct Observer {
   std::string name;                       ///< "normal", "f19 0.50".
   int fault{0};                           ///< 0 = normal, else 1..22.
-  double strength{0.0};                   ///< Of the trained condition; signed.
+  double strength{0.0};                   ///< As trained; signed.
   std::vector<ChannelObserver> channels;  ///< One per ModelSet::channels.
-  /// Those of P1, P2 and T1 that are outside normal operation in all of the
-  /// condition's own data. X and F: the
-  /// observer accounts for its own data there, and has to for what it explains.
+  /// P1, P2, T1: outside normal operation in all of the condition's own data.
+  /// X and F: the observer accounts for its own data there, so it also has to
+  /// account for whatever it explains.
   SignalMask moved{0};
 };
 
@@ -116,8 +116,8 @@ struct DecisionParameters {
   double evidence_window{200.0};  ///< Memory of evidence [samples].
   double evidence_core{3.0};      ///< Up to this far behind the best fault: 1;
   double evidence_support{9.0};   ///< this far or more: 0 [log-likelihood].
-  /// What interpolation between observers may cost a fault in the comparison:
-  /// this share of how far normal operation is behind; see FaultBank. 0: none.
+  /// Allowance of a fault in the comparison for interpolated observers, as a
+  /// share of how far normal operation is behind; see FaultBank. 0: none.
   double interpolation_allowance{0.0};
   /// α: a fault is isolated before t_k where the probability of a wrong name is
   /// less; see Episode::Proven(). 0: never before t_k.
@@ -209,7 +209,7 @@ struct ModelSet {
   double false_alarms_per_hour{kFalseAlarmsPerHour};
   /// The fitted physics of an onboarded valve, for simulation; else empty.
   std::vector<PhysicalValue> physics{};
-  /// What its models read as CV is the position X, and they have no X: see
+  /// Its models read the position X as CV, and have no X: see
   /// PositionAsCommand().
   bool position_as_command{false};
 };

@@ -10,7 +10,7 @@ struct InputRow {
   double p1_kpa;
   double p2_kpa;
   double t1_degc;
-  ValveMode mode{ValveMode::kAuto};  ///< Of the sample.
+  ValveMode mode{ValveMode::kAuto};  ///< During the sample.
 };
 
 /// One instant of a plant record: inputs and response of the valve.

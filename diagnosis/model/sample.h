@@ -59,7 +59,7 @@ std::string_view SignalName(Signal signal);
 std::string_view SignalUnit(Signal signal);
 /// Parses a signal name, ignoring case.
 std::optional<Signal> ParseSignal(std::string_view name);
-/// The physically possible readings of `signal`, for both flow units. Of kSp
+/// The physically possible readings of `signal`, for both flow units; for kSp,
 /// those in %: see IsPlausible().
 SignalRange PlausibleRange(Signal signal);
 
@@ -123,7 +123,7 @@ struct Sample {
 };
 
 /// Whether the reading of `signal`, which is present, is physically possible:
-/// in PlausibleRange(), or, of an SP beside a PV, in that of the PV.
+/// in PlausibleRange() or, for an SP beside a PV, in that of the PV.
 bool IsPlausible(const Sample& sample, Signal signal);
 
 /// A reading to be relied upon: there, plausible and not of quality BAD; else

@@ -57,8 +57,8 @@ struct Estimate {
 /// strength that is not finite counts as the smallest fault.
 Severity SeverityAt(const SeverityBands& bands, double strength);
 
-/// The severity of a fault that had `before`, and is estimated anew. It changes
-/// only where the whole interval says so: noise at the border of a band changes
+/// The severity of a fault that had `before`, from a new estimate. It changes
+/// only if the whole interval says so: noise at the border of a band changes
 /// nothing.
 Severity SeverityNow(const SeverityBands& bands, Severity before,
                      const Estimate& estimate);

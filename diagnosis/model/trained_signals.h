@@ -50,8 +50,8 @@ class TrainedSignals {
     mask_ = static_cast<SignalMask>(mask);
   }
 
-  /// The sample as the models read it. What engine, second look and scoring see
-  /// of a valve passes through here.
+  /// The sample as the models read it. The engine, the second look and scoring
+  /// see the samples of a valve only in this form.
   Sample Of(const Sample& measured) const {
     Sample sample =
         position_as_command_ ? PositionAsCommand(measured) : measured;

@@ -28,8 +28,8 @@ double LogMembership(const FuzzySet& set, double x) {
   return -0.5 * z * z;
 }
 
-// −½ ‖L (x − v)‖²; 0 for a rule without a center. Of row i of L, only the i + 1
-// entries up to the diagonal are stored.
+// −½ ‖L (x − v)‖²; 0 for a rule without a center. Row i of L stores only its
+// i + 1 entries up to the diagonal.
 double LogNearness(const TsRule& rule, const double* x) {
   const double* entry = rule.metric.data();
   double squares = 0.0;

@@ -48,7 +48,7 @@ struct TsRule {
   std::vector<double> slopes;         ///< a_i, one per regressor.
   double intercept{0.0};              ///< b_i [unit of the output].
   double data_share{0.0};        ///< Share of the training data, sums to 1.
-  std::vector<double> center{};  ///< v_i, of the first regressors; or empty.
+  std::vector<double> center{};  ///< v_i, for the first regressors; or empty.
   /// L_i, lower triangular, row by row [1/unit of the regressor]; one row per
   /// entry of the center. L_iᵀL_i is the inverse covariance of the cluster.
   std::vector<double> metric{};

@@ -24,7 +24,7 @@ constexpr double kLeastDeviations = 0.25;
 constexpr double kOnTop = 2.0;
 // Between a small fault (.25) and a medium one (.5).
 constexpr double kMedium = 0.375;
-// Of the evidence; what took hours may wait for a name.
+// In evidence windows: a fault that took hours may wait for a name.
 constexpr double kMemories = 8.0;
 
 double StepSquares(std::span<const double> y, double sum, double square) {
@@ -177,7 +177,7 @@ DriftWatch::DriftWatch(const ModelSet& models)
   }
   least_ = kLeastDeviations *
            models.observers.front().channels[channel_].residual_sd;
-  // What looks normal is no explanation.
+  // Undetectable faults look normal, so they explain nothing.
   for (std::size_t i = 0; i < models.faults.size(); ++i) {
     const int fault = models.faults[i];
     faults_ |= IsFault(fault) && !Contains(models.undetectable, fault)

@@ -55,15 +55,15 @@ void AddDriftFinding(ModelSet& models);
 /// By its form it can be a fault of the actuator or the transmitter, so what
 /// counts is how it came and how far: X alone deviates when it is detected, it
 /// had grown over hours before, and no fault of medium size is left to explain
-/// it. Then it is said, and no fault is named. So is what grows over hours and
-/// is beyond no limit yet.
+/// it. Then the drift is reported, and no fault is named. Growth over hours
+/// that exceeds no limit yet is reported, too.
 class DriftWatch {
  public:
   /// `models` must outlive it. It watches sets that list the finding.
   explicit DriftWatch(const ModelSet& models);
   bool watches() const { return watches_; }
 
-  /// What was before does not count.
+  /// Forgets all earlier samples.
   void Restart();
 
   /// A judged sample.

@@ -53,7 +53,7 @@ void FitWindow::Add(const Entry& entry, int sign, Sums& sums) {
   }
 }
 
-// What is taken off has the bits that were added: the ring holds what counts.
+// The ring holds the values that were added, so the same bits are taken off.
 void FitWindow::Push(std::span<const double> z, std::span<const double> u) {
   static const double kMost = std::sqrt(kMaxSquaredDistance);
   Entry* row = &ring_[static_cast<std::size_t>(next_) * channels_];

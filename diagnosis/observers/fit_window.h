@@ -37,7 +37,7 @@ class FitWindow {
   bool full() const { return filled_ == length_; }
 
   /// How far beyond its limits m or q of a channel is: 1 at a limit, 0 where
-  /// nothing is known. Of fewer than t_k samples the limits are wider.
+  /// nothing is known. With fewer than t_k samples the limits are wider.
   double Excess(std::size_t channel, const FitBounds& limits) const;
 
   /// m; NaN where the channel says nothing.
@@ -78,10 +78,10 @@ class FitWindow {
 /// 1, one whose effect is off by half 3/4.
 class AccountedShare {
  public:
-  static constexpr double kLeast = 0.5;      ///< Of one that explains,
+  static constexpr double kLeast = 0.5;      ///< For one that explains, and
   static constexpr double kLeastOwn = 0.75;  ///< in the data of its own fault.
 
-  /// What is gathered counts less from now on.
+  /// Reduces the weight of all samples so far.
   void Fade(double memory);
   void Push(double normal, double residual);
 

@@ -31,7 +31,7 @@ std::uint32_t SidesBeyond(const ChannelSpec& channel, double residual) {
 }  // namespace
 
 // An input that has no channel of its own, as a pressure of the paper's set,
-// shows in the channels that read it alone, so it is held out with them. The
+// shows only in the channels that read it, so it is held out with them. The
 // command is no transmitter, unless a position stands in its place.
 LoneReadings::LoneReadings(const ModelSet& models) : models_(&models) {
   SignalMask others = models.position_as_command ? 0 : MaskOf(Signal::kCv);
@@ -103,8 +103,8 @@ const Sample& LoneReadings::Step(ObserverBank& bank, const Sample& sample) {
   return judged_;
 }
 
-// Which of the sides that are held out the next reading confirms. Where it is
-// inside, the reading before was wrong.
+// The held-out sides that the next reading confirms. If that is inside the
+// limits, the reading before was wrong.
 LoneReadings::Sides LoneReadings::Confirmed(Sides held, std::int64_t stamp_ns) {
   const Sides read = held & ~Unread();
   const Sides confirmed = Beyond() & read;
@@ -160,7 +160,7 @@ bool LoneReadings::Doubted(Sides sides, std::int64_t stamp_ns) const {
   return false;
 }
 
-// The past gets back what was held out if the step was real.
+// The past gets back the held-out readings if the step was real.
 void LoneReadings::Judge(ObserverBank& bank, const Sample& sample, bool real) {
   for (std::size_t k = 0; k < held_count_; ++k) {
     const Sample& past = real ? last_held_[k].original : last_held_[k].judged;

@@ -24,7 +24,7 @@ namespace fdi {
 ///  2. It does not, or cannot be used: the reading stays out of the past of the
 ///     observers, their windows, and the floor.
 ///
-/// Detection counts the residual() of what is held out against the threshold,
+/// Detection counts the residual() of a held-out reading against the threshold,
 /// for n_d samples in a row, so an abrupt fault is detected as soon as ever.
 ///
 /// A channel that has had a wrong reading within a day has a loose wire, which
@@ -33,7 +33,7 @@ namespace fdi {
 /// third.
 ///
 /// Wrong readings are taken to be rare: a channel that has had more of them of
-/// late than kBurst passes all on, as its noise is what has changed.
+/// late than kBurst passes all on, as it is its noise that has changed.
 class LoneReadings {
  public:
   /// Twenty wrong readings an hour, at a sample a second, hardly ever (Poisson:
@@ -47,7 +47,7 @@ class LoneReadings {
   /// After the bank was initialised: there is no reading before.
   void Restart();
 
-  /// Which channels are doubted, and until when.
+  /// Saves which channels are doubted, and until when.
   void Save(SnapshotWriter& writer) const;
   /// @returns false, leaving it undefined, if there is nothing to be read.
   bool Restore(SnapshotReader& reader);

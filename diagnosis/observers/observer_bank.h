@@ -50,8 +50,8 @@ class ObserverBank {
   void Amend(int lag, const std::array<double, kSignalCount>& values,
              SignalMask uncertain);
 
-  /// Takes over what `bank`, of the same plan, has read of the last sample, and
-  /// which channels are active. SetPrediction() then says what is predicted.
+  /// Takes over the readings of the last sample from `bank`, of the same plan,
+  /// and which channels are active. SetPrediction() then sets the predictions.
   void TakeReadings(const ObserverBank& bank);
   void SetPrediction(int observer, int channel, double prediction,
                      double extrapolation);

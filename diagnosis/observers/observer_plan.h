@@ -79,7 +79,7 @@ struct ObserverBlock {
   Quad d;
   Quad rise;  ///< b − a
   Quad fall;  ///< d − c
-  Quad sd;    ///< Of the residual.
+  Quad sd;    ///< Deviation of the residual.
   Quad variance;
   Quad log_variance;
 };

@@ -28,7 +28,7 @@ struct LookRival {
   bool operator==(const LookRival&) const = default;
 };
 
-/// What the last second look at an episode made of it: the answer that counts,
+/// The result of the last second look at an episode: the answer that counts,
 /// and how the valve would have moved under the fault that explains it best.
 struct EpisodeLook {
   std::uint64_t episode_id{0};
@@ -39,7 +39,7 @@ struct EpisodeLook {
   double misfit{0.0};
   std::vector<LookFault> faults;     ///< Best first; none: no fault fits.
   std::optional<LookRival> rival{};  ///< Nothing: all faults are named.
-  std::vector<int> observers{};      ///< What the observers named then.
+  std::vector<int> observers{};      ///< Faults named by the observers then.
   std::vector<double> x_pct;         ///< Simulated position, a row each [%].
   std::vector<double> flow;          ///< Simulated flow, in the unit of F.
 

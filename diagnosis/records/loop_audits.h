@@ -15,7 +15,7 @@ struct LoopAudits {
     std::string verdict;  ///< loop::VerdictName()
     bool sure{false};
     std::string reason;
-    std::optional<double> band_pct{};  ///< Of stiction [% of OP].
+    std::optional<double> band_pct{};  ///< Stiction band [% of OP].
     std::int64_t start_ns{0};
     std::int64_t end_ns{0};
   };

@@ -4,7 +4,7 @@
 
 namespace fdi {
 
-/// Which valves a monitor takes, as published on the topic MonitorShare. At
+/// The valves that a monitor takes, as published on the topic MonitorShare. At
 /// most one monitor should take a valve.
 struct MonitorShare {
   std::string monitor;     ///< Unique name of the process, e.g. host:pid.

@@ -25,7 +25,7 @@ struct DataGap {
 struct CoverageDay {
   std::string valve_id;
   std::int64_t day{0};   ///< UTC, days since 1970-01-01.
-  double period_s{1.0};  ///< Of the samples.
+  double period_s{1.0};  ///< Between samples.
   QualityCount samples;
 };
 
@@ -34,10 +34,10 @@ struct Accumulator {
   std::string valve_id;
   std::uint64_t source_id{0};
   std::uint64_t model_hash{0};
-  std::int64_t stamp_ns{0};  ///< Of the last sample.
+  std::int64_t stamp_ns{0};  ///< Stamp of the last sample.
   std::vector<std::byte> bytes;
 };
-/// What a monitor stores for all valves every minute.
+/// State that a monitor stores for all valves every minute.
 struct Checkpoint {
   std::vector<CoverageDay> coverage;      ///< Since the last checkpoint.
   std::vector<Accumulator> accumulators;  ///< One per live valve.

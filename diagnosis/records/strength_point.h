@@ -15,9 +15,9 @@ struct StrengthPoint {
   double strength{0.0};            ///< Most likely; signed [-].
   double lowest{0.0};              ///< Ends of its 95 % interval [-].
   double highest{0.0};             ///<
-  Layer layer{Layer::kObservers};  ///< What estimated it.
-  /// Of the fault whose strength is that of the episode: how bad the episode is
-  /// by now. Not part of the curve.
+  Layer layer{Layer::kObservers};  ///< Layer that estimated it.
+  /// How bad the episode is by now; set for the fault whose strength is that of
+  /// the episode. Not part of the curve.
   std::optional<Severity> severity{};
 
   bool operator==(const StrengthPoint&) const = default;

@@ -12,7 +12,7 @@ namespace fdi {
 /// use this for GLOB, too.
 bool GlobMatches(std::string_view glob, std::string_view text);
 
-/// The pattern that the id of this valve alone matches: "V[1]" as a pattern
+/// A pattern that matches only the id of this valve: "V[1]" as a pattern
 /// matches "V1" and not itself.
 std::string GlobOf(std::string_view valve_id);
 
