@@ -340,7 +340,7 @@ std::vector<Regressor> ChooseRegressors(const ChannelPlan& plan,
   for (const std::vector<Regressor>& pool : plan.pools) {
     const std::vector<Regressor> candidates =
         Available(pool, plan.antecedents, normal);
-    // The antecedents alone will do where no pool adds to them.
+    // If no pool adds to the antecedents, they have to do by themselves.
     if (candidates.empty()) {
       best = best.empty() && !pool.empty() ? plan.antecedents : best;
       continue;

@@ -32,7 +32,7 @@ struct StructureStep {
 
 struct StructureSearchResult {
   std::vector<int> selected;         ///< Ascending indices.
-  double error{0.0};                 ///< Of `selected`.
+  double error{0.0};                 ///< With `selected`.
   std::vector<StructureStep> steps;  ///< In the order of adding.
   int evaluations{0};                ///< Calls of the criterion.
 };
@@ -48,7 +48,7 @@ StructureSearchResult SearchStructure(
     int num_candidates, const StructureCriterion& criterion,
     const StructureSearchOptions& options = {});
 
-/// What a residual channel may look like before its structure is searched.
+/// The form of a residual channel before its structure is searched.
 struct ChannelPlan {
   std::string name;
   Signal output{Signal::kX};
@@ -63,8 +63,8 @@ struct ChannelPlan {
   std::vector<int> rule_counts{};  ///< To try; empty: as FitOptions says.
   /// Fault observers are the normal one with other consequents (AdaptModel).
   bool adapted{false};
-  /// What a normal observer that runs on its own past may read, for difference
-  /// observers (FitNormalChannel); empty: it never does.
+  /// Regressors of a normal observer that runs on its own past, for difference
+  /// observers (FitNormalChannel); empty: there is no such observer.
   std::vector<std::vector<Regressor>> own_past{};
   /// Models that run on their own past are told apart by FreeRunError(), and
   /// ForgetsItsPast().

@@ -263,9 +263,9 @@ FuzzyPartition OneCluster(const MatrixXd& z) {
   return partition;
 }
 
-// Where no regressor varies, z is y alone, and clusters of it would have no
-// place in the space of the antecedents. The trivial partition would give the
-// same rule many times.
+// If no regressor varies, z is only y, and clusters of it would have no place
+// in the space of the antecedents. The trivial partition would give the same
+// rule many times.
 FuzzyPartition Cluster(const MatrixXd& z, const TakagiSugenoOptions& options) {
   if (options.num_rules == 1 || z.cols() == 1) {
     return OneCluster(z);

@@ -49,11 +49,11 @@ std::vector<std::vector<FuzzySet>> ProjectAntecedents(
 
 /// The clusters of Z = [X, y], from which the antecedents of rules are made.
 struct RuleClusters {
-  std::vector<Eigen::Index> columns;  ///< Of X in Z, ascending; they vary.
+  std::vector<Eigen::Index> columns;  ///< Columns of X in Z, ascending.
   Eigen::MatrixXd z;  ///< Z scaled to mean 0 and variance 1, N×(m+1) [-].
-  Eigen::RowVectorXd mean;       ///< Of the columns of Z; their units.
+  Eigen::RowVectorXd mean;       ///< Means of the columns of Z; their units.
   Eigen::RowVectorXd deviation;  ///< Likewise.
-  FuzzyPartition partition;      ///< Of z; one cluster has no covariances.
+  FuzzyPartition partition;      ///< Over z; one cluster has no covariances.
 };
 
 /// @throws std::invalid_argument as FitTakagiSugeno() does.
@@ -80,7 +80,7 @@ class KnownClusters {
   std::vector<Known> known_;
 };
 
-/// One rule per cluster, with antecedents alone.
+/// One rule per cluster, with antecedents only.
 std::vector<TsRule> RuleAntecedents(const RegressionData& data,
                                     const RuleClusters& clusters,
                                     AntecedentKind kind);

@@ -23,7 +23,7 @@ TrainingRun AtPosition(TrainingRun run);
 struct Stretch {
   std::string run_id;
   std::vector<Sample> samples;
-  /// Of the fault, one per sample; empty in normal operation.
+  /// Strengths of the fault, one per sample; empty in normal operation.
   std::vector<double> strengths{};
 };
 

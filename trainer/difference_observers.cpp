@@ -24,7 +24,7 @@ constexpr double kMinPosition = 0.0;  // ends of the position transmitter [%]
 constexpr double kMaxPosition = 100.0;
 
 // The plan of a normal model that runs on its own past.
-// The only pool holds the antecedents alone, so that ChooseRegressors() has
+// The only pool holds just the antecedents, so that ChooseRegressors() has
 // nothing to search.
 ChannelPlan OwnPastPlan(const ChannelPlan& plan,
                         const std::vector<Regressor>& regressors) {
@@ -61,8 +61,8 @@ std::vector<std::vector<double>> PredictAll(
   return predictions;
 }
 
-// What the fault makes of a reading without the background of the valve;
-// readings at a limit stay.
+// A reading with the fault, cleared of the background of the valve; readings at
+// a limit stay.
 //
 //     F_i ŷ_0/F,   X_i − (X − ŷ_0),
 //
@@ -116,7 +116,7 @@ Condition Targets(const NormalChannel& channel,
 
 // The rules of `inputs` without anything to say.
 // A difference is not a reading, so no limit of a transmitter applies to it.
-// Its output range is 0 alone; AdaptModel() widens it to what the targets need.
+// Its output range is [0, 0]; AdaptModel() widens it as the targets require.
 TsModel ZeroEffect(TsModel inputs) {
   for (TsRule& rule : inputs.rules) {
     rule.intercept = 0.0;
@@ -158,7 +158,7 @@ Readings RunObserver(const NormalChannel& channel, const TsModel& model,
   return readings;
 }
 
-// What δ_i or ŷ_i is adapted from.
+// The model from which δ_i or ŷ_i is adapted.
 TsModel Base(const NormalChannel& channel) {
   return channel.difference ? ZeroEffect(channel.inputs) : channel.inputs;
 }
@@ -345,7 +345,7 @@ ModelSet Describe(const std::vector<TrainingRun>& healthy,
   return models;
 }
 
-// What the healthy runs give: the stretches that faults are put onto, and the
+// Results of the healthy runs: the stretches that faults are put onto, and the
 // models of every channel.
 struct Healthy {
   Condition normal;
@@ -405,7 +405,7 @@ void FitLimits(const Healthy& healthy, const NormalResiduals& held_out,
   BalanceThresholds(models);
 }
 
-// What a fault, by its index, makes of Healthy::stretches.
+// Healthy::stretches with a fault in force, given by its index.
 using FaultySource = std::function<std::vector<Stretch>(std::size_t)>;
 
 // Fits the observer of every fault. Returns the data on which faults are
@@ -415,8 +415,8 @@ std::vector<Condition> FitFaults(const Healthy& healthy,
                                  const FaultySource& faulty_by,
                                  const TrainingOptions& options,
                                  Reporter& reporter, ModelSet& models) {
-  // A task writes the observer and the entry of `compared` of its own fault
-  // alone. All tasks read the normal observer, which is complete by now.
+  // A task writes only the observer and the entry of `compared` of its own
+  // fault. All tasks read the normal observer, which is complete by now.
   std::vector<Condition> compared(faults.size() + 1);
   compared.front() = healthy.normal;
   std::atomic<int> done{0};
@@ -494,7 +494,7 @@ ModelSet TrainDifferenceSet(const std::vector<TrainingRun>& healthy,
     simulated->healthy = fitted.stretches;
     simulated->faulty.resize(faults.size());
   }
-  // Each fault is asked for once, and writes its own entry alone.
+  // Each fault is asked for once, and writes only its own entry.
   const auto faulty_by = [&](std::size_t i) {
     std::vector<Stretch> faulty =
         Synthesize(faults[i], fitted.stretches, synthesize);
@@ -575,7 +575,7 @@ double ShareWithin(const ValidityRegion& region,
   return inside / std::max(1.0, all);
 }
 
-// The normal models of the type, fitted anew.
+// The normal models of the type, fitted to the new runs.
 // Stretches and adaptations stay empty: no fault is simulated or fitted.
 Healthy RefitHealthy(const ModelSet& of_type,
                      const std::vector<TrainingRun>& runs,
@@ -599,7 +599,7 @@ Healthy RefitHealthy(const ModelSet& of_type,
   return healthy;
 }
 
-// What a fault adds to the normal model with the same antecedents.
+// The effect of a fault relative to the normal model of the same antecedents.
 // With common weights w_k(x) it is again a Takagi-Sugeno model,
 //
 //     Σ_k w_k (a_kᵀx + b_k) − Σ_k w_k (a_0kᵀx + b_0k)

@@ -94,7 +94,7 @@ ModelSet TrainDifferenceSet(const std::vector<TrainingRun>& healthy,
                             FaultyStretches* simulated = nullptr);
 
 /// A set of other runs of the same valve, to be scored on what these leave out:
-/// observers, limits and bounds are fitted anew. Regressors, numbers of rules
+/// observers, limits and bounds are fitted again. Regressors, numbers of rules
 /// and groups are those of `like`, and nothing is simulated.
 ///
 /// @param like By TrainDifferenceSet() with the same faults and options.

@@ -91,7 +91,7 @@ Indication IndicationOf(const ModelSet& models, const Verdict& verdict,
 Wording WordingOf(const ModelSet& models, const Verdict& verdict,
                   const std::vector<int>& faults, Layer layer);
 
-/// Called for every sample with what the engine said about it.
+/// Called for every sample with the verdict of the engine.
 using VerdictSink = std::function<void(const Sample&, const Verdict&)>;
 
 /// Runs the monitor's own engine over a stored run. The truth is kept beside

@@ -137,7 +137,7 @@ double Sustained(const std::vector<double>& values, int length) {
 }
 
 // Runs the rods of Floor over the record. Both sides count separately, as they
-// do there: a deviation that changes its sign begins anew.
+// do there: a deviation that changes its sign starts over.
 void FitDeviation(const std::vector<Stretch>& stretches, FloorLimits& floor) {
   double most = 0.0;
   double repeated = 0.0;  // travel of the slow rod while X repeats
@@ -285,7 +285,7 @@ void FitFlowFactors(const std::vector<Stretch>& stretches, FloorLimits& floor) {
       const double flow =
           sample[Signal::kF] - floor.flow_margin * floor.flow_high;
       ratios.push_back(least > 0.0 ? flow / least : 0.0);
-      // Of a shut valve, Floor does not test for too little flow.
+      // Floor does not test a shut valve for too little flow.
       shortfalls.push_back(
           IsShut(x, sample[Signal::kCv])
               ? 0.0

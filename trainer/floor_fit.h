@@ -12,7 +12,7 @@ namespace fdi::trainer {
 /// explain X nearly as well as the best one, the law of the flow, and margins
 /// of twice what they err by on these very data, within fixed bounds.
 ///
-/// @param flow_shape that of FloorLimits; the gain alone is fitted then.
+/// @param flow_shape as in FloorLimits; then only the gain is fitted.
 /// @return Nothing without CV and one of X, F.
 std::optional<FloorLimits> FitFloor(const Condition& normal, double period_s,
                                     std::vector<double> flow_shape = {});

@@ -159,7 +159,7 @@ class Iteration {
       }
       const double change = UpdateMemberships();
       ++result.iterations;
-      // What random memberships lead to first is close to the trivial
+      // Random memberships first lead to a point close to the trivial
       // partition, where every μ is 1/c. That is a fixed point, and the first
       // steps away from it can be smaller than the tolerance.
       result.converged = change < options_.tolerance &&

@@ -19,7 +19,7 @@ struct GustafsonKesselOptions {
   double max_condition{1e12};     ///< β ≥ 1, bound on cond(Fᵢ) [-].
   int num_starts{3};              ///< ≥ 1; the start with the lowest J wins.
   int coarse_points{500};         ///< For choosing a start; 0: all points.
-  int seed{1};                    ///< Of the first random start; >= 0.
+  int seed{1};                    ///< For the first random start; >= 0.
 };
 
 /// A fuzzy partition of N points in n dimensions into c clusters.
@@ -28,7 +28,7 @@ struct FuzzyPartition {
   Eigen::MatrixXd centers;                   ///< V, c×n; units of the data.
   std::vector<Eigen::MatrixXd> covariances;  ///< F₁…F_c, each n×n, s.p.d.
   double objective{0.0};                     ///< J(U, V).
-  int iterations{0};                         ///< Of the start that won.
+  int iterations{0};                         ///< In the start that won.
   bool converged{false};  ///< False if max_iterations came first.
   bool separated{false};  ///< False if every start fell onto the trivial
                           ///< partition: no μ exceeds 1/c by 0.1.
@@ -76,7 +76,7 @@ FuzzyPartition FitGustafsonKessel(
 /// @param columns m regressors among those of the rule, ascending.
 /// @param center v, m; in the units of the regressors.
 /// @param covariance F, m×m, s.p.d.
-/// @param num_regressors n ≥ m, of the rule.
+/// @param num_regressors n ≥ m, in the rule.
 /// @throws std::invalid_argument if sizes differ or F is not s.p.d.
 void PlaceByDistance(const std::vector<Eigen::Index>& columns,
                      const Eigen::Ref<const Eigen::VectorXd>& center,

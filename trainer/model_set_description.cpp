@@ -28,8 +28,8 @@ constexpr int kStuckFactor = 10;
 constexpr int kStuckMargin = 60;  // samples
 constexpr double kNoFlow = 0.02;  // of the largest flow
 // As many as the observers take to settle, and as the shortest window has: of a
-// command that was seen less often no mean of residuals was, and a model has
-// it from the side. Of short data no more than what counts as rare elsewhere.
+// command that was seen less often there is no mean of residuals, and models
+// know it only from neighbours. For short data, a share that counts as rare.
 constexpr std::size_t kFewSamples = 30;
 constexpr double kFewShare = 0.02;
 
@@ -47,7 +47,7 @@ void ForEach(const std::vector<Stretch>& stretches, Visit visit) {
   }
 }
 
-// Of `value(sample)` over all samples; empty without any.
+// The range of `value(sample)` over all samples; empty without any.
 template <typename Value>
 SignalRange RangeOf(const Condition& condition, Value value) {
   SignalRange range = kEmpty;

@@ -109,8 +109,8 @@ MatrixXd Design(const MatrixXd& weights, const MatrixXd& x,
   return design;
 }
 
-// What the penalties and folds make of the rows of a condition: everything but
-// the targets.
+// The part of the least-squares systems of a condition, by penalty and fold,
+// that does not depend on the targets.
 struct Systems {
   std::vector<VectorXd> uses;                 // per fold: 1 where a row counts
   std::vector<std::vector<Index>> members;    // per fold: where it is 0
@@ -118,12 +118,12 @@ struct Systems {
   std::vector<Eigen::LLT<MatrixXd>> factors;  // per penalty: per fold
   MatrixXd all;                               // DᵀD, lower triangle
 
-  // Of all rows: of one penalty alone it is needed.
+  // For all rows: needed for a single penalty only.
   Eigen::LLT<MatrixXd> Whole(double penalty) const {
     return Penalized(all, penalty);
   }
 
-  // Eigen's LLT reads the lower triangle alone.
+  // Eigen's LLT reads only the lower triangle.
   static Eigen::LLT<MatrixXd> Penalized(MatrixXd gram, double penalty) {
     gram.diagonal().array() += penalty;
     return Eigen::LLT<MatrixXd>(gram);
@@ -131,8 +131,8 @@ struct Systems {
 };
 
 // Forming DᵀD costs N p² for N rows and p columns. It is done once for the rows
-// of each fold; sums of these serve the folds and the whole, and λ adds to the
-// diagonal alone, so that all factors share the work.
+// of each fold; sums of these serve the folds and the whole, and λ is added
+// only to the diagonal, so that all factors share the work.
 Systems Factorize(const MatrixXd& design, const std::vector<int>& folds) {
   Systems systems;
   // Lower triangles; of the rows of each fold, then of those that it uses.
@@ -171,7 +171,7 @@ Systems Factorize(const MatrixXd& design, const std::vector<int>& folds) {
   return systems;
 }
 
-// What a model is fitted to.
+// The targets that a model is fitted to.
 struct Target {
   VectorXd y;
   bool censored{false};          // Some y are at the limit.

@@ -11,8 +11,8 @@ namespace fdi::trainer {
 /// A model of a fault condition and its errors on data it was not fitted to.
 struct AdaptedModel {
   TsModel model;
-  std::vector<double> residuals;  ///< Of the folds left out, in order of time.
-  std::vector<double> outputs;    ///< That they belong to.
+  std::vector<double> residuals;  ///< In the folds left out, in order of time.
+  std::vector<double> outputs;    ///< Outputs that they belong to.
 };
 
 /// Adapts the normal model of a channel to a fault condition: the antecedents
@@ -37,9 +37,9 @@ struct AdaptedModel {
 /// @throws DataError if the condition has fewer than 20 samples.
 AdaptedModel AdaptModel(const TsModel& normal, const Condition& condition);
 
-/// AdaptModel() for conditions that differ in their outputs alone, as those of
-/// faults that leave the inputs as they are: what depends on the regressors is
-/// computed once. Fit() may be called from several threads.
+/// AdaptModel() for conditions that differ only in their outputs, as those of
+/// faults that leave the inputs as they are: everything that depends on the
+/// regressors is computed once. Fit() may be called from several threads.
 class Adaptation {
  public:
   /// @throws As AdaptModel().

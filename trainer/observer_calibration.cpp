@@ -93,8 +93,8 @@ struct Fold {
   std::vector<Stretch> beyond;  // As `block`, see MarkBeyond().
 };
 
-// What the rest of the record never did says nothing of models of that rest:
-// there they extrapolate, for which Detection makes an allowance of its own.
+// Commands that the rest of the record never had say nothing of models of that
+// rest: there they extrapolate, for which Detection has its own allowance.
 // Samples whose model reads such a command, up to `lag` before, count in
 // `beyond`, all others in `block`, where they are few as in WithoutStops();
 // else they are how the valve works.
@@ -139,7 +139,7 @@ void MarkBeyond(int lag, Fold& fold) {
   }
 }
 
-// Every kFolds-th stretch and the others; of few stretches block f of kFolds of
+// Every kFolds-th stretch and the others; if they are few, block f of kFolds of
 // each, and the rest of it.
 // A block that is left out cuts the rest of its stretch in two, so that no lag
 // reaches across it. FitChannel() needs validation data to choose the kind of
@@ -174,7 +174,7 @@ Fold MakeFold(const Condition& normal, int fold, int lag) {
   return result;
 }
 
-// Of channel c and fold f at c · kFolds + f.
+// The series of channel c and fold f are at c · kFolds + f.
 std::vector<ResidualSeries> JoinedFolds(
     const std::vector<ResidualSeries>& parts) {
   std::vector<ResidualSeries> joined(parts.size() / kFolds);
@@ -193,7 +193,7 @@ NormalResiduals CrossValidate(const Condition& normal, const Observer& chosen,
   const std::size_t channels = plans.size();
   std::vector<ResidualSeries> residuals(channels * kFolds);
   std::vector<ResidualSeries> commands(channels * kFolds);
-  // One task for each channel and fold, which writes its own two entries alone.
+  // One task for each channel and fold, which writes only its own two entries.
   // Regressors and number of rules stay those of `chosen`, so that the
   // residuals are those of a model of the same structure.
   ParallelFor(static_cast<int>(residuals.size()), threads, [&](int i) {
@@ -259,8 +259,8 @@ ModelSet Frame(ModelSet& models) {
   return frame;
 }
 
-// The set with some of its observers alone, normal first: what the others
-// predict takes the same time and is not asked for.
+// The set with only some of its observers, normal first: predicting the others
+// would take the same time again, to no use.
 ModelSet WithObservers(const ModelSet& frame,
                        const std::vector<Observer>& observers,
                        const std::vector<int>& chosen) {
@@ -423,8 +423,8 @@ void ScoreStretch(const Stretch& stretch,
 void FitInterpolationErrors(const std::vector<Condition>& conditions,
                             int threads, ModelSet& models) {
   const ModelSet frame = Frame(models);
-  // A task reads and writes the observers of its own fault and direction alone,
-  // but for the normal one, which stays.
+  // A task reads and writes only the observers of its own fault and direction,
+  // and reads the normal one, which stays.
   ParallelFor(
       2 * static_cast<int>(models.faults.size()), threads, [&](int task) {
         const int fault = models.faults[static_cast<std::size_t>(task / 2)];
@@ -505,7 +505,7 @@ std::vector<FitBlocks> BlocksOf(
   return blocks;
 }
 
-// What one more block is beyond with probability `share`.
+// The value that one more block exceeds with probability `share`.
 double BlockReach(const std::vector<double>& values, double share) {
   const auto n = static_cast<double>(values.size());
   return StudentQuantile(1.0 - share, n - 1.0) *

@@ -12,7 +12,7 @@ namespace fdi::trainer {
 
 /// Least deviation of a residual that counts as noise [unit of the output].
 inline constexpr double kMinSd = 1e-6;
-/// Least deviation of a fault observer's residual, of the normal one's.
+/// Least deviation of a fault observer's residual, as a share of the normal.
 inline constexpr double kMinDeviation = 0.2;
 
 /// A channel of an observer from the residuals of its model on data it was not
@@ -25,7 +25,7 @@ ChannelObserver CalibrateChannel(TsModel model,
                                  std::span<const double> residuals,
                                  std::span<const double> outputs, double least);
 
-/// The same by the residuals of the validation stretches, of all stretches
+/// The same by the residuals of the validation stretches, or of all stretches
 /// where those are too short to tell anything.
 ChannelObserver CalibrateOn(TsModel model, const Condition& condition,
                             int settling, double least);
@@ -87,7 +87,7 @@ void SetFitBounds(const std::vector<Condition>& conditions, int threads,
 void SetAccounting(const std::vector<Condition>& conditions, int threads,
                    ModelSet& models);
 
-/// Of P1, P2 and T1, those outside normal operation in 95 % of the validation
+/// The inputs (P1, P2, T1) outside normal operation in 95 % of the validation
 /// samples: Observer::moved.
 SignalMask MovedIn(const Condition& condition, const ModelSet& models);
 

@@ -136,7 +136,7 @@ void Run(const TsModel& model, const Stretch& stretch, int settling,
   }
 }
 
-// Of the samples that the residuals belong to.
+// Values of `signal` in the samples that the residuals belong to.
 std::vector<double> RunSignal(const TsModel& model, const Stretch& stretch,
                               int settling, Signal signal) {
   std::vector<double> values;
@@ -193,7 +193,7 @@ TsModel MakeModel(std::vector<TsRule> rules, const RegressionData& data,
   const double low = data.y.minCoeff();
   const double high = data.y.maxCoeff();
   // The limits keep a model that runs on its own predictions from running away.
-  // What a transmitter at its limit hides may be far beyond.
+  // A value hidden by a transmitter at its limit may be far beyond.
   const double reach = high >= data.saturation ? 2.0 : 0.5;
   const double margin = reach * (high - low) + 1e-9;
   model.output_min = low - margin;

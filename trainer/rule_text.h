@@ -17,7 +17,7 @@ std::string UnitOf(Signal signal, FlowUnit flow_unit);
 std::string RegressorText(const Regressor& regressor);
 
 /// "low [62.1..66.0 %]": the set of a rule on regressor `j`, where its
-/// membership is at least one half, within what the training data had; low,
+/// membership is at least one half, within the range of the training data; low,
 /// medium and high by its middle in thirds of that. Empty where it is nearly
 /// all of the data.
 std::string AntecedentWords(const TsModel& model, const TsRule& rule,

@@ -9,7 +9,7 @@ namespace fdi::trainer {
 double Mean(std::span<const double> values);
 /// About the mean, over N; 0 of no values.
 double Variance(std::span<const double> values);
-/// Of the values that are numbers; 0 if none is.
+/// Over the values that are numbers; 0 if none is.
 double MeanSquare(std::span<const double> values);
 /// Linear between the values; `sorted` must not be empty, q in [0, 1].
 double SortedQuantile(const std::vector<double>& sorted, double q);
@@ -35,7 +35,7 @@ SignTest CountSigns(const std::vector<double>& differences);
 ///
 ///     p = min(1, 2 Σ_{i ≤ min(n₊, n₋)} C(n, i) 2⁻ⁿ),   n = n₊ + n₋,
 ///
-/// 1 where no pair differs. Of detected or not, it is McNemar's exact test.
+/// 1 if no pair differs. For detected or not, it is McNemar's exact test.
 ///
 /// - [Dixon & Mood, 1946] "The statistical sign test", J. Am. Stat. Assoc.
 ///   41(236), pp. 557–566.

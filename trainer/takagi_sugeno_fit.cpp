@@ -109,8 +109,8 @@ VectorXd Solve(const MatrixXd& a, const VectorXd& b) {
   return decomposition.solve(b);
 }
 
-// Rule i alone, in standardized columns Xs. Centering on the weighted means
-// takes the intercept out of the system: it is what the means leave.
+// Rule i by itself, in standardized columns Xs. Centering on the weighted means
+// takes the intercept out of the system, as it follows from the means.
 //
 //     b = ȳ − aᵀx̄,   a = argmin Σₖ wₖ (yₖ − ȳ − aᵀ(xₖ − x̄))² + ridge W |a|²
 //

@@ -74,7 +74,7 @@ struct RegressionData {
 
 class KnownClusters;
 
-/// What tells the rules apart.
+/// How the rules are told apart.
 enum class AntecedentKind {
   kProjected,    ///< Sets on each regressor: readable; the default.
   kProductSpace  ///< The distance to the cluster: keeps oblique ones oblique.
@@ -89,7 +89,7 @@ struct TakagiSugenoOptions {
   /// Lower bound on the common factor on the widths; 1: leave them.
   double min_width_factor{0.3};
   /// Columns of X that the rules are told apart by; the others stand in the
-  /// consequents alone. Empty: all of them.
+  /// consequents only. Empty: all of them.
   std::vector<Eigen::Index> antecedents;
 };
 
@@ -132,10 +132,10 @@ struct RuleSelectionOptions {
   std::vector<int> counts;  ///< Numbers of rules to try instead of all between.
   bool both_methods{false};       ///< Try local and global consequents alike.
   bool both_antecedents{false};   ///< And both kinds of antecedents.
-  KnownClusters* known{nullptr};  ///< Of earlier fits, if there were any.
+  KnownClusters* known{nullptr};  ///< Those of earlier fits, if there were any.
 };
 
-/// What was tried with one number of rules.
+/// Result of a fit with one number of rules.
 struct RuleCount {
   int num_rules{0};
   AntecedentKind antecedents{AntecedentKind::kProjected};
@@ -151,8 +151,8 @@ struct RuleSelection {
 
 /// Chooses the number of rules: among those whose validation error is within
 /// `tolerance` of the lowest, the one with the smallest S(c) of Sugeno and
-/// Yasukawa; without a validation, the smallest S(c) alone. Of what is tried
-/// with one number of rules, what comes first: projected, local. Numbers that
+/// Yasukawa; without a validation, simply the smallest S(c). Among fits with
+/// one number of rules, ties go to the first: projected, local. Numbers that
 /// the rows of X do not suffice for are left out.
 ///
 /// @throws std::invalid_argument as FitTakagiSugeno() does, or if no number of

@@ -101,8 +101,8 @@ ModelSet TrainModelSet(const std::vector<TrainingRun>& runs,
                     "fitting " + models.observers[o].name);
   });
   reporter.Report(kStructureShare + kFitShare, "setting thresholds");
-  // Of data that the models were not fitted to: on its own data a model is
-  // better than it will ever be in service, and thresholds would be too close.
+  // Residuals on data that the models were not fitted to: on its own data a
+  // model is better than ever in service, and thresholds would be too close.
   const NormalResiduals normal_data =
       CrossValidate(conditions.front(), models.observers.front(),
                     options.channels, options.fit, options.threads);

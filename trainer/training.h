@@ -19,8 +19,8 @@ using Progress = std::function<void(double share, std::string_view stage)>;
 
 /// Everything that decides what comes out of a training.
 struct TrainingOptions {
-  std::string name;    ///< Of the model set.
-  std::string preset;  ///< That these options came from.
+  std::string name;    ///< Name of the model set.
+  std::string preset;  ///< Name of the preset they came from.
   std::vector<ChannelPlan> channels;
   DecisionParameters decision;
   DatasetOptions dataset;

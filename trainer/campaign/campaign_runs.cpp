@@ -102,7 +102,7 @@ class Collector {
         ids_(runs.size()) {}
 
   CollectedRuns Collect() {
-    // A campaign of recorded runs alone writes nothing.
+    // A campaign of only recorded runs writes nothing.
     const bool writes =
         std::any_of(runs_.begin(), runs_.end(), [](const CampaignRun& run) {
           return !std::holds_alternative<RecordedRun>(run.source);
@@ -271,8 +271,8 @@ class Collector {
   const CollectProgress& progress_;
   std::optional<storage::RunStore> store_;
   std::vector<RunInfo> known_;
-  std::vector<std::string> ids_;  // Of the runs of the campaign.
-  std::size_t at_{0};             // The run that is looked for.
+  std::vector<std::string> ids_;  // One per run of the campaign.
+  std::size_t at_{0};             // The run being looked for.
   std::vector<std::pair<std::size_t, importer::CsvTable>> files_;  // To import.
   std::vector<std::size_t> missing_;          // To simulate.
   std::map<std::string, std::size_t> first_;  // The first run, by content.

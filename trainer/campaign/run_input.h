@@ -28,7 +28,7 @@ SignalMask UsualSignals(const storage::StoredRun& run);
 
 /// The samples of a stored run that may be trained on: accepted in their time,
 /// mode AUTO, finite, of good quality, within what a transmitter reads, and
-/// with the signals that most samples of the run have. Of a run with truth, the
+/// with the signals that most samples of the run have. In a run with truth, the
 /// samples without one are left out unless `assume_normal`.
 TrainingRun ToTrainingRun(const storage::StoredRun& run, bool assume_normal);
 

@@ -86,7 +86,7 @@ std::string PeriodOf(const importer::CsvTable& table, bool utc) {
                    " s";
 }
 
-// The window of the row, of each of its files that has some of it.
+// The part of the row's window in each of its files that has some of it.
 std::vector<storage::StoredRun> ReadRuns(const PlantJob& job,
                                          const std::vector<RowText>& texts,
                                          bool as_loop, bool utc) {
@@ -126,8 +126,8 @@ std::vector<storage::StoredRun> ReadRuns(const PlantJob& job,
   return runs;
 }
 
-// The longest stretch in AUTO with what is judged, of which two hours count:
-// the last ones; and its period.
+// The longest stretch in AUTO with all judged signals, and its period. At most
+// its last two hours count.
 std::span<const storage::StoredSample> AuditedPart(
     const std::vector<storage::StoredRun>& runs, double& audited_period_s) {
   std::span<const storage::StoredSample> longest;

@@ -31,7 +31,7 @@ std::uint64_t InputHash(const PlantJob& job, const std::vector<RowText>& texts,
 std::vector<TrainingRun> ReadValve(const PlantJob& job,
                                    const std::vector<RowText>& texts, bool utc);
 
-/// What the audit says about the record of a loop, in one sentence.
+/// The verdict of the audit on the record of a loop, in one sentence.
 /// @param fits false: check what the record is, but do not judge the loop.
 /// @throws DataError, ConfigError if op, pv, sp or mode cannot be what the row
 ///   says, with what was seen and what to type.

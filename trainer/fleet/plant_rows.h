@@ -6,8 +6,8 @@
 namespace fdi::trainer {
 
 /// The loop as the table lists it, before its record is read.
-/// @param before states what the row leaves open of who it is; the service
-///   is of the table alone.
+/// @param before states the identity where the row leaves it open; the service
+///   is always that of the table.
 storage::PlantLoop LoopOf(const importer::PlantRow& row,
                           const ValveIdentity& before = {});
 /// The entry of its valve.

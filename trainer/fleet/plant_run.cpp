@@ -22,7 +22,7 @@
 
 // The rows are independent of each other. A first loop over them compares
 // fingerprints, because only the number of rows that are left tells how many
-// threads each of them may have; a second one does the work. What becomes of a
+// threads each of them may have; a second one does the work. The result of each
 // row is stored at once, so a run that is stopped loses only the rows that were
 // in work.
 namespace fdi::trainer {

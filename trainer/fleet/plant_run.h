@@ -16,11 +16,11 @@ struct PlantSettings {
   std::filesystem::path folder;  ///< That files and types of rows start from.
   int jobs{0};                   ///< Rows at a time; 0: one per core.
   bool utc{false};               ///< Messages show times in UTC.
-  OnboardingOptions onboarding;  ///< Of every row, but for name and type.
+  OnboardingOptions onboarding;  ///< For every row, except name and type.
   std::function<bool()> stop{};  ///< Asked often; any thread.
 };
 
-/// What became of a row.
+/// The result of a row.
 struct PlantOutcome {
   storage::PlantLoop loop;
   bool unchanged{false};    ///< As it was stored before.
@@ -47,7 +47,7 @@ std::vector<PlantOutcome> OnboardPlant(const std::vector<PlantJob>& jobs,
                                        const PlantSettings& settings,
                                        const PlantProgress& progress = {});
 
-/// What can be said about the rows without storing anything: each is read as
+/// Checks the rows without storing anything: each is read as
 /// far as `files` keep it, and its finding says what is wrong.
 /// @param store null: there is no models.db.
 std::vector<PlantOutcome> CheckPlant(const std::vector<PlantJob>& jobs,

@@ -14,8 +14,8 @@ namespace fdi::trainer {
 struct FoundType {
   ValveType type;
   bool stored{false};       ///< In models.db: made for this type, as it is.
-  std::string model_set{};  ///< Of the valve it was saved from, NAME@VERSION.
-  std::string set_hash{};   ///< Of its content; empty: not known.
+  std::string model_set{};  ///< Set of the valve it came from, NAME@VERSION.
+  std::string set_hash{};   ///< Content hash of that set; empty: not known.
 };
 
 /// The type called `name`: one stored in models.db, a shipped parameter set, or

@@ -10,8 +10,8 @@
 
 namespace fdi::trainer {
 
-/// What the set of a valve was onboarded from: with healthy hours beside it, it
-/// is made anew.
+/// The record that the set of a valve was onboarded from: with more healthy
+/// hours, the set is made again.
 struct FormerRecord {
   ValveType type;         ///< As it was fitted: where the fit starts.
   SignalMask signals{0};  ///< That the valve measures.
@@ -21,8 +21,8 @@ struct FormerRecord {
   std::vector<std::string> files;  ///< FILE[@from:to]
 };
 
-/// Runs that limits were set by are not among them: of these, the time around
-/// episodes is not known to be healthy. Neither is what labels taught of
+/// Runs that limits were set by are not among them, because the time around
+/// their episodes is not known to be healthy. Nor are lessons of labels about
 /// faults.
 ///
 /// @param labels with the set of the valve as the parent.

@@ -18,7 +18,7 @@ namespace {
 
 constexpr double kExcerptS = 900.0;
 
-// The normal observer alone: it needs no time for those of faults.
+// Only the normal observer: it needs no time for those of faults.
 std::shared_ptr<const ModelSet> NormalObserverOnly(const ModelSet& models) {
   ModelSet normal = models;
   normal.position_as_command = false;  // AddResiduals() has exchanged them.
@@ -51,9 +51,9 @@ class Reader {
         bank_(std::make_shared<const ObserverPlan>(*models)),
         coverage_(*models) {}
 
-  // What the engine says about `sample` tells whether it took it. Whether the
-  // valve would have been judged is asked anew, as without an alarm: while one
-  // is open the engine judges a valve wherever it is.
+  // The verdict of the engine tells whether it took `sample`. Whether the
+  // valve would have been judged is decided here, as without an alarm: during
+  // one, the engine judges a valve wherever it is.
   void Take(const Sample& sample, const Verdict& verdict) {
     if (OutOfOrder(verdict.intake)) {
       return;

@@ -12,7 +12,7 @@
 
 namespace fdi::trainer {
 
-/// What the normal observer erred by over samples in a row, one period apart,
+/// Errors of the normal observer over consecutive samples, one period apart,
 /// at which a valve without an alarm would have been judged.
 struct ResidualStretch {
   std::string run;  ///< As RunName() has it.
@@ -29,13 +29,13 @@ struct HealthyResiduals {
   QualityCount left_out;        ///< Samples that would not have been judged.
   std::int64_t samples{0};      ///< In the stretches.
   std::vector<Sample> excerpt;  ///< The end of the longest stretch, 15 min.
-  /// That of the set, as wide as the data ask for (WidenFloor): it judges at
-  /// every command in AUTO, so all samples count that the engine would take.
+  /// The floor of the set, as wide as the data ask for (WidenFloor): it judges
+  /// at every command in AUTO, so all samples that the engine would take count.
   std::optional<FloorLimits> floor{};
 };
 
 /// Runs the normal observer over the samples of a run as the engine does, and
-/// adds its residuals. The observer settles anew after every gap. Left out are
+/// adds its residuals. The observer settles again after every gap. Left out are
 /// samples that the engine would not take, and those at which the valve is
 /// outside of what the set covers, in another mode than AUTO, or settling.
 ///

@@ -108,8 +108,8 @@ std::vector<storage::Episode> EpisodesOf(
   return history ? history->List(filter) : std::vector<storage::Episode>();
 }
 
-// The episodes whose labels count. What has tuned limits since the observers
-// were made is only asked for from then on.
+// The episodes whose labels count. Those labelled false, which tune the limits
+// of an onboarded valve, count from the making of its observers on.
 std::vector<storage::Episode> LabelledOf(const RelearnRequest& request,
                                          const LabelPlan& plan) {
   std::vector<storage::Episode> labelled;
@@ -149,7 +149,7 @@ bool Contains(const std::vector<std::string>& words, const std::string& word) {
   return std::find(words.begin(), words.end(), word) != words.end();
 }
 
-// What the label of an episode says now that the parent has learnt from, or
+// The present label of an episode that the parent has learnt from, or
 // null.
 const LabelledEpisode* SameEpisode(const std::vector<LabelledEpisode>& read,
                                    const TrainingEpisode& before) {
@@ -173,7 +173,7 @@ void PlanRuns(const std::vector<std::string>& more,
               const std::filesystem::path& file, LabelPlan& plan) {
   std::set<std::string> replaced;
   for (const TrainingEpisode& before : plan.lineage.episodes) {
-    // What another label taught is forgotten even if the new one teaches
+    // Lessons of another label are forgotten even if the new one teaches
     // nothing. Under the same label the evidence outlives the trace.
     const LabelledEpisode* refused = SameEpisode(plan.refused, before);
     const bool withdrawn =
@@ -245,7 +245,7 @@ bool KeepsObservers(const storage::Lineage& lineage) {
          (settings.contains(kLimitsKey) || settings.contains(kTaughtKey));
 }
 
-// What tells the evidence of one label from that of another:
+// A name that tells the evidence of one label from that of another:
 // "episode 00c0ffee12345678 as f19 0.5".
 std::string EvidenceName(const TrainingEpisode& meaning) {
   std::string text =
@@ -470,7 +470,7 @@ int StoreEvidence(LabelPlan& plan, const storage::DataDirectory& directory,
 }
 
 // Episodes of the parent are handed down as long as their runs are used, unless
-// the same episode is learnt from anew.
+// the same episode is learnt from again.
 storage::Lineage LineageOf(const LabelPlan& plan) {
   storage::Lineage lineage;
   lineage.parent = storage::ParentSet{plan.parent->name, plan.parent->version,

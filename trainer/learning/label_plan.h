@@ -17,8 +17,8 @@
 
 namespace fdi::trainer {
 
-/// Keys of what the lineage of a relearnt set says of an onboarded valve: its
-/// models were made anew, its limits were set, labels taught it faults.
+/// Keys of the lineage of a relearnt set, about an onboarded valve: its models
+/// were made again, its limits were set, labels taught it faults.
 inline constexpr const char* kModelsKey = "models";
 inline constexpr const char* kLimitsKey = "limits";
 inline constexpr const char* kTaughtKey = "taught";
@@ -36,8 +36,8 @@ ModelSet FirstSet(const ModelSet& models, storage::ModelStore& store);
 
 /// The labels and healthy hours to learn from, as the user names them.
 struct RelearnRequest {
-  std::string valve;  ///< Its id. Of a set that several valves share: a glob.
-  std::optional<std::int64_t> from_ns{};  ///< Of recorded samples and episodes.
+  std::string valve;  ///< Its id; a glob if several valves share the set.
+  std::optional<std::int64_t> from_ns{};  ///< Limits on samples and episodes.
   std::optional<std::int64_t> to_ns{};
   /// ID[@from:to] of runs.db: healthy hours. For a set of `train`: runs to
   /// train on beside its own.
@@ -49,25 +49,25 @@ struct RelearnRequest {
 /// The lessons of labels, and the set to build on. Making a plan stores
 /// nothing.
 ///
-/// A set of `train` is trained anew, on its own runs and on the episodes. A set
+/// A set of `train` is trained again, on its own runs and the episodes. A set
 /// of onboarding learns each label by itself: episodes labelled false are
 /// healthy hours, and faults become observers (TeachFrom).
 struct LabelPlan {
   std::shared_ptr<const ModelSet> parent;
-  storage::Lineage lineage;  ///< Of the parent.
+  storage::Lineage lineage;  ///< Lineage of the parent.
   TrainingOptions training;  ///< As the parent was trained.
   /// All episodes of the valve, labelled or not, by detection.
   std::vector<storage::Episode> episodes;
   /// Recorded samples before do not count.
   std::int64_t since_ns{0};
-  /// Those of the parent, less the evidence of episodes that are read anew,
-  /// and those of the request.
+  /// The runs of the parent, without the evidence of episodes that are read
+  /// again, and those of the request.
   std::vector<std::string> runs;
   std::vector<std::string> missing;  ///< Runs of the parent not in runs.db.
   std::vector<LabelledEpisode> learnt;
   std::vector<LabelledEpisode> refused;
   /// The request names runs to train on, or a label says what the parent does
-  /// not know. Of a set of onboarding: a label that names a fault.
+  /// not know. For a set of onboarding: a label that names a fault.
   bool has_news{false};
 };
 
@@ -113,8 +113,8 @@ struct Teaching {
 Teaching TeachFrom(const LabelPlan& plan, const ModelSet& models,
                    const storage::DataDirectory& directory);
 
-/// What `models` calls the episode, with what went before it: the last set of
-/// faults, empty for none.
+/// The name that `models` gives the episode, with what went before it: the last
+/// set of faults, empty for none.
 std::vector<int> NameIn(const std::shared_ptr<const ModelSet>& models,
                         const LabelledEpisode& episode);
 

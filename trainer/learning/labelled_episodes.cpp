@@ -43,7 +43,7 @@ struct LabelReader::EpisodeSamples {
 
 namespace {
 
-// What a false alarm may reach back to before the detection. The engine needs
+// How far a false alarm may reach back before its detection. The engine needs
 // a part of it to settle.
 constexpr std::int64_t kLeadInNs = 1'800'000'000'000;
 constexpr double kSecondsPerNs = 1e-9;
@@ -247,7 +247,7 @@ LabelReader::TimeSpan LabelReader::SpanAround(const storage::Episode& episode) {
   for (const storage::Episode& other : history_.List(earlier)) {
     if (other.id != episode.id && other.detected_ns < episode.detected_ns) {
       // An earlier episode was not normal operation, unless it is labelled so
-      // itself, and then it teaches its own samples. Of one without an end only
+      // itself, and then it teaches its own samples. If it has no end, only
       // the detection is known.
       span.from_ns = std::max(span.from_ns,
                               other.ended_ns.value_or(other.detected_ns) + 1);
@@ -294,7 +294,7 @@ LabelReader::EpisodeSamples LabelReader::LoadSamples(
     try {
       storage::StoredRun run = store.Load(selector);
       span.Restrict(run.samples);
-      // `>=`: of equal numbers the recorded run is preferred to the trace.
+      // `>=`: at equal numbers the recorded run is preferred to the trace.
       if (!run.samples.empty() &&
           run.samples.size() >= best.run.samples.size()) {
         best = {std::move(run), selector};
@@ -336,7 +336,7 @@ void LabelReader::RequireSuited(const storage::StoredRun& run) const {
 
 double LabelReader::StrengthOf(const storage::Episode& episode, int fault,
                                const storage::StoredRun& run) const {
-  // What the user says comes first, then what was estimated live for this very
+  // A strength from the user comes first, then one estimated live for this very
   // fault, and only then an estimate of the engine.
   for (const auto& [id, strength] : strengths_) {
     if (episode.episode_id.starts_with(id)) {

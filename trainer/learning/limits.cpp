@@ -204,7 +204,7 @@ void WidenCommands(const ModelSet& fitted, ModelSet& models) {
   }
 }
 
-// What a limit becomes that was passed by `share`: wider.
+// The wider limit that replaces one exceeded by the factor `share`.
 double Loosened(LimitKind kind, double before, double fitted, double share) {
   // share = e^(log rms − limit) at the peak, so limit + ln share is the log rms
   // seen there, less what the motion of CV explains.
@@ -224,7 +224,7 @@ double Loosened(LimitKind kind, double before, double fitted, double share) {
 void Tighten(LimitKind kind, const WindowLimits* fitted_window, double fitted,
              WindowLimits* window, double& limit) {
   // The slope and the usual motion of CV belong to the limit on a deviation:
-  // the tail was fitted to what is left above their line.
+  // the tail was fitted to the excess above their line.
   if (kind == LimitKind::kDeviation && fitted < limit) {
     window->activity_slope = fitted_window->activity_slope;
     window->log_activity = fitted_window->log_activity;
@@ -369,12 +369,12 @@ void RequireHealthy(const ModelSet& first, const ModelSet& parent,
       "its models anew with these hours (--models)");
 }
 
-// On a valve that follows its normal model exactly, fault i alone makes the
+// On a valve that follows its normal model exactly, only fault i makes the
 // residual
 //
 //     r = y − ŷ_0 = ŷ_i − ŷ_0.
 //
-// Whether it passes a limit is asked of both sets in one run of the bank,
+// Both sets are asked whether it passes a limit in one run of the bank,
 // because they have the same observers.
 std::vector<CoverageChange> CompareVisibility(
     const ModelSet& before, const ModelSet& after,

@@ -12,7 +12,7 @@
 
 namespace fdi::trainer {
 
-/// What a limit of a channel holds.
+/// The quantity that a limit of a channel bounds.
 enum class LimitKind : std::uint8_t {
   kLower,      ///< The residual from below.
   kUpper,      ///< The residual from above.
@@ -36,7 +36,7 @@ std::string LimitText(const Limit& limit);
 
 /// How near some data come to a limit.
 struct Peak {
-  double share{0.0};  ///< Of the limit, for n_d samples; above 1: an alarm.
+  double share{0.0};  ///< Share of it for n_d samples; above 1: an alarm.
   std::string run{};  ///< Where that was.
   std::int64_t stamp_ns{0};
 };
@@ -47,10 +47,10 @@ std::vector<Peak> PeaksOf(const ModelSet& models, const HealthyResiduals& data);
 /// Fewer residuals of a channel say nothing of its limits.
 inline constexpr std::size_t kMinResiduals = 100;
 
-/// How the limits of a set came about anew.
+/// New limits of a set, and how they came about.
 struct NewLimits {
   ModelSet models;     ///< The parent with other limits; not stored yet.
-  double hours{0.0};   ///< Of healthy data.
+  double hours{0.0};   ///< Healthy data used.
   bool fitted{false};  ///< The data may also make limits closer.
 };
 
@@ -59,7 +59,7 @@ struct NewLimits {
 ///
 /// A limit that the data pass becomes the one that FitThresholds() gives for
 /// them, but at most 1.5 times what was seen, and that where too few data give
-/// one; the limit on a deviation then lies e^0.25 beyond what was seen. Of as
+/// one; the limit on a deviation then lies e^0.25 beyond what was seen. With as
 /// many hours as the parent's limits were made from, over at least 80 % of the
 /// commands that these hold for, every other limit becomes the one of
 /// FitThresholds() if that is closer; otherwise it stays.
@@ -80,9 +80,9 @@ inline constexpr double kMaxReachRatio = 2.0;
 void RequireHealthy(const ModelSet& first, const ModelSet& parent,
                     const std::vector<Peak>& peaks);
 
-/// The smallest strengths of each fault and direction whose effect alone passes
-/// a limit, as do all greater ones, by what the observers of the faults predict
-/// over `samples` beside the normal one. The strengths are those of the
+/// The smallest strengths of each fault and direction whose effect by itself
+/// passes a limit, as do all greater ones, by what the observers of the faults
+/// predict over `samples` beside the normal one. The strengths are those of the
 /// observers.
 std::vector<CoverageChange> CompareVisibility(
     const ModelSet& before, const ModelSet& after,

@@ -271,7 +271,7 @@ void CompareWithParent(const RelearnRequest& request,
                         result.alarms_after += second.indices.episodes;
                         result.hours += second.duration_s / 3600.0;
                       } catch (const DataError&) {
-                        // Of another period or without a signal: it suits
+                        // Another period or a missing signal: it suits
                         // neither set.
                       }
                     });
@@ -368,7 +368,7 @@ ModelSet StoreRelearned(Relearning& learnt, const std::string& valve,
   if (!activate || !IsOnboarded(models)) {
     return models;
   }
-  // AssignModelSet() alone would leave an onboarded valve without a baseline.
+  // With AssignModelSet() only, an onboarded valve would have no baseline.
   // Its parameters are the same, so the record of the onboarding is repeated
   // for the new set.
   const auto entry = store.FindValve(valve);

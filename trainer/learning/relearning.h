@@ -17,7 +17,7 @@
 namespace fdi::trainer {
 
 /// The answers of both sets to an episode that was learnt from: the faults that
-/// they name; of one labelled false "alarm" or "no alarm".
+/// they name; for one labelled false, "alarm" or "no alarm".
 struct EpisodeAnswers {
   std::string before;
   std::string after;
@@ -25,11 +25,11 @@ struct EpisodeAnswers {
 
 /// Two sets on the same healthy hours and labelled episodes.
 struct ParentComparison {
-  double hours{0.0};  ///< Of the healthy runs.
+  double hours{0.0};  ///< Length of the healthy runs.
   int alarms_before{0};
   int alarms_after{0};
   std::vector<EpisodeAnswers> episodes;  ///< Parallel to LabelPlan::learnt.
-  std::vector<std::string> worse;  ///< What the new set does worse; sentences.
+  std::vector<std::string> worse;  ///< Where the new set is worse; sentences.
 };
 
 /// The next version of a set, and how it compares with the one in use. Nothing
@@ -41,9 +41,9 @@ struct Relearning {
   std::vector<std::string> runs;    ///< Healthy ones that limits are set by.
   HealthyResiduals healthy;         ///< Without the samples of episodes.
   double episodes_left_out_s{0.0};  ///< With the time around them.
-  std::vector<Peak> peaks;          ///< Of all data, by LimitsOf(parent).
+  std::vector<Peak> peaks;          ///< Over all data, by LimitsOf(parent).
   std::optional<NewLimits> limits;  ///< Nothing: no healthy hours are known.
-  /// The models were made anew: what onboarding stores.
+  /// Set if the models were made again: the result that onboarding stores.
   std::optional<storage::ValveResult> anew;
   std::vector<TaughtObserver> taught;
   std::vector<CoverageChange> faults;  ///< Seen from another strength on.
@@ -63,8 +63,8 @@ std::vector<std::string> HealthyRuns(const RelearnRequest& request,
 /// Sets the limits of an onboarded valve by its healthy hours, HealthyRuns()
 /// and the files of the request. Healthy are their samples without those from
 /// 10 min before an episode of the valve was detected to its end and the
-/// clearing time t_c. What LabelReader reads of episodes that were labelled
-/// false counts as healthy, too.
+/// clearing time t_c. Samples that LabelReader reads from episodes labelled
+/// false count as healthy, too.
 ///
 /// Without healthy hours the limits stay, if there are labels to learn from.
 ///

@@ -60,7 +60,7 @@ double InterpolationError(const ModelSet& parent, const Lesson& lesson,
   return count > 1 ? largest : ChannelObserver{}.interpolation_error;
 }
 
-// What a channel of a fault that the parent does not know is adapted from: no
+// The base of a channel of a fault that the parent does not know: no
 // effect at all, by rules that do not read the channel's own past.
 ChannelObserver WithoutEffect(const ModelSet& parent, std::size_t c) {
   const ChannelObserver& normal = parent.observers.front().channels[c];
@@ -212,7 +212,7 @@ void RequireSamples(const Lesson& lesson, int settling) {
   }
 }
 
-// What noise could explain teaches nothing.
+// Refuses a lesson that noise could explain.
 void RequireEffect(const TaughtObserver& taught, double needed) {
   const double gain = taught.gain_over_normal;
   if (gain >= needed) {

@@ -15,10 +15,10 @@ struct Lesson {
   std::vector<Stretch> stretches;
 };
 
-/// What became of a lesson.
+/// The result of a lesson.
 struct TaughtObserver {
   Observer observer;         ///< Its name ends with kTaughtMark.
-  std::string adapted_from;  ///< Name of an observer; empty: of none.
+  std::string adapted_from;  ///< Name of an observer; empty: none.
   std::int64_t samples{0};
   /// How much better it explains the samples than normal operation, and than
   /// what it was adapted from: differences of log-likelihood, all on folds of
@@ -32,7 +32,7 @@ struct TaughtObserver {
 ///
 /// In every channel it is the parent's observer of the fault at the nearest
 /// strength in the same direction, with the consequents changed as little as
-/// the samples ask for (AdaptModel); of a fault that the parent does not know,
+/// the samples ask for (AdaptModel); for a fault that the parent does not know,
 /// the normal one. Deviation, membership and the limits of the fit are those on
 /// folds of the samples that were left out, but none is closer than the
 /// parent's: a window of minutes does not show another day.

@@ -49,7 +49,7 @@ TrainingRun RunWith(const FaultCondition& fault,
   return run;
 }
 
-// What the models of a part say of it as it is.
+// How the models judge a part without a fault.
 struct HealthyScore {
   std::optional<double> alarm_s;  // From when a fault would begin.
   double judged{1.0};             // Share of the samples after the first LIVE.
@@ -76,7 +76,7 @@ HealthyScore ScoreHealthy(const ScoredPart& part,
   return score;
 }
 
-// Of a fault at a strength, over all parts.
+// Score of a fault at a strength, over all parts.
 struct FaultScore {
   FaultCondition fault;
   bool detected{true};

@@ -12,7 +12,7 @@
 
 namespace fdi::trainer {
 
-/// What model sets make of one fault in one direction.
+/// How model sets detect and isolate one fault in one direction.
 struct FaultCoverage {
   int fault{0};
   bool negative{false};
@@ -28,8 +28,8 @@ struct CoverageTable {
   SignalMask signals{0};
   double seconds{0.0};  ///< That a fault was given to show.
   std::vector<FaultCoverage> faults;
-  int parts{1};    ///< Of healthy data that faults were put onto.
-  int alarmed{0};  ///< Of these, those with an alarm without a fault.
+  int parts{1};    ///< Healthy parts that faults were put onto.
+  int alarmed{0};  ///< Parts that have an alarm without a fault.
   /// Share of them that was within what the models know: the least of a part.
   double judged{1.0};
 };
@@ -65,7 +65,7 @@ struct RecordPart {
 };
 
 /// The two parts of a record that are left out in turn: its first and its last
-/// 600 samples; of a shorter record its halves.
+/// 600 samples, or the halves of a shorter record.
 /// @throws DataError where a half is too short for a fault to show.
 std::vector<RecordPart> PartsOf(const std::vector<Stretch>& stretches);
 
@@ -75,7 +75,7 @@ std::vector<TrainingRun> RunsWithout(const std::vector<TrainingRun>& runs,
 
 Stretch CutOut(const Stretch& stretch, const RecordPart& part);
 
-/// What is left of the stretches without `part`, of much of it four blocks of
+/// The rest of the stretches without `part`; of a long rest, four blocks of
 /// 300 samples; rests too short to tell anything are left out.
 FaultyStretches Without(const FaultyStretches& all, const RecordPart& part);
 

@@ -17,7 +17,7 @@ namespace {
 // beside its normal observer (kMaxObservers).
 constexpr std::array kStrengths{0.1, 0.25, 0.5, 0.75, 1.0};
 constexpr std::array kSignedStrengths{0.1, 0.25, 0.5, 0.75};
-// Of the span: faults of transmitters are steps.
+// Shares of the span: faults of transmitters are steps.
 constexpr std::array kTransmitterStrengths{0.02, 0.1, 0.5, 1.0};
 
 void Add(int fault, const auto& strengths, bool both_ways,
@@ -80,7 +80,7 @@ std::vector<Sample> Run(const simulator::ValveSimulationConfig& config) {
   return samples;
 }
 
-// F F_i/F_0, which is free of what the simulated Kv is off by. Where the
+// F F_i/F_0, which is free of the error of the simulated Kv. Where the
 // simulated healthy flow is close to 0, the ratio would amplify any error, and
 // F + F_i − F_0 takes its place.
 double FaultyFlow(const Transmitter& transmitter, double reading,

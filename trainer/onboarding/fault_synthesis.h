@@ -15,7 +15,7 @@
 
 namespace fdi::trainer {
 
-/// What valves of one type have in common: how faults act on them. A valve's
+/// The common features of valves of one type: how faults act on them. A valve's
 /// own baseline, its normal observer and background, stands apart.
 struct ValveType {
   std::string name;
@@ -32,8 +32,8 @@ struct ValveType {
 };
 
 /// Faults that onboarding prepares observers for, each at several strengths, by
-/// fault: those that are visible in `signals` and that `valve` can have. Of
-/// more than `most` those of 0.1 are left out, of the last faults first.
+/// fault: those that are visible in `signals` and that `valve` can have. Beyond
+/// `most` of them, those of 0.1 are left out, from the last faults on.
 std::vector<FaultCondition> OnboardingFaults(
     SignalMask signals, const simulator::ValveParameters& valve,
     std::size_t most = kMaxObservers - 1);
@@ -47,8 +47,8 @@ InputRow InputsOf(const Sample& sample, const InputRow& levels);
 ///
 ///     X + X_i − X_0,   F F_i/F_0,   P + P_i − P_0,   T + T_i − T_0,
 ///
-/// each kept within the range of its transmitter. What simulation and valve
-/// differ by is thus in the faulty samples as it is in the healthy ones. CV
+/// each kept within the range of its transmitter. Errors of the simulation are
+/// thus the same in the faulty samples as in the healthy ones. CV
 /// stays: the reaction of the control loop is left out. Only signals that the
 /// samples have are given back. Thread safe.
 class FaultSynthesizer {
@@ -66,7 +66,7 @@ class FaultSynthesizer {
   const ValveType& type() const { return type_; }
 
  private:
-  // What a fault that leaves the rod where it is makes of a simulation without.
+  // Applies a fault that leaves the rod in place to a simulation without it.
   std::vector<Sample> BehindRod(const FaultCondition& fault,
                                 std::vector<Sample> samples) const;
   std::vector<Sample> Simulate(const FaultCondition& fault,

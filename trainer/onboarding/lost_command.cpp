@@ -13,10 +13,10 @@ namespace {
 
 constexpr double kErrors = 3.0;  // standard errors
 constexpr std::size_t kParts = 20;
-// Of the delays -1, 0, 1 and 2 that identification tries.
+// Number of the delays that identification tries: -1, 0, 1 and 2.
 constexpr std::size_t kDelays = 4;
 
-// Of every sample that has them: commands[d] is that of d - 1 samples before.
+// All samples that have them: commands[d] is that of d - 1 samples before.
 struct Record {
   std::array<std::vector<double>, kDelays> commands;
   std::vector<double> x;

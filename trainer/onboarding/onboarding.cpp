@@ -189,7 +189,7 @@ Stretch LongestStretch(const std::vector<TrainingRun>& runs) {
   return longest;
 }
 
-// What cuts the record into pieces: missing readings, of which signal, or gaps.
+// Names what cuts the record into pieces: missing readings, by signal, or gaps.
 std::string Interruptions(const std::vector<TrainingRun>& runs) {
   std::array<std::size_t, kSignalCount> lacks{};
   std::size_t samples = 0;
@@ -333,7 +333,7 @@ std::pair<double, double> RangeOf(const std::vector<TrainingRun>& runs,
           SortedQuantile(readings, 1.0 - kBroken)};
 }
 
-constexpr double kUse = 0.8;  // Of the range of a transmitter.
+constexpr double kUse = 0.8;  // Share of the range of a transmitter.
 
 // Readings beyond the range of the type's transmitter would be held to it.
 void WidenRanges(const std::vector<TrainingRun>& runs,
@@ -366,7 +366,7 @@ void NarrowPressures(const std::vector<TrainingRun>& runs,
   }
 }
 
-// What stands for P1, P2 and T1 where they are not measured, beside those that
+// Substitutes for P1, P2 and T1 where they are not measured, beside those that
 // are: one pressure has the ratio of the type to the other, and a liquid does
 // not boil at it.
 InputRow LevelsOf(const std::vector<TrainingRun>& runs, const ValveType& type) {
@@ -430,7 +430,7 @@ std::vector<PhysicalValue> Physics(const ValveType& type,
       records));
 }
 
-// Of the readings of `output`, or of X − CV where that is what is compared.
+// For the readings of `output`, or for X − CV if that is compared.
 struct Moments {
   double mean{0.0};
   double square{0.0};
@@ -508,7 +508,7 @@ TrainingOptions TrainingOf(const OnboardingOptions& options,
   return training;
 }
 
-// Of the simulated record of a type: for the models, and to score them.
+// Lengths of the simulated record of a type: for the models, and to score them.
 constexpr std::size_t kTypeSamples = 1800;
 constexpr std::size_t kTypeUnseen = 1020;
 
@@ -577,7 +577,7 @@ std::vector<FaultCondition> FaultsOf(SignalMask signals,
   return faults;
 }
 
-// What coverage needs of an onboarding.
+// The parts of an onboarding that coverage needs.
 struct Scoring {
   const std::vector<TrainingRun>& runs;
   const std::vector<FaultCondition>& faults;
@@ -686,7 +686,7 @@ void TakeRangesOf(const std::vector<TrainingRun>& runs, bool resize,
 
 }  // namespace
 
-// What is refused is refused before the work that it would spoil:
+// Each check refuses the record before the work that it would spoil:
 //
 //   RequireHealthy   the record as given, and once more without its stops,
 //                    which may have cut its longest stretch short

@@ -14,7 +14,7 @@
 
 namespace fdi::trainer {
 
-/// The run as a valve gives it that measures `signals` alone.
+/// The run as a valve gives it that measures only `signals`.
 TrainingRun WithSignals(TrainingRun run, SignalMask signals);
 
 /// A healthy valve of the type in the feedwater loop, all transmitters there.
@@ -33,7 +33,7 @@ std::vector<std::string> DropUnreadChannels(
     const std::vector<TrainingRun>& runs, std::vector<ChannelPlan>& channels);
 
 struct OnboardingOptions {
-  std::string name;  ///< Of the model set.
+  std::string name;  ///< Name of the model set.
   ValveType type;    ///< Where the fit starts, or what is taken as it is.
   bool fit{true};    ///< Fit the physical parameters to the valve.
   double false_alarms_per_hour{kFalseAlarmsPerHour};
@@ -61,13 +61,13 @@ struct ChannelFit {
   double naive_rmse{0.0};  ///< [unit of the output]
   double seen_from{0.0};   ///< The least lasting change, either way, that is
                            ///< beyond a limit [unit of the output].
-  double mean{0.0};        ///< Of the output in the record [its unit].
+  double mean{0.0};        ///< Mean of the output in the record [its unit].
 };
 
 struct Onboarding {
   ModelSet models;
   ValveType type;    ///< With the parameters that the faults were simulated by.
-  double size{1.0};  ///< Of the valve, relative to the type that was given.
+  double size{1.0};  ///< Size of the valve relative to the given type.
   std::optional<simulator::ValveFit> fit;
   std::vector<ChannelFit> channels;
   std::vector<std::string> unread;  ///< Channels of DropUnreadChannels().
@@ -78,8 +78,8 @@ struct Onboarding {
   /// both have seen.
   std::optional<std::vector<CoverageChange>> changes;
   SignalMask signals{0};   ///< That the valve measures.
-  double hours{0.0};       ///< Of healthy data.
-  double left_out_s{0.0};  ///< Of them at a stop, or just after (WithoutStops).
+  double hours{0.0};       ///< Healthy data used.
+  double left_out_s{0.0};  ///< Time at a stop, or just after it (WithoutStops).
   bool transferred{false};  ///< OnboardingOptions::of_type served.
 };
 
@@ -88,7 +88,7 @@ struct Onboarding {
 /// at a stop in more than 5 % of the samples works there, and keeps them all.
 std::vector<TrainingRun> WithoutStops(std::vector<TrainingRun> runs);
 
-/// Makes a model set for a valve from healthy runs alone: fits the physical
+/// Makes a model set for a valve from healthy runs only: fits the physical
 /// parameters of the type to them, simulates every fault of OnboardingFaults()
 /// with the recorded inputs, and trains difference observers.
 ///
@@ -99,7 +99,7 @@ Onboarding Onboard(const std::vector<TrainingRun>& runs,
                    const OnboardingOptions& options,
                    const Progress& progress = {});
 
-/// The coverage that a valve of the type would have with `signals` alone: the
+/// The coverage that a valve of the type would have with only `signals`: the
 /// type is simulated healthy, and onboarded.
 CoverageTable AssessType(const ValveType& type, SignalMask signals,
                          const OnboardingOptions& options,

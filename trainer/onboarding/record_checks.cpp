@@ -73,7 +73,7 @@ void CheckShare(const Readings& r) {
   }
 }
 
-// What explains a P1 that is so low, or so low for T1, likeliest.
+// The likeliest explanation of a P1 that is so low, or so low for T1.
 std::string WhyLow(double p1_kpa, double t1_degc,
                    const simulator::Medium& medium) {
   constexpr double kKelvin = 273.15;
@@ -260,8 +260,8 @@ std::string SlowRecord(const std::vector<TrainingRun>& runs) {
                    "every second, or unfiltered values";
 }
 
-// What explains a flow that is not simulated: the flow meter of the type ends
-// before the readings do. Else empty.
+// Explains a flow that is not simulated: the flow meter of the type ends
+// before the readings do. Empty if it does not.
 std::string BeyondMeter(const std::vector<TrainingRun>& runs, const Readings& f,
                         double meter_end) {
   const auto beyond = std::ranges::count_if(

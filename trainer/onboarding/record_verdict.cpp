@@ -12,8 +12,8 @@ namespace fdi::trainer {
 namespace {
 
 constexpr double kLeastMinutes = 25.0;
-constexpr double kLeastSpan = 5.0;    // Of the command [%].
-constexpr double kLeastJudged = 0.5;  // Of a part of the record.
+constexpr double kLeastSpan = 5.0;    // Span of the command [%].
+constexpr double kLeastJudged = 0.5;  // Share of a part of the record.
 constexpr double kMostlyRead = 0.9;   // Below it, the readings are told.
 
 std::string Fixed(double value, int decimals) {
@@ -74,7 +74,7 @@ ReadHours ReadHoursOf(const std::vector<TrainingRun>& runs) {
   return read;
 }
 
-// What the record lacks as far as it shows in parts that were left out.
+// Shortcomings of the record that show in the parts that were left out.
 std::vector<std::string> LacksOf(const CoverageTable& coverage, double hours) {
   std::vector<std::string> lacks;
   if (coverage.judged < kLeastJudged) {

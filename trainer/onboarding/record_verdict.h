@@ -8,7 +8,7 @@
 
 namespace fdi::trainer {
 
-/// What a model set is worth that was made from a healthy record.
+/// The worth of a model set that was made from a healthy record.
 struct RecordVerdict {
   std::string word;      ///< "usable" or "thin"; what is neither is refused.
   std::string sentence;  ///< Begins with the word; says what is still needed.

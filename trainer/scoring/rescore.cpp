@@ -39,7 +39,7 @@ void RequireSuited(const ModelSet& models, const storage::StoredRun& run) {
   }
 }
 
-// Tells whether the samples alone made the live engine initialise itself. The
+// Tells whether the samples by themselves made the live engine initialise. The
 // recorder stores for each sample whether the engine did; a restart of the
 // monitor or an operator's command is a cause that only this mark shows.
 class InitialisationWatch {
@@ -90,7 +90,7 @@ void BackdateDetections(const Verdict& verdict, std::int64_t start_ns,
   }
 }
 
-// Those for growth are left out: they change no name.
+// Leaves out those for growth: they change no name.
 void TakeLooks(Decision& decision) {
   for (const LookTask& task : decision.TakeDue()) {
     if (task.occasion == LookOccasion::kGrowth) {

@@ -15,7 +15,7 @@ class App;
 
 namespace fdi::trainer {
 
-/// Which runs are scored, as the options of a verb name them.
+/// The runs to score, as the options of a verb name them.
 struct RunSelection {
   std::vector<std::string> runs;   ///< Stored, ID or ID@from:to.
   std::vector<std::string> files;  ///< FILE.csv or FILE.csv@from:to.
