@@ -12,7 +12,7 @@
 //   clock(source) = newest stamp + (now - last word),
 //
 // so that the instants after its last word become due, and are written without
-// what it said. A reading waits in its slot until its instant is written.
+// its readings. A reading waits in its slot until its instant is written.
 namespace fdi::importer {
 namespace {
 
@@ -197,8 +197,8 @@ std::optional<Assembler::Held> Assembler::HeldOf(
   return mode ? std::optional(held) : std::nullopt;
 }
 
-// By stamp. Of one instant only the newest reading counts, which bounds what
-// waits however many come.
+// Keeps readings by stamp. Only the newest one of an instant counts, which
+// bounds the number that wait, however many come.
 void Assembler::Keep(Slot& slot, const Held& held) const {
   auto at = slot.pending.end();
   while (at != slot.pending.begin() &&
@@ -297,8 +297,8 @@ void Assembler::BeginGap(std::size_t source, std::int64_t from_ns,
   }
 }
 
-// The clock of the source was set back. What it said before has stamps that
-// are yet to come, so the valves begin again with what it says now.
+// The clock of the source was set back. Its earlier readings have stamps that
+// are yet to come, so the valves start again with its present readings.
 void Assembler::RunBack(std::size_t index, std::int64_t stamp_ns) {
   Source& source = sources_[index];
   source.newest_ns = stamp_ns;

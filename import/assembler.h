@@ -48,7 +48,7 @@ struct TagReading {
 /// The time of a call, from the caller: the assembler has no clock.
 struct ArrivalTime {
   std::int64_t utc_ns{0};
-  std::int64_t steady_ns{0};  ///< Of a clock that never leaps.
+  std::int64_t steady_ns{0};  ///< On a clock that never leaps.
 };
 
 struct AssemblerOptions {
@@ -62,13 +62,13 @@ enum class Taken : std::uint8_t {
   kUnknownTag,
   kBadStamp,  ///< Before 2000, or more than an hour after its arrival.
   kLate,      ///< Older than what the samples already have.
-  kBadValue,  ///< Neither a number in range nor, of a mode, a known word.
+  kBadValue,  ///< No number in range and, for a mode, no known word.
 };
 
 /// An event of a source or tag that is no sample.
 struct AssemblyNote {
   enum class Kind : std::uint8_t {
-    kSourceSilent,  ///< What it said is no longer held.
+    kSourceSilent,  ///< Its last readings are no longer held.
     kSourceBack,
     kClockLeaps,  ///< Its stamps leap ahead: a gap.
     kClockBack,   ///< Its stamps run back: a gap.
@@ -76,17 +76,17 @@ struct AssemblyNote {
     kTagBack,
   };
   Kind kind{};
-  std::string name;       ///< Of the source or tag.
+  std::string name;       ///< Name of the source or tag.
   std::int64_t by_ns{0};  ///< How long it was silent; how far the clock moved.
 };
 
 /// Counts of a tag's readings since the start.
 struct TagCounts {
   std::uint64_t readings{0};
-  std::uint64_t bad{0};      ///< Of these: without a usable value or stamp.
-  std::uint64_t late{0};     ///< Of these: after their instant was written.
+  std::uint64_t bad{0};      ///< Those without a usable value or stamp.
+  std::uint64_t late{0};     ///< Those that came after their instant.
   std::uint64_t held{0};     ///< Instants for which an older reading stood.
-  std::int64_t stamp_ns{0};  ///< Of the newest reading; 0: none.
+  std::int64_t stamp_ns{0};  ///< Stamp of the newest reading; 0: none.
   bool silent{false};        ///< Nothing of it is held at present.
 };
 
@@ -104,8 +104,8 @@ struct TagCounts {
 ///   two periods or `lateness_ns` after its last word on. A source that never
 ///   says that it lives, and speaks at odd times, is given its own rhythm
 ///   (Silence()), a minute at most;
-/// - periodic: good for one and a half periods, then UNCERTAIN, as what a file
-///   is filled with, and missing beyond `max_age_ns`.
+/// - periodic: good for one and a half periods, then UNCERTAIN, as values that
+///   fill a file, and missing beyond `max_age_ns`.
 ///
 /// A valve without any signal is written three times, so that whoever judges it
 /// learns of it, and then not at all. One thread.
@@ -122,11 +122,11 @@ class Assembler {
   void Replace(std::vector<LiveValve> valves);
 
   Taken Take(const TagReading& reading, const ArrivalTime& now);
-  /// The source lives: what it has not mentioned is unchanged up to the stamp.
+  /// The source lives: tags not mentioned by it are unchanged up to the stamp.
   void Alive(std::string_view source, std::optional<std::int64_t> stamp_ns,
              const ArrivalTime& now);
-  /// The connection of the source is lost. What it said is not held, and has to
-  /// be said again afterwards.
+  /// The connection of the source is lost. Its readings are not held any more,
+  /// and have to be sent again afterwards.
   void End(std::string_view source);
 
   /// Writes the instants that are due.
@@ -161,7 +161,7 @@ class Assembler {
   };
   struct Held {
     std::int64_t stamp_ns{0};
-    double value{0.0};  // Of a mode its number.
+    double value{0.0};  // For a mode, its number.
     SignalQuality quality{SignalQuality::kGood};
     std::uint32_t connection{0};
   };

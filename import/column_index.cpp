@@ -12,8 +12,8 @@
 namespace fdi::importer {
 namespace {
 
-// Lines that show the form of a table; see kSampleRows of layout.cpp. What all
-// rows have to show (decimal sign, order of dates) is found for each loop.
+// Lines that show the form of a table; see kSampleRows of layout.cpp. Decimal
+// sign and order of dates, which need all rows, are found for each loop.
 constexpr std::size_t kHeadLines = 80;
 /// Bytes of the text and the index of a gzip.
 constexpr std::size_t kMaxPacked = 240U << 20U;
@@ -77,7 +77,7 @@ void ColumnIndex::FindForm(const ColumnMap& map) {
   form_.header_rows = layout.map.header_rows;
   form_.time_column = layout.map.time_column;
   if (form_.time_column.empty()) {
-    form_.time_column = kTimeColumn;  // Which FindLayout() need not say.
+    form_.time_column = kTimeColumn;  // FindLayout() need not set it.
   }
   form_.clock_column = layout.map.clock_column;
   form_.ms_column = layout.map.ms_column;
@@ -118,8 +118,8 @@ void ColumnIndex::IndexRows() {
   }
 }
 
-// Of a wide table the begin of each cell is kept, in bytes from that of the
-// record; of a long one the rows of each tag. Quotes are those of CsvCells: at
+// A wide table keeps the begin of each cell, in bytes from that of the record;
+// a long one keeps the rows of each tag. Quotes are those of CsvCells: at
 // the begin of a cell only, doubled inside, where the second one reopens them.
 std::size_t ColumnIndex::TakeRecord(std::size_t begin, std::size_t& line) {
   Row row{begin, 0, cells_.size(), 0, line++};

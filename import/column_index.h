@@ -31,7 +31,7 @@ class ColumnIndex {
   const ColumnMap& form() const { return form_; }
   std::size_t bytes() const;
 
-  /// The table with its times and these tags alone, rows in the same lines.
+  /// The table with its times and only these tags, rows in the same lines.
   std::string Project(const std::vector<std::string>& tags) const;
 
  private:
@@ -39,7 +39,7 @@ class ColumnIndex {
     std::size_t begin;
     std::size_t length;
     std::size_t first_cell;  // In cells_, unless the table is long.
-    std::size_t count;       // Of cells.
+    std::size_t count;       // Number of cells.
     std::size_t line;        // From 1.
   };
   void FindForm(const ColumnMap& map);

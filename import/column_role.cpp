@@ -354,8 +354,8 @@ std::optional<Role> RoleOfTag(const Parts& parts) {
   return std::nullopt;
 }
 
-// The clues of words anywhere in a name. What flow valves are called is no
-// flow.
+// The clues of words anywhere in a name. The name of a flow valve is no clue to
+// a flow.
 unsigned CluesOf(const std::string& plain, const Parts& parts) {
   unsigned clues = 0;
   for (const RoleWords& row : kOtherWords) {
@@ -415,7 +415,7 @@ std::optional<Role> RoleOfPart(const Parts& parts, std::optional<Role> tag,
 }
 
 // Pairs of words first, then words, the attribute behind a tag, its letters,
-// and last the word valve alone.
+// and last the word valve by itself.
 void TakeName(const std::string& name, const std::string& about,
               RoleGuess& guess) {
   const std::string plain = PlainText(name + ' ' + about);
@@ -456,7 +456,7 @@ void TakeName(const std::string& name, const std::string& about,
                    : tag;
 }
 
-// A flow, a pressure or a temperature by its unit alone, also where the name
+// Takes a flow, a pressure or a temperature by its unit, even if the name
 // says otherwise.
 void TakeUnit(RoleGuess& guess) {
   if (SameName(guess.unit, "mA")) {

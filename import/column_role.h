@@ -32,11 +32,11 @@ enum class Role {
 struct RoleGuess {
   std::optional<Role> role;
   bool by_word{false};  ///< Not by the letters of a tag, which are less sure.
-  /// The role of the last part alone: kMeasured of FIC101.PV.
+  /// The role of the last part by itself: kMeasured of FIC101.PV.
   std::optional<Role> attribute;
   std::string unit;  ///< As the name or the text below it states it.
   std::string tag;   ///< "FIC101." of FIC101.PV; empty: no tag is in front.
-  std::optional<Role> of_tag;  ///< What the letters of the tag say.
+  std::optional<Role> of_tag;  ///< By the letters of the tag.
   /// Beside a flow, a pressure or a temperature: a set point is in its unit.
   bool of_measurement{false};
   /// The tag of a controller of flow, such as "FC101", which may be all that
@@ -51,7 +51,7 @@ RoleGuess RoleOf(const std::string& name, const std::string& about,
                  const std::string& part);
 
 /// The signal of a valve that a role stands for; nothing for a level and the
-/// like. Of kPressure P1, of kValve X.
+/// like. kPressure stands for P1, kValve for X.
 std::optional<Signal> SignalOf(Role role);
 
 /// The names of the columns of one table without what all of them end or begin

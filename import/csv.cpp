@@ -24,8 +24,8 @@ constexpr const char* kSniff =
     "; try: fdi-store runs sniff FILE -o tags.toml, then --map "
     "tags.toml";
 
-/// Words of controllers. In cascade the controller acts, too; what tracks or is
-/// local does not. Numbers differ between systems, except in a column `auto`.
+/// Words of controllers. In cascade the controller acts, too; tracking or local
+/// ones do not. Numbers differ between systems, except in a column `auto`.
 struct ModeWords {
   ValveMode mode;
   std::string_view words;
@@ -276,7 +276,7 @@ bool CsvReader::BeginsHeader(std::string_view line) {
     options_.map.separator = line[4];
     return false;
   }
-  // A pipe shows the header alone, so its separator is the one that cuts it
+  // A pipe shows only the header, so its separator is the one that cuts it
   // into most cells. For whole tables FindLayout() has settled this.
   if (options_.map.separator == '\0' &&
       line.find_first_not_of(" \t\r") != std::string_view::npos) {
@@ -468,7 +468,7 @@ CsvReader::ScannedCell CsvReader::ScannedAt(std::size_t column) const {
   return {unit.empty() || IsUnit(unit) ? Parsed(number) : std::nullopt, unit};
 }
 
-// What is not known is refused: taken as bad it would empty a file in silence,
+// An unknown quality is refused: taken as bad it would silently empty a file,
 // taken as good it would let anything pass.
 SignalQuality CsvReader::QualityAt(std::size_t column) const {
   const std::string& cell = Cell(column);
@@ -518,8 +518,8 @@ void CsvReader::Finish() const {
   }
 }
 
-// Repeated names have numbers, because a choice of one of them by its name
-// alone would be arbitrary.
+// Repeated names have numbers, because choosing one of them by its bare name
+// would be arbitrary.
 std::optional<std::size_t> CsvReader::Column(std::string_view name) {
   std::optional<std::size_t> found;
   for (std::size_t i = 0; i < names_.size(); ++i) {
@@ -873,7 +873,7 @@ FaultTruth CsvReader::Truth() const {
   return {fault, strength};
 }
 
-// What rests on a guess is noted for the user.
+// A form that rests on a guess is noted for the user.
 void CsvReader::FindTimeForm(const std::string& cell) {
   const ColumnMap& map = options_.map;
   time_unit_ = map.time_unit;
@@ -924,7 +924,7 @@ std::string CsvReader::NoTime(const std::string& cell) const {
                     "[time] of --map");
 }
 
-// Of text and spreadsheet days; nothing for the second that UTC repeats.
+// From text and spreadsheet days; nothing for the second that UTC repeats.
 std::optional<std::int64_t> CsvReader::UtcOf(const std::string& cell) {
   std::optional<CivilTime> time;
   if (time_unit_.form == TimeForm::kText) {
@@ -968,7 +968,7 @@ std::optional<std::int64_t> CsvReader::UtcOf(const std::string& cell) {
         "times without a zone taken as local time of this machine "
         "(guessed; --zone says which)");
   }
-  // Of an hour that the clock shows twice, the time of the row before decides
+  // If the clock shows an hour twice, the time of the row before decides
   // which one it is (LocalClock::Utc).
   if (last_ns_.size() > kMaxColumns) {
     Refuse("more than " + std::to_string(kMaxColumns) +
@@ -986,8 +986,8 @@ std::optional<std::int64_t> CsvReader::UtcOf(const std::string& cell) {
   return utc;
 }
 
-// What is less than the row before by more than half a round has begun a new
-// one: the clock passed midnight.
+// A time that is behind the row before by more than half a round belongs to a
+// new one: the clock passed midnight.
 double CsvReader::ClockOf(const std::string& cell) {
   const auto time = ParseElapsed(cell);
   if (!time) {

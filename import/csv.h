@@ -24,7 +24,7 @@
 
 namespace fdi::importer {
 
-/// What shows whether a command is followed; a sample needs one of them.
+/// Signals that show whether a command is followed; a sample needs one.
 inline constexpr SignalMask kAnswers =
     MaskOf(Signal::kX) | MaskOf(Signal::kF) | MaskOf(Signal::kPv);
 
@@ -76,7 +76,7 @@ struct ColumnMapping {
   double scale{1.0};
   double offset{0.0};
   Sense sense{Sense::kClosing};
-  std::string unit{};  ///< Of the cells, as written in the map.
+  std::string unit{};  ///< Unit of the cells, as written in the map.
   /// Column of the quality of a wide table; empty: the one that is found.
   std::string quality{};
   /// Cells beyond, which are counts of a broken wire, are no readings.
@@ -87,12 +87,12 @@ struct ColumnMapping {
   std::optional<std::pair<double, double>> root{};
 };
 
-/// Of a wide table; as many tags may a long one have.
+/// Limit for a wide table; a long one may have as many tags.
 inline constexpr std::size_t kMaxColumns = 20'000;
-/// Bytes of lines in one pair of quotes; of what has more, one is not closed.
+/// Bytes of lines in one pair of quotes; beyond, a quote is not closed.
 inline constexpr std::size_t kLongestRecord = 2U << 20U;
-/// Of a table in a gzip, so that a small file does not take much memory; one
-/// that is not packed may have more, at some 170 bytes each.
+/// Limit for a table in a gzip, so that a small file does not take much memory;
+/// one that is not packed may have more, at some 170 bytes each.
 inline constexpr std::size_t kMaxPackedRows = 1'000'000;
 
 /// A table with one reading per row.
@@ -132,7 +132,7 @@ struct ColumnMap {
   std::string ms_column;     ///< Milliseconds, if in a column of their own.
   TimeUnit time_unit;
   DateOrder date_order{DateOrder::kNotSaid};
-  std::string zone;  ///< Of times without an offset; empty: the machine's.
+  std::string zone;  ///< For times without an offset; empty: the machine's.
   std::optional<LongTable> long_table;
   QualityWords quality;
   /// Found by FindLayout(): the column of the quality of a column, and the
@@ -157,10 +157,10 @@ struct CsvOptions {
   /// of X, F are always required.
   SignalMask required{kBasicSignals};
   bool split_gaps{false};  ///< A gap starts another run instead of an error.
-  bool scan{false};  ///< Rows have their cells(), of any tag, and no signals.
+  bool scan{false};  ///< Rows have the cells() of any tag, and hold no signals.
   double period_s{0.0};  ///< 0: detected.
-  /// What is impossible for a valve is refused. Not for a loop, whose PV may be
-  /// anything.
+  /// Refuse values that are impossible for a valve; not for a loop, whose PV
+  /// may be anything.
   bool check_values{true};
   /// Leave out, with a note, a row with the time of the row before it, which
   /// exports in pieces have where two pieces meet; otherwise an error.
@@ -186,10 +186,10 @@ struct CsvTable {
   CsvHeader header;
   std::vector<SampleSeries> runs;
   bool dated{false};         ///< The times in the file have a date.
-  std::int64_t start_ns{0};  ///< Of t = 0; dated: the first sample.
+  std::int64_t start_ns{0};  ///< UTC of t = 0; dated: the first sample.
   /// The part of CV's range that moves X from end to end, if it is half of it.
   std::optional<std::pair<double, double>> split_range;
-  /// What was detected, converted or filled in, one sentence each.
+  /// Properties detected, converted or filled in, one sentence each.
   std::vector<std::string> notes;
 };
 
@@ -258,8 +258,8 @@ class CsvReader {
   /// Cells beyond ColumnMapping::lowest and highest.
   std::size_t beyond(Signal signal) const { return beyond_[Index(signal)]; }
   [[noreturn]] void Refuse(const std::string& reason) const;
-  /// With CsvOptions::scan: a cell of the last row. What is of bad quality or a
-  /// known word is missing.
+  /// With CsvOptions::scan: a cell of the last row. Cells of bad quality, or
+  /// with a known word, are missing.
   struct ScannedCell {
     std::optional<double> value{};
     std::string_view unit{};
@@ -270,7 +270,7 @@ class CsvReader {
  private:
   struct Conversion {
     std::size_t column;
-    ColumnMapping mapping;  ///< Of the contract: without a unit.
+    ColumnMapping mapping;  ///< By the contract: without a unit.
     std::optional<std::size_t> quality{};
   };
 
@@ -317,7 +317,7 @@ class CsvReader {
   std::vector<std::string> notes_;
   CsvCells record_;
   std::vector<Conversion> conversions_;
-  std::vector<std::optional<std::size_t>> qualities_;  // Of scanned columns.
+  std::vector<std::optional<std::size_t>> qualities_;  // By scanned column.
   std::vector<bool> used_;
   std::optional<std::size_t> time_column_;
   std::optional<std::size_t> clock_column_;
@@ -331,7 +331,7 @@ class CsvReader {
   bool fault_by_number_{false};
   TimeUnit time_unit_;
   std::optional<std::int64_t> first_ns_;
-  std::int64_t latest_ns_{0};  // Of the row before.
+  std::int64_t latest_ns_{0};  // In the row before.
   // Per tag, because a table may be sorted by tag; a wide table uses "".
   std::map<std::string, std::int64_t, std::less<>> last_ns_;
   std::uint64_t rows_{0};
@@ -374,7 +374,7 @@ std::string_view WithoutFlag(std::string_view cell);
 void ForEachRow(const TextLines& lines, CsvReader& reader,
                 const std::function<void(CsvRow&&)>& take);
 
-/// Median of the steps of `times_s`, of two middle ones the shorter.
+/// Median of the steps of `times_s`, or the shorter of two middle ones.
 double MedianStep(const std::vector<double>& times_s);
 
 /// Writes the CSV contract's columns for the signals that occur; mode if it is

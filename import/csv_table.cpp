@@ -153,7 +153,7 @@ class TableReader {
   const TextLines& lines_;
   CsvReader reader_;
   std::deque<CsvRow> rows_;  // Unlike a vector, never in memory twice.
-  // Of a long table: where the row of an instant is.
+  // For a long table: where the row of an instant is.
   std::unordered_map<std::int64_t, std::size_t> row_at_;
   double period_s_{0.0};
   CsvTable table_;
@@ -235,7 +235,7 @@ void TableReader::TakeRows() {
   }
 }
 
-// What was found out about the form, as far as it is not usual.
+// Notes findings about the form that are not usual.
 void TableReader::NoteForm() {
   const ColumnMap& map = options().map;
   auto note = [this](const std::string& text) { table_.notes.push_back(text); };
@@ -361,7 +361,7 @@ void TableReader::FindPeriod() {
 bool TableReader::IsSteady() const {
   for (std::size_t k = 1; k < rows_.size(); ++k) {
     const double off = rows_[k].t_s - rows_[k - 1].t_s - period_s_;
-    // Half a period too much, or more, is a gap. What is less is jitter, which
+    // Half a period too much, or more, is a gap. Anything less is jitter, which
     // PutOnGrid() removes.
     if (std::abs(off) > kStepTolerance * period_s_ &&
         !(MayHaveGaps() && off >= 0.5 * period_s_)) {
@@ -607,8 +607,8 @@ void TableReader::DropImpossible(const ColumnMapping& m) {
       ") taken as no reading");
 }
 
-// A signal counts as there by its readings: a header alone, or a column that is
-// bad throughout, gives nothing to diagnose.
+// A signal is there if it has readings: a mere header, or a column that is bad
+// throughout, gives nothing to diagnose.
 void TableReader::CheckReadings() {
   std::array<std::size_t, kSignalCount> readings{};
   std::size_t usable = 0;
@@ -734,7 +734,7 @@ void TableReader::CheckPair(Signal signal) {
   }
 }
 
-// What kind of valve and record this is, where the models are for another one.
+// Notes the kind of valve and record, if the models are for another one.
 void TableReader::CheckMotion() {
   constexpr std::size_t kEnough = 60;
   const SignalMask signals = table_.header.signals;

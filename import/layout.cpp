@@ -19,7 +19,7 @@ using WordCounts = std::map<std::string, std::size_t>;
 
 /// Rows that the form of a table is found from; signs and words come from all.
 constexpr std::size_t kSampleRows = 200;
-/// Of tables with many columns fewer rows, which are kept.
+/// Limit for tables with many columns, of which fewer rows are kept.
 constexpr std::size_t kSampleCells = 500'000;
 /// Different cells that are counted in a column of words.
 constexpr std::size_t kMaxWords = 500;
@@ -27,16 +27,16 @@ constexpr std::size_t kMaxWords = 500;
 constexpr double kMost = 0.9;
 
 struct Record {
-  std::size_t line{0};  ///< Of its first line, from 1.
+  std::size_t line{0};  ///< Number of its first line, from 1.
   Cells cells;
 };
 
-/// What a column of the sample holds.
+/// Contents of a column of the sample.
 struct Column {
   std::size_t full{0};
   std::size_t numbers{0};  ///< Also with a unit.
   std::size_t dates{0};    ///< Text with a date.
-  std::size_t clocks{0};   ///< "14:56:11" alone, or "12 sec".
+  std::size_t clocks{0};   ///< Just "14:56:11", or "12 sec".
   std::vector<double> values;
   std::map<std::string, std::size_t> words;  ///< In all rows.
 
@@ -119,7 +119,7 @@ void ForEachRecord(const TextLines& lines, std::size_t begin, char separator,
             return true;
           }
         }
-        // What is wrong with a record without an end, the reader says.
+        // The reader reports a record without an end.
         const bool ended = reader.TakeLine(line);
         bytes = reader.open() ? bytes + line.size() : 0;
         return ended && !reader.blank() ? take(first, reader.cells())
@@ -128,14 +128,14 @@ void ForEachRecord(const TextLines& lines, std::size_t begin, char separator,
       begin);
 }
 
-/// What the first rows of a table have in common.
+/// Common features of the first rows of a table.
 struct RowShape {
   explicit RowShape(const std::vector<Record>& records);
   bool IsData(const Record& record) const;
   bool IsHeader(const Record& record) const;
   bool NamesColumns(const Cells& cells) const;
 
-  std::size_t width{0};  ///< Of most rows.
+  std::size_t width{0};  ///< Width of most rows.
   std::vector<bool> holds_values;
 };
 
@@ -228,7 +228,7 @@ class LayoutFinder {
   const std::string& source_;
   bool choose_;
   Layout layout_;
-  std::vector<Record> rows_;  // Of the sample, without the header.
+  std::vector<Record> rows_;  // Sample, without the header.
   std::vector<Column> columns_;
   std::size_t data_line_{1};
   std::optional<std::size_t> time_;
@@ -495,8 +495,8 @@ bool LayoutFinder::FindHeader() {
   return true;
 }
 
-// Of the rows in front of the values: `at` holds the names, the others what is
-// about them.
+// Takes the rows in front of the values: `at` holds the names, the others
+// describe them.
 void LayoutFinder::TakeNames(std::span<const Record> header, std::size_t at) {
   const std::size_t width = header[at].cells.size();
   columns_.resize(width);
@@ -566,7 +566,7 @@ void LayoutFinder::FindTimeColumn() {
     if (column.Mostly(column.dates)) {
       score = 40;
     } else if (column.Mostly(column.clocks)) {
-      score = 15;  // Of a day that nothing says.
+      score = 15;  // On an unknown day.
     } else if (column.Mostly(column.numbers) && !column.values.empty()) {
       const TimeForm form = TimeUnitOf(Name(c), column.values.front()).form;
       const auto backwards = static_cast<std::size_t>(std::ranges::count_if(
@@ -993,7 +993,7 @@ void LayoutFinder::RefuseSign(const SignCell& seen,
                   "of --map");
 }
 
-// Of dates with slashes or short years: the order in which all of them are
+// For dates with slashes or short years: the order in which all of them are
 // dates; else the one with fewer days from the first to the last. In America
 // slashes come without zeros, with AM and PM, or with gallons.
 void LayoutFinder::FindDateOrder() {
@@ -1026,7 +1026,7 @@ void LayoutFinder::FindDateOrder() {
   }
 }
 
-// Of a table of tags, few steps lead from one tag to the next.
+// In a table of tags, few steps lead from one tag to the next.
 void LayoutFinder::FindDirection() {
   if (!time_) {
     return;

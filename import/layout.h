@@ -16,8 +16,8 @@ struct Layout {
   std::vector<std::string> names;  ///< As CsvReader::names().
   /// Units and descriptions of each column from further rows of the header.
   std::vector<std::string> about;
-  /// What the table leaves open, by key of the map ("decimal", "date", "good"):
-  /// what was chosen, and why.
+  /// Choices that the table leaves open, by key of the map ("decimal", "date",
+  /// "good"): what was chosen, and why.
   std::map<std::string, std::string> choices;
 };
 

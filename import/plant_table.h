@@ -15,7 +15,7 @@
 
 namespace fdi::importer {
 
-/// What a tag of a loop is.
+/// The kind of a tag of a loop.
 enum class LoopTag { kOp, kPv, kSp, kMode, kX, kF, kP1, kP2, kT1 };
 inline constexpr std::size_t kLoopTagCount = 9;
 std::string_view LoopTagName(LoopTag tag);  ///< The key in the table: "op".
@@ -25,7 +25,7 @@ struct TagCell {
   std::string pattern{};  ///< Placeholders replaced; * stands for anything.
   bool own{false};        ///< Stated in the row itself, not as a default.
   std::string unit{};
-  /// In the file. Of op and x it is 0..100 %. Readings that are beyond it by a
+  /// In the file. For op and x it is 0..100 %. Readings that are beyond it by a
   /// tenth are none.
   std::optional<std::pair<double, double>> range{};
 };
@@ -35,7 +35,7 @@ struct PlantRow : ValveIdentity {
   std::string name;
   std::string place;  ///< For messages: "plant.csv:12".
   std::array<TagCell, kLoopTagCount> tags;
-  Sense sense{Sense::kClosing};  ///< Of op and x.
+  Sense sense{Sense::kClosing};  ///< For op and x.
   std::string type{};            ///< Empty: data only.
   std::string group{};
   std::string file{};  ///< Empty: those of the table.
@@ -49,7 +49,7 @@ struct PlantRow : ValveIdentity {
   std::string topic{};
   std::string value_key{};  ///< In the JSON of a payload.
   std::string time_key{};
-  std::string error{};  ///< What is wrong with the row; empty: nothing.
+  std::string error{};  ///< Error in the row; empty: none.
 
   const TagCell& operator[](LoopTag tag) const {
     return tags[static_cast<std::size_t>(tag)];
@@ -79,7 +79,7 @@ struct PlantTable {
 ///     name = "FIC101"
 ///     type = "lublin-actuator-3"
 ///
-/// docs/plant.md has all keys. What is wrong with one row is its
+/// docs/plant.md has all keys. An error in one row is its
 /// PlantRow::error.
 /// @throws NotFoundError, ConfigError or DataError if the file as a whole
 ///   cannot be read: syntax, no header, an unknown key of the header.
@@ -90,7 +90,7 @@ class TagNames {
  public:
   explicit TagNames(std::vector<std::string> names);
 
-  /// Those that `pattern` means: of its spelling, else in any case; with a *,
+  /// The names that `pattern` means: in its spelling, else in any case; with *,
   /// all that match in any case. A name that occurs twice is given twice.
   std::vector<std::string> Find(const std::string& pattern) const;
   /// Up to four that contain `part`, else the first four.
@@ -104,7 +104,7 @@ class TagNames {
   std::unordered_multimap<std::string, std::size_t> any_case_;
 };
 
-/// Which columns of one file are the tags of a row.
+/// The columns of one file that are the tags of a row.
 struct TagMatch {
   std::array<std::string, kLoopTagCount> columns;  ///< Empty: not there.
   std::vector<std::string> unmatched;              ///< "sp = FIC101.SP"

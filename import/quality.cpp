@@ -23,7 +23,7 @@ constexpr std::string_view kBadWords =
     "|b|failed|failure|not connected|not good|stale|out of service|down|"
     "disabled|"
     "schlecht|ungultig|gestort|mauvais|invalide|malo|cattivo|zly|";
-// What historians, OPC clients and spreadsheets write where there is no value.
+// Words of historians, OPC clients and spreadsheets for a missing value.
 // The words are complete cells, as Bare() leaves them, so no reading is lost.
 constexpr std::string_view kNoReading =
     "|nan|-nan|nan(ind)|-nan(ind)|"
@@ -112,7 +112,7 @@ bool IsNoReading(std::string_view cell, const std::vector<std::string>& more) {
          bare.starts_with("bad input");
 }
 
-// What the map lists comes first. "Good, Non-specific", "GoodNonCascade" and
+// Words of the map come first. "Good, Non-specific", "GoodNonCascade" and
 // "BadSensorFailure" begin with the word that counts.
 std::optional<SignalQuality> QualityOf(std::string_view cell,
                                        const QualityWords& words,

@@ -45,8 +45,8 @@ QualityCode QualityCodeOf(std::string_view column,
 bool IsQualityColumn(std::string_view column,
                      const std::map<std::string, std::size_t>& cells);
 
-/// Whether a cell means "no reading": empty, NaN, Bad, #N/A, "<No Data>", signs
-/// alone, ..., or one of `more`.
+/// Whether a cell means "no reading": empty, NaN, Bad, #N/A, "<No Data>", only
+/// signs, ..., or one of `more`.
 bool IsNoReading(std::string_view cell,
                  const std::vector<std::string>& more = {});
 

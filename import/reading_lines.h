@@ -15,10 +15,10 @@ namespace fdi::importer {
 struct Said {
   enum class Kind : std::uint8_t { kNothing, kReading, kAlive, kWrong };
   Kind kind{Kind::kNothing};
-  /// Its texts are valid until the next line is taken. Of kAlive source and
+  /// Its texts are valid until the next line is taken. For kAlive: source and
   /// stamp.
   TagReading reading;
-  std::string why;  ///< Of kWrong: what was seen and what is accepted.
+  std::string why;  ///< For kWrong: what was seen and what is accepted.
 };
 
 /// UTC [ns] of a stamp as clients write it: RFC 3339, seconds or milliseconds

@@ -43,13 +43,13 @@ constexpr Claim kClaims[] = {
     {Signal::kT1, Role::kTemperature, 40.0},
     {Signal::kPz, Role::kSupply, 40.0},
     {Signal::kSp, Role::kSetpoint, 40.0}};
-// Added to these. Of equal weights the first column counts.
+// Added to these. At equal weights the first column counts.
 constexpr double kKnown = 1000.0;     // By the contract or the caller's map.
 constexpr double kByWord = 5.0;       // Rather than by letters of a tag.
 constexpr double kController = -3.0;  // A flow that may be a set point.
 constexpr double kSwitch = -8.0;      // Two values at most.
-constexpr double kMovesFirst = 1.0;   // Of two valves, the command.
-constexpr double kHigher = 6.0;       // Of two pressures; above a word.
+constexpr double kMovesFirst = 1.0;   // For the command of two valves.
+constexpr double kHigher = 6.0;       // Higher of two pressures; above a word.
 
 /// The weight of a column for a signal of a loop, by the last part of its name
 /// and by its role. The first row of the signal that holds counts.
@@ -225,7 +225,7 @@ bool FitsSignal(SniffedColumn& column, Signal signal, const std::string& unit,
   return true;
 }
 
-// The range beyond which readings are outliers or codes: of a percentage that
+// The range beyond which readings are outliers or codes: for a percentage that
 // of its unit; else three quartile distances from the quartiles, or, where that
 // would leave out more than a few, the middle 90 % and as much on either side.
 std::pair<double, double> UsualRange(const SniffedColumn& column) {
@@ -490,8 +490,8 @@ bool SignalGuess::IsCandidate(Candidate& candidate) {
   return true;
 }
 
-// Columns that their names do not tell apart. Of two tags of valves, the
-// command moves first; of two pressures, that in front is the higher one.
+// Compares columns that have like names. Among two tags of valves, the
+// command moves first; among two pressures, that in front is the higher one.
 void SignalGuess::CompareAlike() {
   constexpr double kSeen = 0.1;
   const auto valves = Of({Role::kValve});
@@ -678,8 +678,8 @@ struct NamedColumn {
   RoleGuess guess;
 };
 
-// The column with the heaviest claim. Of several those with the tag of OP, or
-// else those that measure what the tag of OP controls.
+// The column with the heaviest claim. Among several, those with the tag of OP,
+// or else those that measure the variable that the tag of OP controls.
 const NamedColumn* LoopColumn(const std::vector<NamedColumn>& columns,
                               Signal signal, const std::string& option,
                               const RoleGuess& op, const std::string& source) {
@@ -790,7 +790,7 @@ void GuessLoop(const std::vector<SniffedColumn>& columns,
       flow_unit = signal == Signal::kF && unit ? unit->flow_unit : flow_unit;
       map.columns.push_back(LoopMapping(*found, signal));
     } else if (!name.empty()) {
-      map.columns.push_back({name, signal});  // Which the reader refuses.
+      map.columns.push_back({name, signal});  // The reader refuses it.
     }
     return found != nullptr || !name.empty();
   };

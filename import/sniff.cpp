@@ -345,7 +345,7 @@ void ReadWithMap(const TextLines& lines, const std::string& source,
   try {
     options.map = ReadTagMapText(MapText(found, "this table"), source);
     options.map.zone = found.map.zone;
-    options.map.time_unit = found.map.time_unit;  // What is guessed is noted.
+    options.map.time_unit = found.map.time_unit;  // Guesses are noted.
     const auto resampling = std::exchange(options.map.resampling, {});
     CsvTable table;
     try {

@@ -10,12 +10,12 @@
 
 namespace fdi::importer {
 
-/// What a file holds, and a map of it.
+/// Contents of a file, and a map of it.
 struct Sniffed {
   ColumnMap map;  ///< Without signals: those are in `columns`.
   std::vector<SniffedColumn> columns;
   std::size_t rows{0};
-  std::vector<double> times_s{};  ///< Of the rows, by ScanColumns().
+  std::vector<double> times_s{};  ///< By row, from ScanColumns().
   bool dated{false};
   TimeUnit time;
   std::string resample;  ///< Proposed; empty: not needed.
@@ -26,8 +26,8 @@ struct Sniffed {
   bool compressed{false};
   /// Choices that the table leaves open, with their reasons.
   std::vector<std::string> choices;
-  /// What the importer says about the table with this map: its notes, or why it
-  /// refuses it; what the record cannot show.
+  /// The importer's report on the table with this map: its notes, or why it
+  /// refuses it; and what the record cannot show.
   std::vector<std::string> findings;
 };
 
@@ -36,8 +36,8 @@ struct Sniffed {
 Sniffed ScanColumns(const TextLines& lines, const std::string& source,
                     ColumnMap map);
 
-/// Analyses a table with the reader of the importer. What `map` sets is taken
-/// over, its signals, too; other signals are guessed from units, ranges, words
+/// Analyses a table with the reader of the importer. The settings of `map` are
+/// kept, including its signals; others are guessed from units, ranges, words
 /// and ISA 5.1 letters, in this order of weight, and from the first 4 million
 /// cells.
 /// @throws DataError if there is no header, no column of times or no row.

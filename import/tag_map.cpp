@@ -146,7 +146,7 @@ std::string Plain(std::string_view name) {
   return plain;
 }
 
-// Of a unit of gas at standard conditions, to m3/h at 0 degC.
+// Factor of a unit of gas at standard conditions, to m3/h at 0 degC.
 std::optional<double> NormalVolume(std::string_view name) {
   const std::string plain = PlainText(Plain(name));
   for (const auto& [unit, normal] : kGasUnits) {
@@ -371,7 +371,7 @@ std::optional<UnitConversion> FindUnit(Signal signal, std::string_view name) {
   // The whole name comes first, because "Pa" and "kPa" end with the a of
   // "absolute".
   auto found = find();
-  // Of gauge pressures, "bar(u)" stands for the German "bar(ü)".
+  // In gauge pressures, "bar(u)" stands for the German "bar(ü)".
   for (const std::string_view suffix :
        {"gauge", "abs", "uberdruck", "rel", "eff", "g", "u", "a"}) {
     if (!found && QuantityOf(signal) == Quantity::kPressure &&
@@ -404,7 +404,7 @@ std::pair<std::string_view, std::string_view> SplitUnit(std::string_view cell) {
 
 bool IsUnit(std::string_view name) {
   if (SameName(name, "mA")) {
-    return true;  // Of any signal, over a span.
+    return true;  // For any signal, over a span.
   }
   for (std::size_t i = 0; i < kModelSignalCount; ++i) {
     if (FindUnit(static_cast<Signal>(i), name)) {

@@ -20,7 +20,7 @@ enum class TimeForm {
 /// Form of a time column, and what its numbers count.
 struct TimeUnit {
   TimeForm form{TimeForm::kFindOut};
-  double scale{1.0};    ///< Of a number, in seconds.
+  double scale{1.0};    ///< Seconds per number.
   double of_1970{0.0};  ///< 1970-01-01 in these numbers.
   bool operator==(const TimeUnit&) const = default;
 };
