@@ -87,7 +87,7 @@ double ValveDynamics::PlayWidth() const {
 //   y = clamp(y_before, z - w/2, z + w/2)
 //
 // y_before is rod_, which only Commit() and Align() move. Within a step, y is
-// therefore a function of z alone, whatever states the solver tries. There is
+// therefore a function of z only, whatever states the solver tries. There is
 // no root function for the moment when the play is taken up: it would be 0 at
 // the very restart that it causes, and CVODE would miss it there.
 double ValveDynamics::Rod(double z) const {
@@ -135,12 +135,12 @@ double ValveDynamics::ForceOnAir(double t, double z) const {
   return ForceOnAir(InputsAt(t), z);
 }
 
-// What the chamber has to balance at rest, from (14):
+// The force that the chamber has to balance at rest, from (14):
 //
 //   K (z + x0) + (P1m - P2) A0 / Km - m g,   P1m = max(P1, Pv)
 //
 // The spring acts on the actuator z; Km is that of the plug, which follows the
-// rod. The flow acts with the spring, as it has to where that alone shuts the
+// rod. The flow acts with the spring, as it must if the spring itself shuts the
 // valve: to open where it opens, to close where it closes.
 double ValveDynamics::ForceOnAir(const ProcessInputs& inputs, double z) const {
   const ActuatorParameters& a = parameters_.actuator;

@@ -107,7 +107,7 @@ class ValveDynamics final : public OdeSystem {
   const ValveParameters& parameters() const { return parameters_; }
 
  private:
-  // What the position transmitter makes of the rod, along the same travel.
+  // The reading of the position transmitter for the rod, along the same travel.
   double Reading(double rod) const {
     return Closing(Closing(rod) * effects_.position_reading_factor);
   }

@@ -49,8 +49,8 @@ struct OperatingPointExcitation {
   double p2_kpa{2615.0};
   Disturbance p2_noise_kpa{13.0, 0.6};
   double t1_degc{100.7};
-  double amplitude_pct{0.0};  ///< Of the sine on the command.
-  double period_s{400.0};     ///< Of the sine on the command, > 0.
+  double amplitude_pct{0.0};  ///< Amplitude of the sine on the command.
+  double period_s{400.0};     ///< Period of that sine, > 0.
 };
 
 /// The benchmark's excitation: CV 50 + 25 sin(2 pi 0.01 t) %,
@@ -65,7 +65,7 @@ struct LevelLoopExcitation {
   double level_set_point_pct{49.2};
   double steam_demand_t_h{14.89};
   Disturbance steam_noise_t_h{0.72, 0.984};
-  Disturbance level_noise_pct{1.05, 0.35};  ///< Of the level transmitter.
+  Disturbance level_noise_pct{1.05, 0.35};  ///< Level transmitter.
   Disturbance pump_noise_kpa{35.0, 0.85};   ///< On P1.
   double initial_cv_pct{59.9};
   double proportional_gain{5.0};  ///< % of CV per % of level.
@@ -80,8 +80,8 @@ struct LevelLoopExcitation {
 /// medium and trim, see level_loop.h.
 struct InventoryLoopExcitation {
   double initial_cv_pct{60.0};  ///< The flow there is the mean demand.
-  Disturbance demand_noise_pct{5.0, 0.984};  ///< Of the mean.
-  Disturbance level_noise_pct{1.05, 0.35};   ///< Of its transmitter.
+  Disturbance demand_noise_pct{5.0, 0.984};  ///< Share of the mean.
+  Disturbance level_noise_pct{1.05, 0.35};   ///< On its transmitter.
   double p1_kpa{1000.0};
   Disturbance p1_noise_kpa{8.0, 0.85};
   double p2_kpa{700.0};

@@ -10,7 +10,7 @@ namespace fdi::simulator {
 
 /// State of the boiler that the valve feeds.
 struct BoilerState {
-  double level_pct;  ///< Of the drum.
+  double level_pct;  ///< In the drum.
   double drum_pressure_pa;
   double steam_flow_kg_s;
   double steam_temperature_c;  ///< After the superheater.
@@ -107,7 +107,7 @@ class InventoryLoop final : public Excitation {
   DisturbanceProcess level_noise_;
   InventoryController controller_;
   double level_pct_{0.0};  // Above the set point.
-  double mean_flow_{0.0};  // Of the first sample; 0 before.
+  double mean_flow_{0.0};  // In the first sample; 0 before.
   ProcessInputs last_;
   bool held_{false};
 };

@@ -11,7 +11,7 @@ namespace fdi::simulator {
 
 /// How the inputs of a record act between its rows.
 struct RecordDrive {
-  double period_s{1.0};  ///< Of the rows, > 0.
+  double period_s{1.0};  ///< Between rows, > 0.
   /// The command is interpolated between rows instead of held.
   bool interpolated_command{false};
   /// Rows from the stamp of a command to its effect; negative if the valve

@@ -22,12 +22,12 @@ struct PointBounds {
 
 struct RobustFitOptions {
   int max_iterations{10};
-  double difference_step{0.02};  ///< Of the numeric Jacobian.
+  double difference_step{0.02};  ///< For the numeric Jacobian.
   double huber{1.345};           ///< Corner of the loss, in scales.
   double tolerance{2e-3};        ///< Relative decrease of the loss to stop.
   Eigen::VectorXd least_scale;   ///< Per channel: transmitter noise.
   Eigen::Index block_rows{60};   ///< Block length for estimating `scatter`.
-  double damping{1e-2};          ///< Of the first iteration.
+  double damping{1e-2};          ///< In the first iteration.
 };
 
 /// Result of a fit; see StandardDeviations().
@@ -37,7 +37,7 @@ struct RobustFit {
   Eigen::MatrixXd information;  ///< p x p, sum of w J'J / scale^2.
   Eigen::MatrixXd scatter;      ///< p x p, sum of the blocks' scores s s'.
   Eigen::MatrixXd residuals;    ///< At the point.
-  /// Of the next iteration: a fit that begins with it at `point` goes on as if
+  /// For the next iteration: a fit that begins with it at `point` goes on as if
   /// this one had not ended.
   double damping{RobustFitOptions{}.damping};
   bool settled{false};  ///< It ended because nothing lowers the loss by enough.

@@ -80,7 +80,7 @@ struct MediumState {
   double density_kg_m3;       ///< rho at the inlet.
   double critical_ratio;      ///< Water: rc(P1m); liquids: F_F.
   double gas_factor;          ///< F_gamma = gamma / 1.40; 0 for liquids.
-  double rounding;            ///< Of the standard's constant, on the drop.
+  double rounding;            ///< Factor on the drop, by rounded constants.
 };
 MediumState MediumAt(const Medium& medium, double inlet_pressure_pa,
                      double outlet_pressure_pa, double temperature_c);

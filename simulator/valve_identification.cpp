@@ -45,7 +45,7 @@ struct ValveUnknown {
   double lower;  // > 0.
   double upper;
   // Stated in a data sheet and poorly determined by a record: noise in the
-  // recorded pressures alone can favour a wrong value.
+  // recorded pressures by itself can favour a wrong value.
   bool stated;
 };
 
@@ -366,7 +366,7 @@ double SizeOf(const std::vector<HealthyRecord>& records,
 
 ValveParameters Resized(ValveParameters valve, double size,
                         double largest_flow) {
-  constexpr double kLeastUse = 0.1;  // Of a range.
+  constexpr double kLeastUse = 0.1;  // Share of a range.
   constexpr double kUse = 0.8;
   valve.trim.kv_m3_h *= size;
   valve.trim.bypass_kv_m3_h *= size;
@@ -425,7 +425,7 @@ Trim RegressTrim(const std::vector<HealthyRecord>& records,
   }
   const double x_mean = sums.x / sums.w;
   const double x_variance = sums.xx / sums.w - x_mean * x_mean;
-  constexpr double kMinSpread = 0.02;  // Of X, standard deviation.
+  constexpr double kMinSpread = 0.02;  // Standard deviation of X.
   if (exponential && x_variance > kMinSpread * kMinSpread) {
     const double n =
         -(sums.xy / sums.w - x_mean * sums.y / sums.w) / x_variance;
@@ -445,7 +445,7 @@ using Eigen::VectorXd;
 // With this corner a fit to normal residuals has 95 % of the efficiency of
 // least squares.
 constexpr double kHuber = 1.345;   // Corner of the loss.
-constexpr double kAtBound = 1e-3;  // Of a search, in the logarithm.
+constexpr double kAtBound = 1e-3;  // Near a bound, in the logarithm.
 constexpr int kMaxIterations = 10;
 
 // The transmitter's noise, or at least its resolution.
@@ -504,7 +504,7 @@ struct Hypothesis {
   VectorXd point;
   RobustFit fit;
   std::vector<FittedParameter> rejected;
-  std::optional<double> error{};  // Of Best(), once it is fitted there.
+  std::optional<double> error{};  // Error of Best(), once it is fitted there.
 };
 
 // How far a fit goes, and how much it may cost.
@@ -618,8 +618,8 @@ Hypothesis Identification::Start(const ValveParameters& variant,
   }
   Hypothesis h{
       {variant, drive}, Unknowns(variant, /*stated=*/false), {}, {}, {}};
-  // Kv is that of the open valve, to which a record is extrapolated: of two
-  // valves that pass the same where the record is, the one with the smaller
+  // Kv is that of the open valve, to which a record is extrapolated: if two
+  // valves pass the same where the record is, the one with the smaller
   // slope has the smaller Kv. Its search reaches as far about that value.
   for (ValveUnknown& u : h.unknowns) {
     if (u.name == "trim.kv_m3_h") {
@@ -642,9 +642,9 @@ Hypothesis Identification::Start(const ValveParameters& variant,
   return h;
 }
 
-// Chooses first how and when the command acts, then the relay. Of equally good
-// fits the first is kept: the nominal relay, a held command without delay. That
-// takes 8 + 1 fits, all combinations would take 16.
+// Chooses first how and when the command acts, then the relay. If fits are
+// equally good, keeps the first: the nominal relay, a held command without
+// delay. That takes 8 + 1 fits, all combinations would take 16.
 Hypothesis Identification::BestStart() const {
   const bool friction = nominal_.actuator.coulomb_friction_n > 0.0;
   std::vector<Hypothesis> drives;
@@ -747,7 +747,7 @@ void Identification::FitBriefly(std::vector<Hypothesis>& hypotheses) const {
       open.push_back(&h);
     }
   }
-  // Each is one thread's as far as there are enough of them: of a single
+  // Each is one thread's as far as there are enough of them: with a single
   // segment, most simulations of a fit come one after the other.
   const auto fit = [&](int iterations) {
     const int threads = std::max(
@@ -818,9 +818,9 @@ Hypothesis Identification::Best(std::vector<Hypothesis> hypotheses) const {
 }
 
 // Fits; resets parameters that the records do not determine to nominal, the
-// last of the list first, and fits the others again. F alone tells a lag less
-// closely than X does. One that is surely not the nominal one is kept all the
-// same, because F would be further off with that.
+// last of the list first, and fits the others again. F tells a lag less closely
+// than X does. Without X, one that is surely not the nominal one is kept all
+// the same, because F would be further off with that.
 void Identification::KeepIdentified(Hypothesis& hypothesis) const {
   constexpr double kSurely = 3.0;  // deviations
   const bool has_position = HasPosition(records_);

@@ -46,7 +46,7 @@ Trim RegressTrim(const std::vector<HealthyRecord>& records,
 
 struct ValveFitOptions {
   bool has_flow{true};   ///< RecordRow::flow is measured.
-  double period_s{1.0};  ///< Of the records' rows, > 0.
+  double period_s{1.0};  ///< Between the records' rows, > 0.
   int threads{2};        ///< >= 1.
   /// Maximum number of rows that are simulated repeatedly, the liveliest ones;
   /// the closed form of the trim and the reported fit use all. Time is

@@ -11,7 +11,7 @@
 
 namespace fdi::simulator {
 
-/// What flows through the valve.
+/// The medium in the valve.
 enum class Fluid {
   kWater,   ///< Density, vapour pressure and choking of the benchmark.
   kLiquid,  ///< IEC 60534-2-1 with the three numbers of Medium.
@@ -22,9 +22,9 @@ enum class Fluid {
 /// The medium. A field that the fluid does not need is ignored.
 struct Medium {
   Fluid fluid{Fluid::kWater};
-  double density_kg_m3{1000.0};           ///< Of a liquid.
-  double vapour_pressure_kpa{0.0};        ///< Of a liquid, absolute.
-  double critical_pressure_kpa{22064.0};  ///< Of a liquid, absolute.
+  double density_kg_m3{1000.0};           ///< For a liquid.
+  double vapour_pressure_kpa{0.0};        ///< For a liquid, absolute.
+  double critical_pressure_kpa{22064.0};  ///< For a liquid, absolute.
   double molar_mass_kg_kmol{28.96};       ///< M of a gas.
   double compressibility{1.0};            ///< Z of a gas at the inlet.
   double isentropic_exponent{1.4};        ///< gamma of a gas.
@@ -127,7 +127,7 @@ struct Instrumentation {
   /// Noise of the command on its way to the positioner, drawn once per sample
   /// and held, hence 17 times smaller than fast white noise [%].
   double positioner_noise_sd_pct{0.0083};
-  int resolution_bits{16};  ///< Of the span.
+  int resolution_bits{16};  ///< Over the span.
 };
 
 /// One valve. Users choose from the named sets below.

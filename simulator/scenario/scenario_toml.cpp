@@ -322,8 +322,8 @@ TomlReader ReaderOf(const std::string& setting, std::string_view key,
   }
 }
 
-// What differs from a shipped set; a valve that is based on none of them is
-// written as the difference from the first.
+// Writes the differences from a shipped set; a valve that is based on none of
+// them is written as the difference from the first.
 void AppendParameters(const ValveParameters& parameters, Lines& result) {
   const auto names = ParameterSetNames();
   const bool shipped = std::ranges::count(names, parameters.name) > 0;

@@ -16,7 +16,7 @@ ValveSimulationConfig DefaultConfig();
 struct Scenario {
   std::string valve_id{"VALVE-0001"};
   ValveSimulationConfig config{DefaultConfig()};  ///< start_ns 0: not set.
-  std::string excitation_file;  ///< Of a csv excitation, as given.
+  std::string excitation_file;  ///< File of a csv excitation, as given.
 };
 
 /// Applies `table` to `scenario`; what it does not mention is unchanged. Keys:

@@ -47,14 +47,14 @@ struct Hypothesis {
   int fault;
   double sign;
   Course course;
-  double supply{1.0};  // Of what onboarding took for the supply pressure.
+  double supply{1.0};  // Factor on the supply pressure of onboarding.
   std::map<double, Trajectory> simulated{};  // By |strength|.
   double cost{kInfinity};                    // The least that was simulated,
   double strength{0.0};                      // and its |strength|.
 };
 
 constexpr double kNoHypothesis = 1e6;  // of cost
-// What a line that loses its flow pays as long as the loop has not answered.
+// Cost of a line that loses its flow, as long as the loop has not answered.
 constexpr double kUnanswered = 30.0;
 
 // X is that of the healthy valve, and so is what drives the flow.
@@ -75,7 +75,7 @@ bool ReachesValve(int fault) {
          (!ActsOnInputs(fault) || FaultFactsOf(fault).hides.has_value());
 }
 
-// A channel's share of Q, and what of it the errors alone contribute.
+// A channel's share of Q, and how much of it is due to the errors.
 struct ChannelFit {
   double cost{0.0};
   double errors{0.0};
@@ -95,8 +95,8 @@ class Looker {
       bare_ = Simulate(0, 0.0, {0, false});
       stands_ = true;
     }
-    // Before any fault: those of the flow alone are built on it, and the effect
-    // of every fault is the difference from it.
+    // Before any fault: those that only act on the flow are built on it, and
+    // the effect of every fault is the difference from it.
     healthy_ = Simulate(0, 0.0, {0, false});
     FindUsualInputs();
     command_away_ = CommandAway();
@@ -153,17 +153,17 @@ class Looker {
   int detection_;
   InputRow usual_{};  // Mean inputs before the detection, or in onboarding.
   std::optional<double> command_away_{};
-  FaultEffects standing_{};  // What the standing fault does,
+  FaultEffects standing_{};  // Effects of the standing fault,
   bool stands_{false};       // and whether it acts by now.
   Trajectory bare_;          // Without it; empty if there is none.
   Trajectory healthy_;       // With it: what is expected.
 };
 
-// Of a valve in another size than its type the range of the flow transmitter is
-// a guess. It ends where readings repeat that were not reached before the
+// The range of the flow transmitter is a guess if the valve is not as large as
+// its type. It ends where readings repeat that were not reached before the
 // fault: whatever the noise, a flow beyond the limit reads the limit.
 double Looker::MeterEnd() const {
-  constexpr double kLeastUse = 0.75;  // Of the guess; what is stuck is below.
+  constexpr double kLeastUse = 0.75;  // Share of the guess; below, it is stuck.
   constexpr int kMinReadings = 10;
   const double end = valve_.instruments.flow.high;
   double most = kLeastUse * end;
@@ -196,7 +196,7 @@ double Looker::StrengthAt(int row, double strength, Course course) const {
 
 void Looker::FindUsualInputs() {
   constexpr int kMinRows = 30;
-  constexpr int kGuard = 5;  // Of the rows before a late detection.
+  constexpr int kGuard = 5;  // Rows before a late detection.
   usual_ = {0.0, physics_.p1.mean, physics_.p2.mean, physics_.t1.mean};
   if (detection_ < kMinRows + kGuard) {
     return;
@@ -211,8 +211,8 @@ void Looker::FindUsualInputs() {
   }
 }
 
-// What acts on the valve if the fault is there: a faulty transmitter does not
-// tell, and the hot water of f7 is read as the end of the range.
+// The inputs of the valve if the fault is there: a faulty transmitter does not
+// show them, and the hot water of f7 is read as the end of the range.
 InputRow Looker::InputAt(int row, int fault, double strength) const {
   InputRow input = window_.rows[static_cast<std::size_t>(row)].input;
   input.cv_pct = DelayedCommand(window_.rows, static_cast<std::size_t>(row),
@@ -226,7 +226,7 @@ InputRow Looker::InputAt(int row, int fault, double strength) const {
   if (strength != 0.0 && fault != 0) {
     Hide(fault, usual_, input);
   }
-  // What is measured has moved already; what is not is the usual value still.
+  // A measured input has moved already; any other still has its usual value.
   const FaultEffects effects =
       EffectsOf(stands_ && ActsOnInputs(window_.standing),
                 ActsOnInputs(fault) ? fault : 0, strength);
@@ -246,7 +246,7 @@ void Looker::Hide(int fault, const InputRow& instead, InputRow& input) const {
   }
 }
 
-// Of a fault, and of the standing one beside it where that `stands`.
+// The effects of a fault, together with the standing one if that `stands`.
 FaultEffects Looker::EffectsOf(bool stands, int fault, double strength) const {
   FaultEffects effects = stands ? standing_ : FaultEffects{};
   if (fault == kLowFlow) {
@@ -409,7 +409,7 @@ double Looker::ErrorsOf(const Trajectory& answers) const {
               : 0.0);
 }
 
-// Of X and F, as many as count as independent.
+// The number of readings of X and F that count as independent.
 double Looker::Readings() const {
   std::size_t positions = 0;
   std::size_t flows = 0;
@@ -721,7 +721,7 @@ ChannelFit Looker::FitWithoutFault() const {
   // A constant shift of one reading by some per cent: drift.
   constexpr double kDrift = 0.02;
   const Instrumentation& i = valve_.instruments;
-  // What a drift of one reading changes; the rest of the cost stays.
+  // The change by a drift of one reading; the rest of the cost stays.
   const auto drifted = [&](bool flow, const Transmitter& transmitter,
                            const Scatter& scatter) {
     ChannelFit fit = FitChannel(healthy_, flow,

@@ -42,7 +42,7 @@ std::vector<double> Bounded(std::vector<double> errors) {
   return errors;
 }
 
-// Of the readings in `rows` rows.
+// The scatter of the readings in `rows` rows.
 Scatter ScatterOf(std::vector<double> raw, std::size_t rows) {
   if (raw.empty()) {
     return {};
@@ -113,7 +113,7 @@ InputBand BandOf(const std::vector<double>& input,
   return band;
 }
 
-// What of a series its last values do not predict: the errors of an
+// The part of a series that its last values do not predict: the errors of an
 // autoregression, sum_i a_i y_(k-i) with a_0 = 1. Levinson's recursion raises
 // its order to m by
 //
@@ -189,7 +189,7 @@ class LoopObserver {
       moved_ += moved[k] * moved[k];
       ++count_;
     }
-    // What is filled in between two readings has no noise of its own.
+    // Values filled in between two readings have no noise of their own.
     for (std::size_t j = 0; j < noise.size(); ++j) {
       const std::size_t k = measured[j];
       if (k + kLags >= moved.size()) {

@@ -9,11 +9,11 @@
 
 namespace fdi::simulator {
 
-/// What a healthy valve and its simulation differ by in one output.
+/// The difference between a healthy valve and its simulation in one output.
 struct Scatter {
   double sd{1.0};                ///< [unit of the output], > 0.
-  double correlation_time{1.0};  ///< Of the difference [rows], >= 1.
-  double slow_sd{0.1};           ///< Of its means over ten minutes, > 0.
+  double correlation_time{1.0};  ///< Time of the difference [rows], >= 1.
+  double slow_sd{0.1};           ///< Deviation of its ten-minute means, > 0.
 };
 
 /// Readings of a pressure or temperature while the valve is healthy,
@@ -63,8 +63,8 @@ ValvePhysics DescribeValve(const ValveParameters& parameters,
 std::vector<PhysicalValue> ToValues(const ValvePhysics& physics);
 ValvePhysics PhysicsFrom(const std::vector<PhysicalValue>& values);
 
-/// What the flow of the valve is converted to: by the medium, P1 and T1 of an
-/// onboarded valve, else by water, for which alone sets are trained without
+/// The target of converting the flow of a valve: by the medium, P1 and T1 of an
+/// onboarded valve, else by water, the only medium of sets trained without
 /// physics. @throws as PhysicsFrom().
 FlowTarget FlowTargetOf(const ModelSet& models);
 
