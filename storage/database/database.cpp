@@ -332,7 +332,7 @@ int Database::CheckIdentity(const Schema& schema) {
                   .getInt64();
   } catch (const SQLite::Exception& error) {
     // Only a file that is not in WAL mode yet can have left a journal, which a
-    // writer alone rolls back.
+    // writer has to roll back.
     if (error.getExtendedErrorCode() == SQLITE_READONLY_ROLLBACK) {
       refuse_begun();
     }

@@ -86,7 +86,7 @@ struct Schema {
   /// to the next. Never edit a released one: append.
   std::vector<std::string_view> migrations;
   int baseline{1};
-  /// What to do about a file of before the baseline: "import its runs again".
+  /// Advice for a file from before the baseline: "import its runs again".
   std::string_view instead{};
   /// Additional queries of Check(): one finding per row, as text.
   std::vector<std::string_view> checks{};
@@ -103,8 +103,8 @@ class OutdatedError : public DataError {
   using DataError::DataError;
 };
 
-/// The disk has no room for what opening a database takes. What nobody has open
-/// can be read all the same.
+/// The disk has no room for opening a database. A database that nobody has open
+/// can still be read.
 class NoRoomError : public DataError {
  public:
   using DataError::DataError;

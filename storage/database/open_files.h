@@ -35,8 +35,8 @@ class OpenFiles {
   /// To be called before `database` is opened: gives the log that others have
   /// open its name back.
   static void PutBackLogOf(const std::filesystem::path& database);
-  /// Gives each file that lost one of its two names that name back. What took
-  /// the name of a log keeps `NAME-wal.replaced`.
+  /// Gives each file that lost one of its two names that name back. A file that
+  /// took the name of a log keeps `NAME-wal.replaced`.
   void PutBack() const;
 
   /// True if all are still the files of these names.

@@ -39,7 +39,7 @@ std::string TimesText(double times) {
 Certainty CertaintyOf(const Episode& episode) {
   const bool outside =
       episode.unknown_kind == UnknownName(Unknown::kOutsideKnown);
-  // What ended without a name is "unknown", whether a fault fitted or not.
+  // An episode that ended unnamed is "unknown", whether a fault fitted or not.
   const std::string faults = IsNamed(episode) ? *episode.fault : "";
   return WithAudit(
       WithLookAlikes(fdi::CertaintyOf(

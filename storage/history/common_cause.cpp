@@ -43,7 +43,7 @@ CommonCause ReadCause(Database& database, const std::string& cause_id) {
 // The subset of `members`, which are ordered by isolation, that contains
 // `episode_id`, spans at most `within_ns` and has the most valves. Windows that
 // begin at a member suffice, because any other window can be moved forward to
-// its first member without losing one. Of equally large ones, the earliest
+// its first member without losing one. Among equally large ones, the earliest
 // wins.
 std::vector<CauseMember> LargestCluster(const std::vector<CauseMember>& members,
                                         std::int64_t within_ns,

@@ -25,7 +25,7 @@ class ForeignHistory : public History {
   std::string TakeNote();
 
  protected:
-  /// Of `rows` that a call leaves out; of the reasons the first three are kept.
+  /// Counts `rows` that a call leaves out, and keeps the first three reasons.
   void LeaveOut(std::int64_t rows, const std::string& reason);
 
  private:

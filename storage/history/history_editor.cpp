@@ -107,7 +107,7 @@ std::string CheckedFaults(const std::string& faults) {
   return JoinText(numbers, "|", FaultName);
 }
 
-// Of two notes of one kind at the same instant, the second is stamped one
+// If the instant already has a note of this kind, the new one is stamped one
 // nanosecond later.
 void AddNote(Database& database, const std::string& episode, const char* kind,
              const std::optional<std::string>& value,

@@ -30,8 +30,8 @@ class HistoryReader : public History {
   std::vector<Alarm> AlarmList(std::int64_t now_ns,
                                std::int64_t limit = 500) override;
   AlarmCounts CountAlarms(std::int64_t now_ns);
-  /// Those of `episodes` that have ended, and of which nobody waits for a
-  /// confirmation any more.
+  /// Those of `episodes` that have ended and that no longer wait for a
+  /// confirmation.
   std::vector<std::uint64_t> Over(const std::vector<std::uint64_t>& episodes);
   AlarmStatistics AlarmFigures(const EpisodeFilter& filter,
                                std::int64_t now_ns) override;

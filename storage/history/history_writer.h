@@ -121,11 +121,11 @@ class HistoryWriter {
   /// The event was handed to DDS. Buffers.
   void MarkSent(const FaultEvent& event);
 
-  /// Commits what is pending in one transaction, and a heartbeat at least every
+  /// Commits pending records in one transaction, and a heartbeat at least every
   /// 10 s and immediately after an error. Free if nothing is pending.
   void Commit(std::int64_t now_ns);
   bool HasPending() const;
-  /// Discards what is pending.
+  /// Discards pending records.
   void DropPending();
 
   /// Committed events that may not have been handed to DDS, in commit order.

@@ -7,7 +7,7 @@
 
 namespace fdi::storage {
 
-/// What to delete: first everything that is too old, then the oldest records
+/// The records to delete: first all that are too old, then the oldest ones
 /// until the size limit is met.
 struct RetentionLimits {
   std::optional<std::int64_t> before_ns;    ///< Delete if ended earlier [UTC].
@@ -17,7 +17,7 @@ struct RetentionLimits {
   std::chrono::milliseconds pause{20};
 };
 
-/// What was deleted, or would be in a dry run.
+/// The deleted records, or in a dry run those to be deleted.
 struct PruneResult {
   std::int64_t deleted{0};  ///< Runs or episodes.
   std::int64_t kept{0};     ///< Protected ones among the remaining.

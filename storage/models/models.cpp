@@ -13,8 +13,8 @@
 #include "storage/models/model_codec.h"
 #include "storage/models/sql.h"
 
-// The model sets of ModelStore. A set is one BLOB of model_codec.h, which alone
-// is loaded; the rows of its observers, channels and runs only show in SQL what
+// The model sets of ModelStore. A set is one BLOB of model_codec.h; only that
+// is loaded. The rows of its observers, channels and runs just show in SQL what
 // is in it. Valves and types are in valves.cpp, the loops of a plant in
 // plant_loops.cpp.
 namespace fdi::storage {
@@ -327,8 +327,8 @@ ModelSet ModelStore::ImportFile(const std::filesystem::path& path,
               activation);
 }
 
-// The row of a set; without a version, of the active one. The message of the
-// exception lists what is stored, because the mistake is mostly one of
+// The row of a set, or of its active version if none is given. The message of
+// the exception lists the stored sets, because the mistake is mostly one of
 // spelling.
 std::int64_t ModelStore::RequireId(const ModelReference& reference) {
   const auto id = database_.QueryInt64(sql::model_set_id, reference.name,

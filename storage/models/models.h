@@ -107,7 +107,7 @@ struct BaselineRecord {
   std::uint32_t epoch{0};
   std::string model_set;
   int version{0};
-  double hours{0.0};  ///< Of healthy data.
+  double hours{0.0};  ///< Healthy data used.
   /// Fitted parameters by name, e.g. {"trim.kv_m3_h", 118.2}.
   std::vector<std::pair<std::string, double>> parameters{};
   std::vector<ChannelFigures> channels{};
@@ -126,12 +126,12 @@ ValveEventKind ParseValveEventKind(std::string_view name);
 
 /// Maintenance of a valve.
 struct ValveEvent {
-  std::uint32_t epoch{0};  ///< Of the valve from then on; set by the store.
+  std::uint32_t epoch{0};  ///< Valve's epoch from then on; set by the store.
   ValveEventKind kind{ValveEventKind::kReplaced};
   std::string note{};
   std::int64_t at_ns{0};  ///< UTC.
   std::string who{};
-  /// For kOrdered alone: the number of the order, and when the valve is to be
+  /// Only for kOrdered: the number of the order, and when the valve is to be
   /// back.
   std::string order{};
   std::optional<std::int64_t> expected_ns{};
@@ -238,7 +238,7 @@ class ModelStore {
   /// Ordered by epoch, then time.
   std::vector<BaselineRecord> Baselines(std::string_view pattern);
 
-  /// Notes maintenance of a valve, with or without an entry. What is ordered
+  /// Notes maintenance of a valve, with or without an entry. An order
   /// changes nothing until something else is noted. A replacement
   /// opens the next epoch of an entry, which makes its baseline provisional;
   /// after the others the valve is again what its models were made for.

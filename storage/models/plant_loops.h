@@ -11,7 +11,7 @@
 
 namespace fdi::storage {
 
-/// What watches a loop of the plant.
+/// How a loop of the plant is watched.
 enum class LoopWatch : std::uint8_t {
   kNothing,
   kAudit,   ///< The audit of loops: no model set is needed.
@@ -32,11 +32,11 @@ std::string_view LoopStateName(LoopState state);  ///< "expected", ...
 struct PlantLoop : ValveIdentity {
   std::string name;     ///< The id of its valve.
   std::string type{};   ///< Empty: data only.
-  std::string group{};  ///< Of valves that may share a cause.
+  std::string group{};  ///< Valves of one group may share a cause.
   LoopWatch watch{LoopWatch::kNothing};
   LoopState state{LoopState::kExpected};
   std::string finding{};       ///< One sentence about its record.
-  std::string input_hash{};    ///< Of its row and record; empty: not read.
+  std::string input_hash{};    ///< Hash of its row and record; empty: not read.
   std::int64_t checked_ns{0};  ///< UTC; set by the store.
 };
 
@@ -52,7 +52,7 @@ struct ValveResult {
   /// Makes the type to store from the set as it was saved.
   std::function<ValveType(const ModelSet&)> type;
   std::optional<PlantLoop> loop;
-  Lineage lineage{};  ///< Of `models`.
+  Lineage lineage{};  ///< Lineage of `models`.
 };
 
 /// The loop of that name.

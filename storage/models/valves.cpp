@@ -340,7 +340,7 @@ ChangeCounter::ChangeCounter(const std::filesystem::path& path)
 bool ChangeCounter::Changed() {
   if (store_.database().Refresh()) {
     data_version_ = -1;
-    generation_ = -1;  // Of no file.
+    generation_ = -1;  // No file has it.
   }
   // data_version is read before the generation, here and in the constructor. A
   // commit between the two then costs one needless look at the next call; in

@@ -168,7 +168,7 @@ std::optional<ValuePredictor> BestGrid(std::span<const double> values,
     return std::nullopt;
   }
   // `step` has the rounding error of a difference of two readings. Measured
-  // over `count` steps, that error is divided by `count`. What remains is the
+  // over `count` steps, that error is divided by `count`. There remains the
   // rounding of q, which grows with n in a + q·n: so the two neighbours of q on
   // either side are tried, too.
   double q = (far - origin) / count;

@@ -214,7 +214,7 @@ void RunRecorder::Close() {
   }
 }
 
-// Writes what is pending of a run. @returns its state after the commit.
+// Writes the pending samples of a run. @returns its state after the commit.
 RunRecorder::Committed RunRecorder::Store(ActiveRun& active) {
   Committed after = active.committed;
   if (active.moved) {  // Nothing of the run is in this file.

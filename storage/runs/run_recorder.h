@@ -60,7 +60,7 @@ class RunRecorder {
   /// Commits everything pending. After an error it is still pending: retry or
   /// drop it. @throws SqliteError
   void Commit();
-  /// Drops what is pending, for example while the disk is full.
+  /// Drops pending samples, for example while the disk is full.
   /// @returns the number of samples; they are missing from the runs.
   std::int64_t DropPending();
 
@@ -74,12 +74,12 @@ class RunRecorder {
   Database& database() { return database_; }
 
  private:
-  /// What the file contains of a run.
+  /// The part of a run that the file contains.
   struct Committed {
     std::int64_t run_id{0};  ///< 0: no row yet.
     std::int64_t samples{0};
     double period_s{0.0};
-    std::size_t tail{0};       ///< Of these, in the tail table.
+    std::size_t tail{0};       ///< Those in the tail table.
     std::size_t threshold{0};  ///< Tail length that triggers compaction.
     bool ended{false};
   };

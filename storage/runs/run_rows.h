@@ -43,7 +43,7 @@ class RecorderLiveness {
 /// 12 random hex digits.
 std::string NewRunId();
 
-/// What a bundle of samples adds to its run's row.
+/// Additions of a bundle of samples to its run's row.
 struct RunCounters {
   std::int64_t samples{0};
   std::int64_t truth_samples{0};

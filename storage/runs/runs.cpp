@@ -314,7 +314,7 @@ void RunStore::LoadTable(std::string_view table, std::int64_t from,
   }
 }
 
-// In one transaction: of a file with gaps all runs are stored or none.
+// In one transaction: all runs of a file with gaps are stored or none.
 std::vector<std::string> RunStore::Import(std::span<const SampleSeries> series,
                                           const NewRun& base) {
   std::vector<std::string> ids;

@@ -38,7 +38,7 @@ struct Row {
   // flags, fault
   std::array<std::int64_t, kIntegers> integers{};
   std::array<double, kSignalCount> values{};
-  double strength{0.0};  // Of the truth.
+  double strength{0.0};  // Strength in the truth.
 
   double& Double(std::size_t i) {
     return i < kSignalCount ? values[i] : strength;

@@ -40,7 +40,7 @@ struct Chunk {
 
 inline constexpr std::uint32_t kMaxChunkSamples = 65536;
 
-/// What a chunk of a run tells about the next one: the predictors of its
+/// Hints of a chunk of a run for the next one: the predictors of its
 /// columns of doubles, which saves searching for them again.
 struct ChunkHints {
   /// By signal; that of the strength of the truth is the last.
