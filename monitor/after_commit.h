@@ -10,11 +10,11 @@
 
 namespace fdi::monitor {
 
-/// What becomes of a fault event after its commit: the steps in the order in
+/// The steps for a fault event after its commit, in the order in
 /// which they were added, for new events and for those of an earlier session
 /// (FaultEvent::resent) alike.
 ///
-/// A step fails for itself: what it throws is counted and logged, and the next
+/// A step fails for itself: its exception is counted and logged, and the next
 /// one is taken. Add all steps before the first event.
 class AfterCommit : public EventSink {
  public:

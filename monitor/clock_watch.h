@@ -11,9 +11,9 @@
 
 namespace fdi::monitor {
 
-/// Says of which valves the stamps are more than an hour off this host's clock:
-/// of a publisher without a battery (1970), one that is set wrong, or this host
-/// itself. What they stamp is diagnosed as it is, but listed where it was
+/// Reports valves with stamps that are more than an hour off this host's clock,
+/// from a publisher without a battery (1970), one set wrong, or because of this
+/// host. Their samples are diagnosed as they are, but listed where they were
 /// stamped. Once for each source.
 class ClockWatch : public ValveListener {
  public:

@@ -12,8 +12,8 @@
 
 namespace fdi::monitor {
 
-/// What a monitor counts since its start. The table in counters.cpp describes
-/// each counter.
+/// Counters of a monitor since its start. The table in counters.cpp describes
+/// each of them.
 enum class Counter : std::uint8_t {
   kReceived,
   kDiagnosed,

@@ -12,7 +12,7 @@
 namespace fdi::monitor {
 
 /// Runs `call` for a part of the monitor that diagnosis and journal do not
-/// need: what it throws is counted and logged, and goes no further.
+/// need: its exceptions are counted and logged, and go no further.
 template <typename Call>
 void Guarded(Counters& counters, ThrottledLog& log, std::string_view part,
              Call&& call) {

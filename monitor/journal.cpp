@@ -20,7 +20,7 @@ constexpr std::size_t kPointsPerCommit = 5'000;
 constexpr int kTracesPerCommit = 100;
 
 // How long Stop() waits for the subscribers' acknowledgements of the last
-// events. What they do not acknowledge is published again by the next session.
+// events. Unacknowledged ones are published again by the next session.
 constexpr std::chrono::milliseconds kLastDelivery{300};
 
 }  // namespace
@@ -68,8 +68,8 @@ void Journal::Stop() {
     unsent_changed_.notify_one();
   }
   errors.Try([this] { publisher_.Join(); });
-  // From here on this thread alone uses the queues and the history. What it
-  // cannot write is not tried again; the events among it count as lost.
+  // From here on only this thread uses the queues and the history. Records it
+  // cannot write are not tried again; the events among them count as lost.
   options_.tries = 1;
   {
     const MutexLock lock(mutex_);
@@ -111,8 +111,8 @@ void Journal::OnEvent(FaultEvent event) {
   pending->event = std::move(event);
   pending->deadline = Clock::now() + options_.patience;
   const MutexLock lock(mutex_);
-  // The bus does not take events as fast as they come. What is committed and
-  // not published, the next session publishes.
+  // The bus does not take events as fast as they come. Those committed and not
+  // published are left to the next session.
   if (unsent_.size() < options_.max_records) {
     unsent_.push_back(pending);
     unsent_changed_.notify_one();
@@ -257,7 +257,7 @@ void Journal::Write() {
   }
 }
 
-// Commits what is queued, events before evidence.
+// Commits the queued records, events before evidence.
 // @returns false once the history fails.
 bool Journal::WriteWaiting() {
   while (true) {
@@ -337,7 +337,7 @@ bool Journal::WriteBatch(std::vector<const Record*> batch, int failures) {
       return true;
     } catch (const RecordError& error) {
       if (at == nullptr) {
-        throw;  // Of what is buffered.
+        throw;  // From a buffered record.
       }
       failed.emplace_back(at, error.what());
       std::erase(batch, std::exchange(at, nullptr));
@@ -478,8 +478,8 @@ bool Journal::WriteCheckpoint() {
     return true;
   }
   const MutexLock lock(mutex_);
-  // The failed one is the older one: of two accumulators of a valve the newer
-  // one is kept.
+  // The failed one is the older one, and the newer one of two accumulators of a
+  // valve is kept.
   checkpoint_ = Merged(std::move(checkpoint), std::move(checkpoint_));
   return false;
 }
@@ -629,8 +629,8 @@ void Journal::MarkDelivered(Clock::time_point limit,
   MutexLock lock(mutex_);
   bool acknowledged = due();
   lock.unlock();
-  // Without the lock, because it may wait for subscribers. What is published
-  // meanwhile is newer than `limit` and therefore not marked.
+  // Without the lock, because it may wait for subscribers. Events published
+  // meanwhile are newer than `limit` and therefore not marked.
   acknowledged = acknowledged && options_.acknowledged(patience);
   lock.lock();
   while (undelivered_.size() > options_.max_undelivered ||

@@ -80,8 +80,8 @@ class Journal : public EpisodeOutlet {
   void Commit(Checkpoint checkpoint);
 
   void Start();
-  /// Commits and publishes what is queued and ends the threads; does nothing if
-  /// they were not started. @throws what a thread ended with.
+  /// Commits and publishes the queue and ends the threads; does nothing if
+  /// they were not started. @throws the exception that ended a thread.
   void Stop();
 
   /// A thread ended with an exception.
@@ -91,7 +91,7 @@ class Journal : public EpisodeOutlet {
   /// Beaten by the history thread.
   const Pulse& pulse() const { return pulse_; }
 
-  /// What is queued for the history.
+  /// Records queued for the history.
   struct Backlog {
     std::size_t records{0};
     std::size_t trace_points{0};

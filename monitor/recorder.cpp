@@ -8,8 +8,8 @@
 #include "base/printable.h"
 
 // Record() runs in the diagnosis thread, everything that Run() calls in the
-// recorder's, which alone uses the sink. They share the queue, the counters and
-// what `missing_mutex_` guards: CountDropped() is called by both.
+// recorder's, which is the only one to use the sink. They share the queue, the
+// counters and members guarded by `missing_mutex_`: both call CountDropped().
 namespace fdi::monitor {
 namespace {
 
@@ -79,8 +79,8 @@ void Recorder::Run() {
 }
 
 // While commits fail only the period leads to another one, not the number of
-// samples: each try costs time in which the queue fills. What waits is dropped
-// at the limit.
+// samples: each try costs time in which the queue fills. Samples that wait are
+// dropped at the limit.
 void Recorder::Take(const ReceivedSample& sample) {
   try {
     sink_.Append(sample);

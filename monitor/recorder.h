@@ -61,8 +61,8 @@ class Recorder : public ValveListener {
   }
 
   void Start();
-  /// Stores what is queued and ends the runs and the thread; does nothing if it
-  /// was not started. @throws what the thread ended with.
+  /// Stores the queue and ends the runs and the thread; does nothing if it
+  /// was not started. @throws the exception that ended the thread.
   void Stop();
 
   /// The thread ended with an exception.

@@ -80,7 +80,7 @@ class LogLimit {
   std::map<std::string, Window, std::less<>> windows_ GUARDED_BY(mutex_);
 };
 
-/// Writes lines with the ids above; of each id the first immediately and then
+/// Writes lines with the ids above: the first of each id immediately, and then
 /// at most one per interval, with the number suppressed (`not_shown=N`).
 ///
 /// Thread safe.

@@ -13,11 +13,11 @@
 
 namespace fdi::monitor {
 
-/// Which decision vectors a program wants.
+/// The decision vectors that a program wants.
 enum class Vectors : std::uint8_t {
   kNone,
   kLive,  ///< The newest of each valve; under load some are overwritten.
-  kAll,   ///< Of monitors with --lossless-decisions.
+  kAll,   ///< From monitors with --lossless-decisions.
 };
 
 /// Settings of BusView.

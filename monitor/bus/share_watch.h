@@ -20,7 +20,7 @@ struct ContestedValves {
   std::string monitor;  ///< Another monitor that takes it.
 };
 
-/// Those of `valves` that a monitor of `others` takes as well.
+/// The valves among `valves` that a monitor of `others` takes as well.
 /// @param own the monitor itself, which is ignored among `others`.
 ContestedValves FindContested(const MonitorShare& own,
                               const std::vector<MonitorShare>& others,

@@ -48,7 +48,7 @@ struct HttpServerOptions {
   HttpAddress address;
   std::string option{"--http"};  ///< Named in error messages.
   std::size_t threads{4};
-  std::size_t max_body{0};  ///< Of a request [bytes].
+  std::size_t max_body{0};  ///< Largest body of a request [bytes].
   /// Sees each request first. Returns whether it goes on to its page;
   /// otherwise it has made the answer. Null: only an IsLoopback() host goes on.
   std::function<bool(const httplib::Request&, httplib::Response&)> admit{};

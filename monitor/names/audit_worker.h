@@ -49,7 +49,7 @@ class AuditWorker {
   }
 
   void Start();
-  /// Ends the thread after the window at hand; what waits is given up.
+  /// Ends the thread after the window at hand; waiting ones are given up.
   void Stop();
   /// The thread ended with an exception, which Stop() throws. Any thread.
   bool failed() const { return thread_.failed(); }

@@ -20,7 +20,7 @@
 
 namespace fdi::monitor {
 
-/// What became of a look.
+/// The fate of a look.
 enum class LookFate : std::uint8_t { kTaken, kDropped, kFailed };
 
 /// Is told of each look; called by any thread. @param whose "valve=V1" or
@@ -57,7 +57,7 @@ class LookWorker {
                              LookTask task);
 
   void Start();
-  /// Ends the thread, at once between two hypotheses; what waits is given up.
+  /// Ends the thread, at once between two hypotheses; gives up waiting looks.
   void Stop();
   /// Looks at episodes that wait for the thread. Any thread.
   std::size_t waiting() const {

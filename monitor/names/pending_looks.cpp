@@ -4,7 +4,7 @@
 
 namespace fdi::monitor {
 
-// The rows, up to 27 kB, go to the worker alone.
+// The rows, up to 27 kB, go only to the worker.
 void PendingLooks::Request(std::vector<LookTask> due,
                            const LookWorker::Physics& physics) {
   for (LookTask& task : due) {

@@ -164,7 +164,7 @@ class ProgramDelivery : public EventDelivery {
   std::optional<std::string> Await(pid_t pid) const {
     // A descriptor, because poll() awaits it together with stop_ and a timeout,
     // which waitpid() cannot.
-    // The header of glibc 2.36 declares pidfd_open() for C alone.
+    // The header of glibc 2.36 declares pidfd_open() for C only.
     const File process(static_cast<int>(syscall(SYS_pidfd_open, pid, 0)));
     if (process.get() < 0) {
       // Without it the end of the process would go unnoticed until the timeout.

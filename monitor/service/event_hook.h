@@ -70,7 +70,7 @@ report::Json EventJson(const FaultEvent& event, bool persisted,
 /// bus, each at most once and in order, from a thread of its own: neither the
 /// diagnosis nor the bus waits.
 ///
-/// The rate is limited to `per_minute`. Of the events beyond it only the newest
+/// The rate is limited to `per_minute`. Only the newest of the events beyond it
 /// is kept, and delivered once the rate allows it. Each delivery carries
 /// "left_out", the number of events dropped since the previous one.
 ///

@@ -22,7 +22,7 @@ namespace fdi::monitor {
 /// RecordError; any other operation may fail and is retried by the caller.
 /// If the file is deleted or replaced while it is open, the next operation
 /// fails once; by then a session and the open episodes are in the file that has
-/// its name, which is made anew if there is none.
+/// its name; a missing file is created.
 class HistoryStore : public HistorySink {
  public:
   using Clock = std::function<std::int64_t()>;  ///< UTC now [ns]
@@ -80,7 +80,7 @@ class HistoryStore : public HistorySink {
   LogSink log_;
   std::optional<Session> session_;  // As begun.
   bool moved_{false};  // Into a file that does not have what follows yet.
-  // Of each episode the last event that names it, and the last one.
+  // By episode: the last event that names it, and the last one.
   std::map<std::uint64_t, std::vector<FaultEvent>> open_;
 };
 

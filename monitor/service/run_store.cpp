@@ -102,7 +102,7 @@ void RunStore::AppendTo(const std::string& valve_id, Stream& stream,
   recorder_.Append(*stream.run, sample);
 }
 
-// What begins with a late sample or a jump has its period from what follows.
+// A run that begins with a late sample or a jump gets its period later on.
 void RunStore::AddStep(Stream& stream, const storage::StoredSample& sample) {
   if (stream.steps.size() >= kPeriodSteps) {
     return;

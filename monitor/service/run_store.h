@@ -18,7 +18,7 @@ namespace fdi::monitor {
 /// day and a new one begun, so that retention can delete it.
 class RunStore : public SampleSink {
  public:
-  /// The file is made anew, or the other one taken, if it is deleted or
+  /// The file is created again, or the other one taken, if it is deleted or
   /// replaced while it is open: Commit() throws once then.
   /// @throws DataError, storage::SqliteError
   RunStore(const std::filesystem::path& path, std::string software);

@@ -30,7 +30,7 @@ struct PartContext {
   std::int64_t started_ns{0};
   LogSink log;
   std::function<MonitorFacts()> facts;
-  /// Runs `step`; what it throws is counted and logged (`part_failed`).
+  /// Runs `step`; its exceptions are counted and logged (`part_failed`).
   std::function<void(std::string_view part, const std::function<void()>& step)>
       guard;
   /// Notifies whom --on-event names.

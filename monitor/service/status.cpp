@@ -131,7 +131,7 @@ HttpPage ReadinessPage(const Readiness& readiness) {
                                     {"publishers", readiness.publishers}});
 }
 
-// What was refused on the network, and from how many participants.
+// Refusals on the network, and from how many participants.
 void AddRefusals(const StatusFacts& facts, std::vector<Measure>& measures) {
   constexpr Type kCounter = Type::kCounter;
   std::uint64_t refused_datagrams = 0;

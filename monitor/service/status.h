@@ -61,7 +61,7 @@ std::string StatusLine(const idl::MonitorStatusMessage& status);
 /// a database may block it.
 inline constexpr std::chrono::seconds kStallLimit{10};
 
-/// What a monitor needs to be useful.
+/// The conditions for a monitor to be useful.
 struct Readiness {
   std::size_t model_sets{0};
   bool databases{false};  ///< They accept writes.
@@ -70,7 +70,7 @@ struct Readiness {
   bool ready() const { return model_sets > 0 && databases && publishers > 0; }
 };
 
-/// What the metrics page adds to the status.
+/// The additions of the metrics page to the status.
 struct MetricsFacts {
   std::string software;
   std::int64_t started_ns{0};  ///< UTC.
