@@ -182,7 +182,7 @@ class CheckedType : public Generated {
   // must be as long as what was read from it. The calculated size may be a few
   // bytes too large, because it aligns the elements of an empty list.
   bool IsComplete(const rtps::SerializedPayload_t& payload, const void* data) {
-    constexpr rtps::octet kFirstOfXcdr2 = 6;  // Of the encapsulations.
+    constexpr rtps::octet kFirstOfXcdr2 = 6;  // Among the encapsulations.
     const auto form = payload.data[1] < kFirstOfXcdr2
                           ? dds::XCDR_DATA_REPRESENTATION
                           : dds::XCDR2_DATA_REPRESENTATION;

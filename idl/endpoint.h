@@ -49,7 +49,7 @@ struct PublisherStatus {
 /// Writes one topic. Thread safe. Destroying it loses unacknowledged messages:
 /// call WaitForAcknowledged() first.
 ///
-/// Samples go out on two topics: fdi/v1/ValveSample, and, of a valve from its
+/// Samples go out on two topics: fdi/v1/ValveSample and, for a valve from its
 /// first PV on, fdi/v2/ValveSample. Where nobody reads version 2, or our key
 /// does not permit it, they go out on version 1 without PV, which is logged
 /// once. Readers count once.
@@ -115,13 +115,13 @@ struct SubscriberStatus {
   std::uint64_t rejected_instances{0};
   std::uint64_t refused_valves{0};
   /// Rejected while full: a reliable KEEP_ALL writer resends them, so this is
-  /// back-pressure, not loss; what a live writer overwrites meanwhile counts as
-  /// lost.
+  /// back-pressure, not loss; messages that a live writer overwrites meanwhile
+  /// are lost.
   std::uint64_t rejected_samples{0};
   std::uint64_t incompatible{0};  ///< Writers with incompatible QoS.
   std::uint64_t waiting{0};       ///< Messages queued for Take().
-  int matched{0};  ///< Writers at present; of samples, publishers.
-  int alive{0};    ///< Of these, writers that are alive.
+  int matched{0};  ///< Writers at present; for samples, publishers.
+  int alive{0};    ///< Those of them that are alive.
 };
 
 /// Where the backlog of Take() is held once 16 MB are queued.

@@ -15,7 +15,7 @@ std::map<std::string, unsigned> LocalAddresses();
 ///
 /// The kernel ties a multicast membership, and the interface that multicast is
 /// sent from, to the index of an interface, which changes when the interface is
-/// removed and made anew (VPN, container, driver). Its address may be the same,
+/// removed and remade (VPN, container, driver). Its address may be the same,
 /// and yet the library, which opened its sockets before, hears nothing any
 /// more. It cannot open them again, so the program has to be started again.
 class Interfaces {

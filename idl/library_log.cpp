@@ -53,9 +53,9 @@ struct Refusal {
   std::string reason;
 };
 
-// What the library's access control says of others that have a key of our
-// authority without the right to what they do. Only its log tells: the listener
-// of a participant hears of keys that are none.
+// The library's report on others that have a key of our authority, but not the
+// right to what they do. It is only in its log: the listener of a participant
+// hears of keys that are none.
 std::optional<Refusal> RefusalIn(const Log::Entry& entry) {
   constexpr std::array<std::pair<std::string_view, std::string_view>, 4>
       kBegins{{{"Error checking create remote writer ", "writer"},

@@ -44,8 +44,8 @@ using transport::UDPv6TransportDescriptor;
 // The port of discovery is 7400 + 250 domain [RTPS, 9.6], at most 65 535.
 constexpr int kMaxDomain = 232;
 constexpr int kMaxValvesLimit = 100000;
-// Of a peer that a profile names without a port, so many participants are
-// called: what fits a domain and host. The library's default is 4.
+// If a profile names a peer without a port, so many participants of it are
+// called: all that fit a domain and host. The library's default is 4.
 constexpr std::uint32_t kInitialPeersRange = 120;
 // The kernel's default of some 200 kB is the first queue to overflow, and what
 // it drops has to be retransmitted. Capped by net.core.rmem_max.
@@ -95,7 +95,7 @@ void ValidateInterfaces(const std::string& interfaces) {
                                "' is no IPv4 address of this machine, accepted "
                                "are all or, comma separated," +
                                known;
-      // An address may come after us at boot; what is none will not.
+      // An address may come after us at boot; an invalid one will not.
       if (inet_pton(AF_INET, address.c_str(), &ignored) == 1) {
         throw PassingError(what);
       }
@@ -401,8 +401,8 @@ Participant::Impl::Impl(const DdsOptions& options, LogSink log,
   const dds::DomainParticipantQos qos =
       MakeQos(options_, profiles_, datagrams_, name);
   // The participant is active at once: its callbacks may come before `handle_`
-  // is set and use only members initialised above. It listens to discovery
-  // alone; the status of an endpoint goes to the listener of that endpoint.
+  // is set and use only members initialised above. It listens only to
+  // discovery; the status of an endpoint goes to the listener of that endpoint.
   handle_ = NotNull(
       dds::DomainParticipantFactory::get_instance()->create_participant(
           static_cast<std::uint32_t>(options_.domain), qos, this,
@@ -437,8 +437,8 @@ void Participant::Impl::ReportIncompatible(const std::string& topic,
                                            bool remote_is_writer,
                                            dds::QosPolicyId_t id,
                                            const PolicyTexts& ours) {
-  // The library tells the policy, neither the endpoint nor its value. What is
-  // shown is the newest endpoint of the topic whose value differs from ours.
+  // The library tells the policy, but neither the endpoint nor its value.
+  // Shown is the newest endpoint of the topic whose value differs from ours.
   const auto own = ours.find(id);
   std::string theirs = "unknown";
   {

@@ -61,7 +61,7 @@ class Participant {
   /// the first is logged.
   std::uint64_t refused_participants() const;
   /// Call about once a second: looks whether the interfaces are still those of
-  /// the start. @throws PassingError if one is gone or was made anew, after
+  /// the start. @throws PassingError if one is gone or was created again, after
   /// which this participant hears nothing there.
   void RequireInterfaces() const;
 

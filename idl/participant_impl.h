@@ -191,7 +191,7 @@ class Participant::Impl : private dds::DomainParticipantListener {
   Mutex topics_mutex_;             // Separate: held during library calls.
   std::map<std::string, dds::Topic*> topics_ GUARDED_BY(topics_mutex_);
   dds::DomainParticipant* handle_{nullptr};
-  std::optional<Interfaces> interfaces_;  // None: shared memory alone.
+  std::optional<Interfaces> interfaces_;  // None: only shared memory.
 };
 
 }  // namespace fdi::idl

@@ -153,7 +153,7 @@ struct TopicWriter : dds::DataWriterListener {
     return found == instances.end() ? 0 : found->second.last_write;
   }
 
-  // That of the last message of all.
+  // The number of the last message of all.
   std::uint64_t last_write() {
     const MutexLock lock(mutex);
     return writes;
@@ -472,7 +472,7 @@ class SampleWriter {
   std::unique_ptr<Second> second_;  // Null: not permitted.
   Mutex mutex_;
   std::unordered_set<std::string> changed_ GUARDED_BY(mutex_);  // To version 2.
-  std::uint64_t acknowledged_ GUARDED_BY(mutex_){0};            // Of first_.
+  std::uint64_t acknowledged_ GUARDED_BY(mutex_){0};            // By first_.
   int awaited_ GUARDED_BY(mutex_){0};  // Readers of first_.
   bool told_ GUARDED_BY(mutex_){false};
 };

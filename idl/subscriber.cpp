@@ -177,7 +177,7 @@ class SourceOf : public Source<Message> {
   typename Codec<Message, kVersion>::Wire wire_;
 };
 
-// The reader of one topic, with what the library tells of it: all but its
+// The reader of one topic, with the library's facts about it: all but its
 // messages.
 class TopicReader : public dds::DataReaderListener {
  public:
