@@ -188,7 +188,7 @@ Digits DigitsOf(std::string_view cell, char& sign) {
 // Separators are compared by (lines with the most usual number of cells, that
 // number). The agreement comes first: a semicolon table with decimal commas may
 // have more commas than semicolons, but not as many in the header as in the
-// rows. Of equal ones the first in the list is taken.
+// rows. Among equal ones the first in the list is taken.
 char FindSeparator(std::span<const std::string_view> lines) {
   char best = ',';
   std::pair<std::size_t, std::size_t> most{0, 1};

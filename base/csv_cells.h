@@ -77,7 +77,7 @@ std::string Quoted(std::string_view text);
 /// "a,b"
 std::string Listed(const std::vector<std::string>& names);
 
-/// What a cell tells about the decimal sign.
+/// The evidence of a cell for the decimal sign.
 enum class Digits {
   kNone,       ///< No sign, or no number.
   kDecimal,    ///< "0.5", "12.34": the sign cannot group thousands.
@@ -91,8 +91,8 @@ Digits DigitsOf(std::string_view cell, char& sign);
 /// the same number of cells, as many as possible.
 char FindSeparator(std::span<const std::string_view> lines);
 
-/// `cell` without what groups its digits by threes: blanks, ' and `thousands`
-/// (NUL: nothing else). @returns nothing if there is no such group.
+/// `cell` without the signs that group its digits by threes: blanks, ' and
+/// `thousands` (NUL: nothing else). @returns nothing if there is no such group.
 std::optional<std::string> Ungrouped(std::string_view cell, char thousands);
 
 /// `text` in lower case without accents, for comparing words: "Stellgröße" is

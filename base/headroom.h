@@ -16,7 +16,7 @@ void RequireHeadroom(int threads, std::size_t bytes);
 /// Why the process cannot open so many more files and sockets at once, found by
 /// doing it, and the limits to look at; empty if it can.
 std::string LackOfDescriptors(int count);
-/// For what is deaf or fails under another name without them.
+/// For libraries that are deaf or fail under another name without them.
 /// @throws PassingError with that reason.
 void RequireDescriptors(int count);
 

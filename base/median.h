@@ -8,7 +8,7 @@
 
 namespace fdi {
 
-/// The median of one value or more; of an even number, the greater of the two
+/// The median of one value or more; with an even number, the greater of the two
 /// in the middle.
 template <typename T>
 T Median(std::vector<T> values) {

@@ -5,8 +5,8 @@
 #include <shared_mutex>
 #include <utility>
 
-// What a mutex guards, checked by clang (-Wthread-safety) and nothing to other
-// compilers. Of a member: its mutex. Of a function, or of a lambda behind its
+// Facts on a mutex, checked by clang (-Wthread-safety) and nothing to other
+// compilers. For a member: its mutex. For a function, or a lambda behind its
 // `()`: the mutexes that its caller holds, or must not hold.
 #if defined(__clang__)
 #define FDI_THREAD_FACT(fact) __attribute__((fact))
@@ -42,7 +42,7 @@ class FDI_THREAD_FACT(scoped_lockable) MutexLock {
  public:
   explicit MutexLock(Mutex& mutex) FDI_THREAD_FACT(acquire_capability(mutex))
       : lock_(mutex.mutex_) {}
-  /// Of a mutex that the thread holds already.
+  /// Adopts a mutex that the thread holds already.
   MutexLock(Mutex& mutex, std::adopt_lock_t adopt) REQUIRES(mutex)
       : lock_(mutex.mutex_, adopt) {}
   ~MutexLock() FDI_THREAD_FACT(release_capability()) = default;

@@ -13,7 +13,7 @@ class PassingError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-inline constexpr int kExitPassing = 6;  ///< Of every program.
+inline constexpr int kExitPassing = 6;  ///< Same for all programs.
 
 /// Whether a call that failed with this value of errno may succeed later.
 inline bool MayPass(int error) {

@@ -131,7 +131,7 @@ Encoding EncodingOf(std::string_view head, bool is_utf8,
   return is_utf8 ? Encoding::kUtf8 : Encoding::kLatin1;
 }
 
-// Of a whole text, or of blocks that cut no UTF-16 unit and no pair of them.
+// Converts a whole text, or blocks that cut no UTF-16 unit and no pair of them.
 std::string Converted(std::string bytes, Encoding encoding,
                       const std::string& source) {
   std::string text;
@@ -273,8 +273,8 @@ struct Spool {
   bool packed{false};
 };
 
-// Reads the file once. What does not fit into memory is read again from the
-// file itself, or from a temporary one if it has to be unpacked.
+// Reads the file once. A text that does not fit into memory is read again from
+// the file itself, or from a temporary one if it has to be unpacked.
 Spool SpoolOf(const std::filesystem::path& path, const std::string& source) {
   Spool raw;
   bool own_file = path == "-" || !std::filesystem::is_regular_file(path);
@@ -293,7 +293,7 @@ Spool SpoolOf(const std::filesystem::path& path, const std::string& source) {
                       ": has more than 2 GiB and is no file; try a file");
     }
     if (raw.file == nullptr && own_file) {
-      // What comes from a device without end is no text either.
+      // Bytes from a device without end are no text either.
       EncodingOf(raw.head, true, source);
       raw.file = TemporaryFile(source);
       Append(raw.head, *raw.file, source);
@@ -392,7 +392,7 @@ TextLines TextLines::OfFile(const std::filesystem::path& path) {
       ReadAt(*lines.file_, 0, kUtf8Mark.size(), source) == kUtf8Mark) {
     lines.begin_ = kUtf8Mark.size();
   }
-  // What is kept of the text is no longer needed.
+  // The part of the text that was kept is no longer needed.
   raw.head = std::string();
   lines.ForEach([&](std::string_view line, std::size_t number) {
     if (line.find('\0') != std::string_view::npos) {

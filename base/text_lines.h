@@ -10,7 +10,7 @@
 
 namespace fdi {
 
-/// The lines of a text, read in passes. Of a file, at most 16 MiB are kept in
+/// The lines of a text, read in passes. At most 16 MiB of a file are kept in
 /// memory: a longer one is read again in each pass, from a temporary file
 /// without a name if it has to be unpacked or converted to UTF-8. So a gzip of
 /// a few megabytes does not take the memory of the text that it unpacks to.
@@ -33,7 +33,7 @@ class TextLines {
 
   /// Whether the file was a gzip.
   bool packed() const { return packed_; }
-  /// Of the text.
+  /// Size of the text.
   std::size_t bytes() const { return end_ - begin_; }
 
  private:

@@ -8,7 +8,7 @@ namespace fdi {
 
 inline constexpr std::size_t kMaxTomlBytes = 16U << 20U;
 
-/// What every program asks of TOML before it is parsed. The parser and the
+/// Limits of every program on TOML before it is parsed. The parser and the
 /// destructors of its tree recurse, and a key of many thousand parts, or as
 /// many brackets, would overflow the stack.
 /// @param name of the file, for messages.

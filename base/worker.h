@@ -48,7 +48,7 @@ class Worker {
            result_.wait_for(timeout) == std::future_status::ready;
   }
 
-  /// Waits for the body to return. @throws what it threw, once.
+  /// Waits for the body to return. @throws its exception, once.
   void Join() {
     if (thread_.joinable()) {
       thread_.join();
