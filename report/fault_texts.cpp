@@ -68,7 +68,7 @@ SeverityBands ReadBands(TomlReader& table) {
   return bands;
 }
 
-// What a fault and a figure have in common.
+// Reads the keys that a fault and a figure have in common.
 template <typename Entry>
 void ReadWords(TomlReader& table, Entry& text) {
   text.name = table.Text("name").value_or(text.name);
@@ -185,9 +185,9 @@ const FaultText& FaultTexts::Of(int fault) const {
   return text->second;
 }
 
-// Of several faults that are one answer, the words have the names and
+// For several faults that are one answer, the words have the names and
 // disciplines of all, the gravest class and severity, and the check of the
-// first. A priority that was stored with the episode says the severity better
+// first. A priority that was stored with the episode gives the severity better
 // than today's catalogue.
 FaultWords FaultTexts::Words(std::string_view answer, double strength,
                              std::optional<std::int64_t> priority) const {

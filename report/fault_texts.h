@@ -46,8 +46,8 @@ struct FaultText {
   SeverityBands bands;
 };
 
-/// What is counted of a valve (loop::Figure), and from where on it needs
-/// somebody.
+/// A figure that is counted for a valve (loop::Figure), and the value at which
+/// the valve needs attention.
 struct FigureText {
   std::string name;
   std::string unit;  ///< "% of travel"; empty: none.
@@ -69,7 +69,7 @@ struct FigureText {
 /// used.
 struct FaultWords {
   std::string name;
-  std::string check;       ///< Of the first fault.
+  std::string check;       ///< For the first fault.
   std::string discipline;  ///< Distinct ones, joined by "|".
   NamurClass namur{NamurClass::kMaintenanceRequired};
   Severity severity{Severity::kLow};
@@ -109,7 +109,7 @@ class FaultTexts {
   /// fault_history calls it.
   std::map<std::string, std::string> Names() const;
 
-  /// What the monitor needs to say how bad a fault is.
+  /// The bands from which the monitor tells how bad a fault is.
   SeverityCatalogue Severities() const;
 
  private:

@@ -5,9 +5,9 @@
 
 namespace fdi::report {
 
-/// A screen of standard output for a text that is printed again and again, such
-/// as a table of what is live. Lines are cut at its edge. What was on the
-/// terminal comes back at the end.
+/// A screen of standard output for a text that is printed again and again, e.g.
+/// a table of live values. Lines are cut at its edge. The former content of
+/// the terminal comes back at the end.
 class LiveScreen {
  public:
   /// @throws std::system_error if standard output is no terminal.

@@ -31,7 +31,7 @@ enum ExitCode : int {
   kExitNotFound = 5,
 };
 
-/// What a verb receives.
+/// The arguments of a verb.
 struct Context {
   const GlobalOptions& options;
   LogSink log;               ///< To stderr, lines `event key=value`.
@@ -89,8 +89,8 @@ class Program {
   /// Adds --csv to a verb that returns a Report with a table.
   void AllowCsv(CLI::App& verb, const std::string& description);
 
-  /// Refuses a verb, or an option of it, of a component that this build was
-  /// made without; see LeftOut(). @param verb that has the option; "" for a
+  /// Refuses a verb, or an option of it, if its component is not in this
+  /// build; see LeftOut(). @param verb that has the option; "" for a
   /// verb of the program.
   void AddLeftOut(const std::string& verb, const std::string& name,
                   const std::string& option);
@@ -135,7 +135,7 @@ class Program {
 
   std::unique_ptr<CLI::App> app_;
   GlobalOptions options_;
-  bool csv_{false};  // Of the chosen verb.
+  bool csv_{false};  // For the chosen verb.
   bool help_prepared_{false};
   std::vector<Verb> verbs_;
   std::vector<VerbExamples> examples_;

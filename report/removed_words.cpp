@@ -8,7 +8,7 @@ namespace {
 
 struct Removed {
   std::string_view program;
-  std::string_view verb;  ///< "*": of any verb of the program.
+  std::string_view verb;  ///< "*": any verb of the program.
   std::string_view name;
   std::string_view instead;
 };

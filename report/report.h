@@ -32,7 +32,7 @@ struct Column {
   /// "fit_vaf_pct".
   std::string key{};
   Format format{Format::kPlain};
-  int decimals{2};  ///< Of numbers that are not integers.
+  int decimals{2};  ///< In numbers that are not integers.
   /// If a table is wider than the terminal, columns above 0 are omitted, the
   /// highest first.
   int spare{0};
@@ -43,7 +43,7 @@ struct Column {
   std::function<Tone(const Json& row)> tone{};
   /// Default: columns with numbers are right-aligned, others left-aligned.
   std::optional<Align> align{};
-  /// What the column says, for readers who do not know it. HTML lists the
+  /// The meaning of the column, for readers who do not know it. HTML lists the
   /// meanings below the table.
   std::string meaning{};
   /// The id of the picture that HTML links the cell to; empty: none.
@@ -81,7 +81,7 @@ class Report {
 
   /// Shows the array at `key`, a member of the document or a path "a/b", as a
   /// table. A row is an object. `if_empty` is printed if there is no row.
-  /// Of an object {"f3": {...}, ...} each member is a row, its name the row's
+  /// In an object {"f3": {...}, ...} each member is a row, its name the row's
   /// member "name". Only a terminal makes the text narrower; files and pipes
   /// get all columns.
   Report& Table(std::string key, std::vector<Column> columns,
@@ -95,7 +95,7 @@ class Report {
   Report& Heading(std::string text);
   /// An SVG element below its title, in HTML only. `id` is what cells link to.
   Report& Picture(std::string id, std::string title, std::string svg);
-  /// What --csv prints, if not the first table: the members `keys` of the rows
+  /// The output of --csv, if not the first table: members `keys` of the rows
   /// at `key`.
   Report& Csv(std::string key, std::vector<std::string> keys);
 

@@ -26,7 +26,7 @@ constexpr std::array<int, 4> kSignals = {SIGINT, SIGTERM, SIGHUP, SIGPIPE};
 std::atomic<int> g_event{-1};
 std::atomic<bool> g_stop{false};
 std::atomic<bool> g_reload{false};
-std::atomic<bool> g_reloads{false};  // What SIGHUP means.
+std::atomic<bool> g_reloads{false};  // The meaning of SIGHUP.
 std::atomic<bool> g_installed{false};
 std::atomic<std::int64_t> g_patience_ms{0};  // 0: any.
 std::atomic<const char*> g_last_words{""};

@@ -71,7 +71,7 @@ std::vector<std::size_t> TextTable::Widths() const {
   return widths;
 }
 
-// Of columns whose cells may be cut, the least.
+// The widths, but the least ones for columns whose cells may be cut.
 std::vector<std::size_t> TextTable::Least(
     std::vector<std::size_t> widths) const {
   for (std::size_t c = 0; c < columns_.size(); ++c) {
@@ -83,7 +83,7 @@ std::vector<std::size_t> TextTable::Least(
 }
 
 // The columns that remain, in order: while the table is too wide, the one with
-// the highest `spare` is dropped, of equal ones the leftmost. Columns with 0
+// the highest `spare` is dropped, the leftmost of several. Columns with 0
 // always remain.
 std::vector<std::size_t> TextTable::Shown(
     const std::vector<std::size_t>& widths, std::size_t width) const {

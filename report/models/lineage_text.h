@@ -12,7 +12,7 @@ namespace fdi::report {
 /// labelled_utc, fault, strength, run, samples}]}.
 Json LineageJson(const storage::Lineage& lineage);
 
-/// "NAME@VERSION, hash 0123456789abcdef"; "none". Of a set of `fdi-trainer
+/// "NAME@VERSION, hash 0123456789abcdef"; "none". For a set of `fdi-trainer
 /// limits` also ", with limits from 23.92 h".
 std::string ParentText(const storage::Lineage& lineage);
 

@@ -134,7 +134,7 @@ bool AnyHas(const std::vector<TracePoint>& trace, Signal signal) {
   });
 }
 
-// What the valve moves: of a loop with PV that one, with F only if it is there.
+// Quantities that the valve moves: PV if the loop has one, else F or with it.
 std::vector<Panel> AnswerPanels(const EpisodeEvidence& evidence,
                                 const std::vector<TracePoint>& trace) {
   std::vector<Panel> panels;

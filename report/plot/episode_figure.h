@@ -18,7 +18,7 @@ struct EpisodeEvidence {
   storage::Episode episode;
   std::vector<storage::HistoryEntry> events;
   std::vector<TracePoint> trace;
-  std::vector<DataGap> gaps;                 ///< Those that overlap the trace.
+  std::vector<DataGap> gaps;                 ///< Gaps that overlap the trace.
   std::optional<EpisodeLook> look;           ///< Its explanation by simulation.
   std::vector<storage::ValveEvent> repairs;  ///< Work on the valve, ever.
   /// The set behind the diagnosis: thresholds and T. If missing, not drawn.

@@ -83,17 +83,17 @@ struct Mark {
 
 /// One pair of axes. A panel with only bands is a strip without values.
 struct Panel {
-  std::string label;  ///< Of the vertical axis, with unit: "flow F [m3/h]".
+  std::string label;  ///< Vertical axis, with unit: "flow F [m3/h]".
   std::vector<Series> series{};
   std::vector<Limit> limits{};
-  std::optional<Range> range{};      ///< Of the values; empty: automatic.
+  std::optional<Range> range{};      ///< Range of the values; empty: automatic.
   std::vector<Band> bands{};         ///< In this panel only.
   std::vector<std::string> notes{};  ///< Lines of text below the legend.
   double height{200.0};              ///< [px]
   /// A horizontal axis of its own, for the last panel: one variable over
   /// another. Its series have their own x, in any order.
   std::optional<Range> own_axis{};
-  std::string own_label{};  ///< Of that axis, with unit.
+  std::string own_label{};  ///< Label of that axis, with unit.
 };
 
 /// Panels above each other on one horizontal axis, but see Panel::own_axis.
