@@ -86,7 +86,7 @@ class AlarmReader {
       if (!history_) {
         history_ = std::make_unique<storage::HistoryReader>(path_);
       }
-      history_->Version();  // Opens a file anew that was replaced.
+      history_->Version();  // Opens a file again if it was replaced.
       auto alarms = history_->AlarmList(NowNs());
       std::erase_if(alarms, [this](const storage::Alarm& alarm) {
         return !GlobMatches(valves_, alarm.episode.valve_id);

@@ -1,4 +1,4 @@
-// What this program says where a build was made without an optional component.
+// The replies of this program in a build without an optional component.
 #include "base/error.h"
 #include "programs/monitor/console.h"
 #include "programs/monitor/planner.h"

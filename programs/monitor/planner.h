@@ -8,7 +8,7 @@
 #include "report/program.h"
 #include "storage/history/common_cause.h"
 
-/// What the planner adds to the verbs of this program, or left_out.cpp if the
+/// The planner's additions to the verbs of this program, or left_out.cpp if the
 /// build has no planner.
 namespace fdi::monitor {
 

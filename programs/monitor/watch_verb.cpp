@@ -53,7 +53,7 @@ struct WatchCounts {
 };
 
 constexpr std::chrono::seconds kStopPatience{3};
-constexpr std::chrono::seconds kRefresh{1};  // Of the table.
+constexpr std::chrono::seconds kRefresh{1};  // Period of the table.
 
 bool Passed(Clock::time_point since, double seconds) {
   return seconds > 0.0 &&
@@ -77,7 +77,7 @@ void PrintCounts(const WatchCounts& counts, std::uint64_t lost, bool json) {
   }
 }
 
-// Shows the table anew each second: on a terminal in place of the last one,
+// Shows the table every second: on a terminal in place of the last one,
 // else below it.
 class TableOutput {
  public:
@@ -177,7 +177,7 @@ int RunWatch(const WatchOptions& given, const report::Context& context) {
     }
     std::cout.flush();
   }
-  // What still waits for its model set is printed without its names.
+  // Records that still wait for their model set are printed without its names.
   records.Flush(Clock::time_point::max());
   if (output && !in_place) {
     output->Show(Clock::now());

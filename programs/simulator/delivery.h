@@ -112,7 +112,7 @@ struct FedValve {
   std::string valve_id;
   std::uint64_t source_id{0};
   std::optional<std::uint64_t> seed{};
-  std::string run_id{};  ///< Of the recorded run, if any.
+  std::string run_id{};  ///< Id of the recorded run, if any.
   std::uint64_t samples{0};
   std::int64_t first_stamp_ns{0};
   std::int64_t last_stamp_ns{0};

@@ -63,7 +63,7 @@ Recording LoadRun(const ReplayOptions& options,
   return recording;
 }
 
-// Of the valve's model set in the data directory, if any.
+// From the valve's model set in the data directory, if any.
 std::optional<FlowTarget> FlowTargetOf(const std::string& valve,
                                        const report::Context& context) {
   const storage::DataDirectory data{context.options.data_dir};

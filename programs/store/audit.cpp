@@ -55,9 +55,9 @@ struct LoopRecord {
   std::vector<SampleSeries> stretches;
 };
 
-// A map of the loop's columns, so that the importer reads loops, too. What the
-// user's map leaves open but the signals is left to the reader, which refuses
-// what it cannot know.
+// A map of the loop's columns, so that the importer reads loops, too. Settings
+// that the user's map leaves open, other than signals, are left to the reader,
+// which refuses what it cannot know.
 importer::ColumnMap LoopMap(const TextLines& lines, const AuditOptions& options,
                             const std::string& source) {
   importer::ColumnMap map = options.table.Read(false);
@@ -235,8 +235,8 @@ std::optional<loop::Window> WindowOf(Samples part, double period_s,
   window.open_op = record.open_op;
   window.pv = Series(part, Signal::kPv);
   if (!window.pv.empty()) {
-    // Of a valve's PV only the record tells the sense. Its tag is that of the
-    // valve: FV101 may be in a level loop.
+    // The sense of a valve's PV is known only from the record. Its tag is that
+    // of the valve: FV101 may be in a level loop.
     window.sp = Series(part, Signal::kSp);
     if (service == 'L' || !of_valve || !options.service.empty()) {
       loop::SetService(service, window);
@@ -263,7 +263,7 @@ std::optional<loop::Window> WindowOf(Samples part, double period_s,
   return window;
 }
 
-// What the user may want to change, from what was seen; empty: nothing.
+// A hint at what the user may want to change, from what was seen; may be empty.
 std::string HintOf(const Judged& one, bool has_sp) {
   const loop::Evidence& e = one.audit.evidence;
   if (e.exchanged) {
@@ -413,7 +413,7 @@ Json JudgedJson(const Judged& one) {
       {"stands_share", Optional(!one.window.x.empty(), e.standing.share)}};
 }
 
-// What needs somebody first comes first; wide bands before narrow ones.
+// The order of urgency; wide bands before narrow ones.
 int RankOf(const Judged& one) {
   switch (one.audit.verdict) {
     case Verdict::kNoResponse:

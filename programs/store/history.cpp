@@ -125,7 +125,7 @@ Report ListEpisodes(const HistoryOptions& options, const Context& context) {
     keys.insert(keys.end(), {"host", "monitor"});
   }
   report.Csv("episodes", keys);
-  // Of two faults, what a narrow list keeps has to say so.
+  // For two faults, the text that a narrow list keeps has to say so.
   Column meaning = TextColumn("meaning", [](const Json& row) {
     const Json& name = row["fault_name"];
     return (row["second"].is_null() ? "" : FaultText(row) + ": ") +
@@ -193,7 +193,7 @@ bool ByPhysics(const std::string& layer) {
   return layer == LayerName(Layer::kPhysics);
 }
 
-// Of SECOND, what came on top of the faults of the episode.
+// The text of SECOND: a fault on top of those of the episode.
 std::string SecondText(const std::string& value) {
   return value == "none"      ? "alone again"
          : value == "unknown" ? "more than one fault, among them these"

@@ -259,8 +259,8 @@ struct FileOptions {
   bool stamps{false};
 };
 
-// What the intake rejected is left out, because late and repeated samples would
-// make a file that cannot be imported.
+// Leaves out samples that the intake rejected, because late and repeated ones
+// would make a file that cannot be imported.
 int ExportRun(const FileOptions& options, const Context& context) {
   const StoredRun run = RunStore(DataOf(context).runs()).Load(options.selector);
   std::vector<LabelledSample> samples;

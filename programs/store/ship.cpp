@@ -43,7 +43,7 @@ PlantLimits Limits(const Context& context, std::chrono::seconds statement) {
   return limits;
 }
 constexpr std::chrono::seconds kShipping{120};
-// Of the owner: indices of a large history are built, or rows of years deleted.
+// For the owner: indices of a large history are built, or old rows deleted.
 constexpr std::chrono::seconds kOwnerWork{3600};
 
 Report InitPlant(const ShipOptions& options, const Context& context) {

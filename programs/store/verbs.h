@@ -53,7 +53,7 @@ LoopAudits AuditStoredRuns(const DataDirectory& data, std::int64_t since_ns,
                            int windows);
 void AddFaultsVerb(report::Program& program);
 void AddMaintenanceVerbs(report::Program& program);
-// Of optional components; in a build without them, left_out.cpp defines these.
+// Verbs of optional components; in a build without them, left_out.cpp has them.
 void AddPlannerVerbs(report::Program& program);  ///< health, worklist
 void AddShipVerb(report::Program& program);
 
@@ -102,7 +102,7 @@ struct PlantOptions {
   void AddTo(CLI::App& verb);
 };
 
-/// Which episodes of which history.
+/// The episodes and the history that a verb reads.
 struct HistoryOptions {
   EpisodeOptions filter;
   PlantOptions plant;
@@ -120,7 +120,7 @@ struct PlantPrune {
 };
 Report PrunePlant(const PlantPrune& options, const Context& context);
 
-/// The plant's history; of an optional component, too.
+/// The plant's history; an optional component, too.
 std::unique_ptr<History> OpenPlant(const PlantOptions& plant);
 /// The history of --data, or the plant's.
 std::unique_ptr<History> OpenHistory(const PlantOptions& plant,
@@ -165,7 +165,7 @@ struct ValveNotes {
   findings::Identities about{};
   std::vector<std::pair<std::string, ValveEvent>> repairs{};
 };
-/// Those of models.db; nothing for the history of a plant.
+/// Notes from models.db; nothing for the history of a plant.
 ValveNotes NotesOf(const Context& context);
 ValveNotes NotesOf(const PlantOptions& plant, const Context& context);
 /// The columns of the view fault_history, in its order.

@@ -18,8 +18,8 @@ void RequireStorable(const std::string& name, const std::string& option);
 /// Moves the bar, and ends the work by Interrupted where the user asked for it.
 Progress Reporting(report::Progress& bar, const report::StopSignals& signals);
 
-/// What is known about false alarms: the rate that the limits are set for, the
-/// hours that were seen, and what these alone bound.
+/// Facts on false alarms: the rate that the limits are set for, the hours that
+/// were seen, and the bound that follows from these only.
 std::string AlarmRateText(const ModelSet& models);
 /// ["f8", "f14"]
 report::Json FaultsJson(const std::vector<int>& faults);

@@ -200,7 +200,7 @@ std::vector<int> FaultsOfRodAlone() {
   return faults;
 }
 
-// What signals and period of the record keep from being seen.
+// Faults and changes that the signals and period of the record do not show.
 std::vector<std::string> LimitsOfRecord(const Onboarding& onboarding) {
   std::vector<std::string> lines;
   const bool at_position = onboarding.models.position_as_command;
@@ -379,7 +379,7 @@ Onboarding OnboardOrSayWhyNot(const std::vector<TrainingRun>& runs,
   }
 }
 
-// What the valve is onboarded from, and how.
+// The data and settings by which the valve is onboarded.
 struct OnboardingJob {
   std::vector<TrainingRun> runs;
   OnboardingOptions settings;

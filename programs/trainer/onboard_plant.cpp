@@ -27,7 +27,7 @@ using report::Json;
 using report::Tone;
 using storage::LoopState;
 
-// What a dry run reads of each file: the form, the words, the ranges.
+// Lines that a dry run reads of each file, for form, words and ranges.
 constexpr std::size_t kDryRunLines = 600;
 
 std::vector<std::filesystem::path> FilesOf(
@@ -49,7 +49,7 @@ std::vector<std::filesystem::path> FilesOf(
   return files;
 }
 
-// What the command line does not state is taken from the table.
+// Takes from the table everything that the command line does not state.
 importer::ColumnMap FormOf(importer::TableOptions form,
                            const importer::PlantTable& table,
                            const std::filesystem::path& folder, bool utc) {

@@ -1,6 +1,6 @@
 // fdi-trainer relearn: what is known of a valve since its set was made becomes
-// the next version of the set. What is learnt from labels and healthy hours is
-// decided in trainer/learning; here the steps follow each other, and it is said
+// the next version of the set. The lessons of labels and healthy hours are
+// decided in trainer/learning; here the steps follow each other, and it reports
 // what changes.
 #include <algorithm>
 #include <charconv>
@@ -114,7 +114,7 @@ importer::CsvOptions FormOf(const RelearnOptions& options,
 // the files is whole after any end.
 constexpr std::chrono::milliseconds kPatience{800};
 
-// Makes the models anew from the former record and the hours that the request
+// Makes the models again from the former record and the hours that the request
 // names, all as the valve measures it. The fit starts where the former one
 // ended.
 std::string LearnModels(RelearnRequest& request, const RelearnOptions& options,
@@ -177,7 +177,7 @@ std::string LearnModels(RelearnRequest& request, const RelearnOptions& options,
   return JudgeRecord(runs, onboarding.hours, &*onboarding.coverage).sentence;
 }
 
-// Trains a set of `train` anew, on its own runs and on the episodes.
+// Trains a set of `train` again, on its own runs and on the episodes.
 void TrainAnew(const RelearnOptions& options, report::StopSignals& signals,
                const report::Context& context, Relearning& learnt) {
   const storage::DataDirectory directory{context.options.data_dir};
