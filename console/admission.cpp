@@ -85,7 +85,7 @@ Admission::Admission(const std::filesystem::path& secret_file, LogSink log)
     : secret_(ReadSecret(secret_file)), log_(std::move(log)) {}
 
 // A proxy whose secret is wrong must not pass for a program of this machine:
-// what it asks is refused, not answered without a user.
+// its requests are refused, not answered without a user.
 bool Admission::Admit(const httplib::Request& request,
                       httplib::Response& response) {
   if (FromProxy(request)) {

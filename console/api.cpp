@@ -19,12 +19,12 @@
 namespace fdi::console {
 namespace {
 
-// Of a page that has its style and pictures in itself, and no script.
+// For a page that has its style and pictures in itself, and no script.
 constexpr const char* kPagePolicy =
     "default-src 'none'; style-src 'unsafe-inline'; base-uri 'none'; "
     "form-action 'none'; frame-ancestors 'none'";
 
-// For what a request asks of a history on another host.
+// For requests that need a history on another host.
 constexpr std::chrono::seconds kRequestTime{15};
 constexpr std::int64_t kLastMs = 9'000'000'000'000;  // year 2255
 

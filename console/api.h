@@ -40,7 +40,7 @@ struct MonitorLine {
   bool silent{false};
 };
 
-/// What the console needs from the monitor; called by any thread.
+/// The sources in the monitor that the console needs; called by any thread.
 struct ConsoleSources {
   std::filesystem::path history;
   std::filesystem::path models;
@@ -61,7 +61,7 @@ struct ConsoleSources {
 inline constexpr int kHistoryPlaces = 8;
 inline constexpr int kPicturePlaces = 2;
 
-/// What responses are made from; everything referenced outlives the server.
+/// The sources of all responses; everything referenced outlives the server.
 struct Api {
   ConsoleSources sources;
   LiveBoard& board;

@@ -162,7 +162,7 @@ Json Shelves(const Api& api, const httplib::Request& /*request*/) {
           {"note", TextOrNull(storage::TakeNote(*reader))}};
 }
 
-// Those that are open.
+// The open common causes.
 Json Causes(const Api& api, const httplib::Request& /*request*/) {
   Json list = Json::array();
   const auto history = api.History();

@@ -39,7 +39,7 @@ struct ValveAlarm {
   bool unacked{false};
   std::optional<std::int64_t> shelved_until_ns;
   std::optional<std::int64_t> shelf_planned_ns;  ///< Begin of the next one.
-  // Of the active alarm.
+  // Facts on the active alarm.
   std::optional<Severity> severity;
   std::optional<double> strength;  ///< Nothing: it has no name.
   std::optional<std::int64_t> unconfirmed_ns;

@@ -107,8 +107,8 @@ Json WindowsJson(const ModelFacts& models,
   return json;
 }
 
-// What the entry of the valve and the table of the plant say about it. The page
-// of a plant does not have them.
+// Facts on the valve from its entry and the table of the plant. The page of a
+// plant does not have them.
 Json About(const Api& api, const httplib::Request& request) {
   Json about = {{"type", nullptr},        {"service", nullptr},
                 {"description", nullptr}, {"location", nullptr},

@@ -109,7 +109,7 @@ StreamCounts LiveStream::counts() const {
 
 void LiveStream::Start(FeedParts parts) {
   parts_ = std::make_unique<FeedParts>(std::move(parts));
-  // Read here, so that a history that cannot be read ends the start. That of a
+  // Read here, so that an unreadable history ends the start. The history of a
   // plant may be away.
   if (!parts_->plant) {
     parts_->alarms.Refresh(parts_->utc_now_ns());  // The initial alarms.

@@ -37,7 +37,7 @@ struct StreamCounts {
   std::uint64_t dropped{0};  ///< Too slow.
 };
 
-/// What the stream reads; everything outlives its threads.
+/// The sources of the stream; everything outlives its threads.
 struct FeedParts {
   LiveBoard& board;
   AlarmBook& alarms;

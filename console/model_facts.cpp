@@ -150,7 +150,7 @@ void StoredModels::Cache(std::shared_ptr<const ModelFacts> facts) {
 
 std::vector<WindowBeyond> WindowsBeyond(const ModelFacts& models,
                                         const std::vector<TracePoint>& points) {
-  ModelSet set;  // Of the channels alone, which is what windows are made from.
+  ModelSet set;  // With only the channels, from which windows are made.
   for (const ModelFacts::Channel& channel : models.channels) {
     set.channels.emplace_back().windows = channel.windows;
   }

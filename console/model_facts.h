@@ -16,7 +16,7 @@
 
 namespace fdi::console {
 
-/// What a reader needs to know of a model set to interpret its results.
+/// Facts that a reader needs on a model set to interpret its results.
 struct ModelFacts {
   struct Channel {
     std::string name;  ///< "X", "F", ...
@@ -30,14 +30,14 @@ struct ModelFacts {
   std::uint64_t hash{0};
   std::vector<Channel> channels;
   std::vector<std::string> faults;  ///< "f19", ... by bit of a FaultSet.
-  std::vector<std::string> undetectable{};  ///< Those that look normal.
+  std::vector<std::string> undetectable{};  ///< Faults that look normal.
   double isolation_threshold{0.7};          ///< T
   int isolation_samples{20};                ///< t_k
   int detection_samples{2};                 ///< n_d
   double period_s{1.0};
   FlowUnit flow_unit{FlowUnit::kM3PerHour};
   SignalMask required{0};       ///< Signals that the set needs.
-  Signal command{Signal::kCv};  ///< What it reads as the command.
+  Signal command{Signal::kCv};  ///< Signal read as the command.
 };
 
 std::shared_ptr<const ModelFacts> FactsOf(const ModelSet& models);
@@ -69,13 +69,13 @@ class StoredModels {
 struct WindowBeyond {
   std::size_t channel{0};
   int length{0};          ///< [samples]
-  bool deviation{false};  ///< Of the residual about its mean; else the mean.
+  bool deviation{false};  ///< Deviation of the residual; else its mean.
   double value{0.0};      ///< [unit]
   double low{0.0};        ///< [unit]; 0 for a deviation.
   double high{0.0};       ///< [unit]
 };
 
-/// Those at the last of `points`, which reach back as far as is known. They
+/// The windows at the last of `points`, which reach back as far as known. They
 /// raise alarms of slow and small faults, while each single residual is within
 /// its thresholds. None where the limits of the set are not known.
 std::vector<WindowBeyond> WindowsBeyond(const ModelFacts& models,
