@@ -39,7 +39,7 @@ std::string HealthLimitText(const HealthLimit& limit);
 /// "m3/h", "%", "", "strokes"
 std::string HealthUnit(const HealthLimit& limit, FlowUnit flow_unit);
 
-/// What the hours of health say about one quantity.
+/// Daily values of one quantity from the hours of health.
 struct HealthSeries {
   std::vector<DailyValue> days;  ///< Judged days, since 1970-01-01.
   double seen_hours{0.0};
@@ -61,7 +61,7 @@ HealthSeries SeriesOf(std::span<const HealthHour> hours,
 /// The mean residuals of one signal hour by hour, likewise comparable.
 struct HourlyResiduals {
   std::vector<DailyValue> hours;  ///< `day` counts hours since 1970-01-01.
-  double deviation{0.0};  ///< Of the single residual within hour and bin.
+  double deviation{0.0};  ///< Single residuals' deviation in hour and bin.
 };
 
 /// An hour needs a quarter of it LIVE.

@@ -12,7 +12,7 @@ namespace {
 
 using report::Json;
 
-// A loop that was judged for a smaller share of the time is listed as such.
+// A loop that was judged for a smaller share of the time is listed as unjudged.
 constexpr double kMostlyJudged = 0.5;
 
 // Why a valve was not judged, by QualityName().

@@ -10,7 +10,7 @@
 
 namespace fdi::planner {
 
-/// Which loops there are and what watches each of them: those that are planned,
+/// The loops and how each of them is watched: all that are planned,
 /// and whatever was heard, recorded or found in the period, for a loop that
 /// nobody has listed must not be missing.
 class LoopCoverage {

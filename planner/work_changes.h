@@ -7,7 +7,7 @@
 
 namespace fdi::planner {
 
-/// What is different from the last list: of each valve its worst row that
+/// The changes since the last list: for each valve, its worst row that
 /// stands, and whether it was judged, compared one by one, so a valve may have
 /// two changes. Worse and better are by severity; a change of confidence is
 /// none. {"last_utc", "file", "valves": [{"valve_id", "change", "before",
