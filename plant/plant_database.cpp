@@ -221,7 +221,7 @@ PlantRows PlantDatabase::TakeResults(Wait& wait) {
   return last;
 }
 
-// A network that is gone is noticed within 10 s. What the URL says comes later
+// A network that is gone is noticed within 10 s. Settings of the URL come later
 // in the list, and wins.
 void PlantDatabase::Connect(const std::string& url) {
   const std::array<const char*, 9> names = {"keepalives_idle",
@@ -265,7 +265,7 @@ void PlantDatabase::Connect(const std::string& url) {
          (status == PGRES_POLLING_WRITING || status == PGRES_POLLING_READING)) {
     WaitFor(wait, status == PGRES_POLLING_WRITING ? POLLOUT : POLLIN);
     status = PQconnectPoll(c);
-    name_ = NameOf(c);  // Of several hosts that of now.
+    name_ = NameOf(c);  // The present one of several hosts.
   }
 }
 
@@ -481,7 +481,7 @@ PlantTransaction::~PlantTransaction() {
 }
 
 void PlantTransaction::Commit() {
-  // Of a transaction with a failed statement, COMMIT rolls back and reports
+  // If a statement of the transaction has failed, COMMIT rolls back and reports
   // success. The failed statement has thrown before it gets here.
   plant_.Run("COMMIT");
   open_ = false;

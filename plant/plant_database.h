@@ -41,16 +41,16 @@ class PlantRows {
   /// Rows that an INSERT, UPDATE or DELETE changed.
   std::int64_t changed() const;
   std::optional<std::string> Text(int row, int column) const;
-  /// Of a column that is not NULL.
+  /// Reads a column that is not NULL.
   std::int64_t Int64(int row, int column) const;
-  /// Of a bytea; NULL is empty.
+  /// Reads a bytea; NULL is empty.
   std::vector<std::byte> Bytes(int row, int column) const;
 
  private:
   std::unique_ptr<pg_result, void (*)(pg_result*)> result_;
 };
 
-/// How long to wait for a server that nobody here controls. What is over its
+/// How long to wait for a server that nobody here controls. A call beyond its
 /// limit, or stopped, throws PlantError, after which the connection is closed.
 struct PlantLimits {
   /// For each host of the URL, unless its connect_timeout is shorter.
@@ -128,10 +128,10 @@ class PlantDatabase {
   std::string plant_id_;
 };
 
-/// What a rule of retention took, or in a dry run would take.
+/// The rows deleted by a rule of retention, or to be deleted in a dry run.
 struct PlantPruned {
   std::int64_t deleted{0};
-  std::int64_t kept{0};                 ///< Protected, of those that are left.
+  std::int64_t kept{0};                 ///< Protected ones among the remaining.
   std::optional<std::int64_t> from_ns;  ///< Begin of the oldest,
   std::optional<std::int64_t> to_ns;    ///< and of the newest.
 };

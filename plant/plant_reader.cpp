@@ -105,7 +105,7 @@ Record RecordAt(const PlantRows& rows, int row) {
   return record;
 }
 
-// What `read` makes of each row; @returns how many it refuses, by reason.
+// Converts each row by `read`; @returns how many it refuses, by reason.
 template <typename Record, typename Read>
 std::map<std::string, std::int64_t> ReadRows(const PlantRows& rows,
                                              std::vector<Record>& records,
@@ -261,7 +261,7 @@ PlantRows PlantReader::Query(std::string_view sql,
       Replaced(Replaced(open, "GLOB", "~"), "?", "$") +
       " AND utc(e.detected_ns) >= utc($2) AND utc(e.detected_ns) <= utc($3)"
       " AND $5::bigint IS NOT NULL AND ($6 = '' OR e.monitor = $6)";
-  // Of tables without episodes.
+  // For tables without episodes.
   const std::string valve = IsGlob(filter.valve_glob)
                                 ? "valve_id ~ $1"
                                 : "($1 = '*' OR valve_id = $1)";
@@ -520,7 +520,7 @@ std::vector<CommonCause> PlantReader::Causes(std::int64_t since_ns) {
       plant_.Read(sql::plant_causes, {std::to_string(since_ns)});
   struct Row {
     std::string monitor;
-    CommonCause cause;  // Of one member.
+    CommonCause cause;  // With one member.
   };
   const auto read = [&rows](int r) {
     Row row;

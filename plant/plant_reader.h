@@ -13,10 +13,10 @@
 
 namespace fdi::storage {
 
-/// Reads the plant's history, over all monitors or those of one name. Of an id
+/// Reads the plant's history, over all monitors or those of one name. For an id
 /// that several monitors have, Show(), Events(), Look(), Trace() and
-/// AlarmList() give that of the first by host and name; of an hour of a valve,
-/// Health() the one with the longest LIVE time.
+/// AlarmList() give that of the first by host and name; for an hour of a valve,
+/// Health() gives the one with the longest LIVE time.
 ///
 /// Everybody with an account can write there, so each row is judged when it is
 /// read: one that cannot be (a stamp outside the years 1900 to 2149, an unknown

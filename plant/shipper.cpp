@@ -160,8 +160,8 @@ void ShortenLog(Database& history) {
       kLongLog) {
     return;
   }
-  // Of a thing only its last change counts, because its present state is
-  // shipped. Changes that are logged meanwhile make no other one needed again.
+  // Only the last change of an object counts, because its present state is
+  // shipped. Changes logged meanwhile do not make another one needed again.
   std::vector<std::int64_t> repeated;
   Statement rows = history.Prepare(sql::repeated_changes);
   while (rows.Step()) {
@@ -233,7 +233,7 @@ Shipped Shipper::Ship() {
   return shipped;
 }
 
-// Begins anew if this is a new plant, or one that lost what it had: its time is
+// Starts over if this is a new plant, or one that lost its data: its time is
 // before the one noted here, although it commits first.
 Shipper::Cursor Shipper::ReadCursor(std::int64_t shipped_ns_there) {
   Statement& row = history_.Cached(sql::ship_cursor);
@@ -261,8 +261,8 @@ Shipper::Cursor Shipper::ReadCursor(std::int64_t shipped_ns_there) {
 //                     gaps, shelves, sessions and common causes
 //     copied_ns null: changes after number
 //
-// What changes after it was copied has a number above the cursor's, which was
-// taken when the copy began.
+// An object that changes after it was copied has a number above the cursor's,
+// which was taken when the copy began.
 // @returns whether there is something.
 bool Shipper::TakeItems(Cursor& cursor) {
   history_.Run(sql::empty_batch);
@@ -294,7 +294,7 @@ bool Shipper::TakeItems(Cursor& cursor) {
   return true;
 }
 
-// What all plants have is not needed any more.
+// Deletes changes that all plants have.
 void Shipper::StoreCursor(const Cursor& cursor) {
   Transaction noted(history_);
   history_.Cached(sql::set_ship_cursor)
@@ -345,7 +345,7 @@ bool Shipper::ShipBatch(Shipped& shipped) {
   // It rises with every commit, even if the clock was set back: ReadCursor()
   // takes an earlier time in PostgreSQL for a loss.
   behind_ = behind_ || (cursor.behind && shipped_there_ns != last_there_ns_);
-  // Once all is shipped: what moved away has ended as such by then.
+  // Once all is shipped: episodes that moved away have ended by then.
   if (behind_ && !found) {
     EndLost();
     behind_ = false;
@@ -363,8 +363,8 @@ bool Shipper::ShipBatch(Shipped& shipped) {
 }
 
 // The plant has got more than this history knows of: it was restored from a
-// backup, or only the note here is missing. What is open there and not here
-// nobody would ever end or acknowledge.
+// backup, or only the note here is missing. Nobody would ever end or
+// acknowledge what is open there and not here.
 void Shipper::EndLost() {
   const std::string now = std::to_string(NowNs());
   const PlantRows episodes = plant_.Run(sql::open_episodes, {monitor_id_});
@@ -401,8 +401,8 @@ void Shipper::EndLost() {
   }
 }
 
-// There are few, which change seldom: all of them, of which none is written
-// that is the same already.
+// They are few and change seldom: all are sent, and only those that differ
+// are written.
 void Shipper::ShipModels(Shipped& shipped) {
   if (!std::filesystem::exists(data_.models())) {
     return;

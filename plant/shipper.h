@@ -18,7 +18,7 @@ struct ShipSource {
   std::string monitor;
 };
 
-/// What a call of Ship() moved.
+/// The amount that a call of Ship() moved.
 struct Shipped {
   std::int64_t batches{0};
   /// By table of the plant's history: rows that were new or different there.
@@ -28,7 +28,7 @@ struct Shipped {
 };
 
 /// Ends shipping: no change is logged any more, none is kept, and `prune` waits
-/// for no plant. The next shipping begins anew.
+/// for no plant. The next shipping starts over.
 /// @throws DataError, SqliteError
 void StopShipping(const DataDirectory& data);
 
@@ -43,7 +43,7 @@ void StopShipping(const DataDirectory& data);
 /// plant is, with that time. After a crash between the two commits, or a
 /// restore of history.db from a backup, rows are sent again and change nothing.
 /// If the plant's time is before the one noted here, PostgreSQL lost what it
-/// had committed, or was restored from a backup: all is copied anew. If it is
+/// had committed, or was restored from a backup: all is copied again. If it is
 /// later, and what is open there is not here, history.db was restored: that is
 /// ended there. One thread at a time.
 class Shipper {
@@ -53,8 +53,8 @@ class Shipper {
   Shipper(const DataDirectory& data, const std::string& url,
           const ShipSource& source, PlantLimits limits = {});
 
-  /// Until nothing is left. @throws DataError, SqliteError, PlantError; what
-  ///   was shipped before is there, and the next call, of a new object, goes
+  /// Until nothing is left. @throws DataError, SqliteError, PlantError; earlier
+  ///   batches are there by then, and the next call, on a new object, goes
   ///   on behind it.
   Shipped Ship();
 
