@@ -58,7 +58,7 @@ class Intake {
     std::uint64_t readings{0};
     std::uint64_t bad{0};  // Without a usable value or stamp.
     std::uint64_t late{0};
-    std::uint64_t unknown{0};  // Of tags that no row has.
+    std::uint64_t unknown{0};  // With a tag that no row has.
     std::uint64_t wrong{0};    // Lines and payloads that say nothing.
   } totals_;
 };

@@ -28,7 +28,7 @@ class LineSource final : public ReadingSource {
 
   int descriptor_{-1};
   bool own_{false};
-  std::string buffer_;    // What has no line end yet.
+  std::string buffer_;    // Bytes without a line end yet.
   bool skipping_{false};  // The rest of a line that is too long.
   importer::ReadingLines lines_;
 };

@@ -20,8 +20,8 @@ using importer::TagMatch;
 // A reading that is three periods late is one that a device did not send.
 constexpr int kMaxAgePeriods = 3;
 
-// A file has its columns, and a pattern finds one of them. What a plant will
-// say is not known before, so here a tag is its own pattern.
+// A file has its columns, and a pattern finds one of them. The tags of a plant
+// are not known before it sends them, so here a tag is its own pattern.
 TagMatch Match(const PlantRow& row) {
   std::set<std::string> tags;
   for (const importer::TagCell& tag : row.tags) {
@@ -41,7 +41,7 @@ TagMatch Match(const PlantRow& row) {
   return match;
 }
 
-// PV and SP keep their own unit. As in a file, what is beyond the range by a
+// PV and SP keep their own unit. As in a file, a value beyond the range by a
 // tenth is no reading.
 void AddOwnUnit(const PlantRow& row, const TagMatch& match, LoopTag tag,
                 Signal signal, importer::ColumnMap& map) {

@@ -27,11 +27,11 @@ struct RefusedRow {
 struct LiveTable {
   std::int64_t period_ns{1'000'000'000};  ///< By the key `resample`.
   std::vector<importer::LiveValve> valves;
-  std::vector<LiveTopic> topics;  ///< Of rows with the key `topic`.
+  std::vector<LiveTopic> topics;  ///< From rows with the key `topic`.
   std::vector<RefusedRow> refused;
 };
 
-/// Reads the table that files are onboarded by. What is wrong with a row
+/// Reads the table that files are onboarded by. An error in a row
 /// refuses that row. Signals are OP as CV, X, the flow as F where its unit is
 /// known, P1, P2, T1; PV with SP where the PV is not the flow, or has a set
 /// point.

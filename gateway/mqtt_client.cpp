@@ -112,7 +112,7 @@ MqttClient::Address MqttClient::Parse(const std::string& url) {
     rest.pop_back();
   }
   address.port = address.tls ? 8883 : 1883;
-  const std::size_t bracket = rest.rfind(']');  // Of an IPv6 address.
+  const std::size_t bracket = rest.rfind(']');  // End of an IPv6 address.
   const std::size_t colon = rest.rfind(':');
   if (colon != std::string::npos &&
       (bracket == std::string::npos || colon > bracket)) {

@@ -26,7 +26,7 @@ namespace fdi::gateway {
 struct MqttOptions {
   std::string url;           ///< mqtt[s]://[USER@]HOST[:PORT]
   std::filesystem::path ca;  ///< PEM; empty: the authorities of the system.
-  std::filesystem::path certificate;  ///< Of this client, with its key.
+  std::filesystem::path certificate;  ///< For this client, with its key.
   std::filesystem::path key;
   std::filesystem::path password;  ///< A file; empty: FDI_MQTT_PASSWORD.
 
@@ -39,13 +39,13 @@ struct MqttEvent {
   enum class Kind : std::uint8_t { kConnected, kLost, kMessage };
   Kind kind{Kind::kMessage};
   std::string topic;
-  std::string payload;  ///< Of kLost: why.
+  std::string payload;  ///< For kLost: why.
   bool retained{false};
 };
 
 /// A connection to a broker that is made again whenever it is lost, after 1, 2,
-/// 4 ... 60 s. A thread of its own speaks with the broker; what comes waits in
-/// a bounded queue, and is dropped and counted beyond it.
+/// 4 ... 60 s. A thread of its own speaks with the broker; messages wait in
+/// a bounded queue, and are dropped and counted beyond it.
 class MqttClient {
  public:
   struct Will {
@@ -100,7 +100,7 @@ class MqttClient {
   std::atomic<bool> connected_{false};
   std::atomic<std::uint64_t> dropped_{0};
   std::string refused_;  // Why the broker refused; of the thread.
-  std::string said_;     // What was logged last; of the thread.
+  std::string said_;     // Last line logged; of the thread.
   std::jthread thread_;
 };
 

@@ -12,7 +12,7 @@
 
 namespace fdi::gateway {
 
-/// Receives what a source of readings says.
+/// Receives the readings and events of a source.
 struct ReadingHandlers {
   std::function<void(const importer::TagReading&)> reading;
   /// All of the source that is not mentioned is unchanged up to the stamp.

@@ -88,7 +88,7 @@ void ValveWire::AwaitReader() {
   while (!signals_.stop_requested() && std::chrono::steady_clock::now() < end &&
          readers() == 0) {
     if (writers_.empty()) {
-      return;  // Those of the groups come with their first samples.
+      return;  // Writers of groups come with their first samples.
     }
     writers_.begin()->second->WaitForReaders(1, kLook);
   }

@@ -18,7 +18,7 @@
 namespace fdi::gateway {
 
 struct ValveWireOptions {
-  std::size_t valves{0};  ///< Of the table.
+  std::size_t valves{0};  ///< Number in the table.
   /// A writer for each group, in the partition of its name; otherwise one in
   /// those of --partition.
   bool by_group{false};
