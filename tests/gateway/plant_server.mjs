@@ -2,6 +2,7 @@
 // with six tags that take the rows of a table of fdi-simulator, RATE rows a
 // second. Rows are a second apart in source time, and the last one is of now. The
 // first valves have a table each, all others the last one.
+// It listens on PLANT_HOST, or loopback.
 // Usage: plant_server.mjs PORT VALVES RATE CSV...
 import {readFileSync} from 'node:fs';
 import {setTimeout as wait} from 'node:timers/promises';
@@ -22,7 +23,7 @@ const count = Math.min(...tables.map(table => table.length));
 
 for (const signal of ['SIGTERM', 'SIGINT']) process.on(signal, () => process.exit(0));
 
-const server = new OPCUAServer({port, host: '127.0.0.1',
+const server = new OPCUAServer({port, host: process.env.PLANT_HOST ?? '127.0.0.1',
   serverCapabilities: {minSupportedSampleRate: 0}});
 await server.initialize();
 const space = server.engine.addressSpace;

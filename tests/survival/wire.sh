@@ -1,12 +1,17 @@
 #!/usr/bin/env bash
 # The plant's wire from end to end: an OPC UA server of a plant, the client, the
 # gateways, the monitor, a broker and the OPC UA server of the findings are killed
-# and stopped in turn, each at least once and for FDI_WIRE_SECONDS (default 60),
-# while faults grow in every fourth of FDI_WIRE_VALVES valves (default 8) and
-# alarms are acknowledged.
-# While the plant or its client is away no valve is normal; at the end history,
-# MQTT and OPC UA tell the same, and each acknowledgement is there once.
-# Usage: wire.sh FOLDER-OF-PROGRAMS NODE_MODULES     77 without what it takes.
+# and stopped in turn, and the links to the plant and to the broker are cut, while
+# faults grow in every fourth of FDI_WIRE_VALVES valves (default 8) and alarms are
+# acknowledged. Plant and broker are hosts of their own, as network namespaces.
+# The long form, with FDI_WIRE_SECONDS of more than 200 (default 60), plays all
+# ways in which a part goes, leaves it away for 20 s and a link for 60 s, and
+# begins again until the time is up.
+# While a part that a valve is judged by is away, neither the broker nor OPC UA
+# calls the valve normal; at the end history, MQTT and OPC UA tell the same, and
+# each acknowledgement is there once.
+# Usage: wire.sh FOLDER-OF-PROGRAMS NODE_MODULES
+#   77 without what it takes: node-opcua, mosquitto, network namespaces
 set -euo pipefail
 PATH=$PATH:/usr/sbin
 modules=$(realpath -m "$2")
@@ -18,10 +23,31 @@ done
   exit 77
 }
 tests=$(cd "$(dirname "$0")/.." && pwd)
+# Interfaces that come and go are no other test's business.
+if [ -z "${FDI_IN_NAMESPACE:-}" ]; then
+  # In a chroot a namespace can be made but not entered.
+  if ! command -v ip >/dev/null || ! ip netns add fdi-wire-$$ 2>/dev/null ||
+    ! ip netns exec fdi-wire-$$ true 2>/dev/null; then
+    ip netns del fdi-wire-$$ 2>/dev/null || true
+    echo "wire: skipped, network namespaces are not permitted here"
+    exit 77
+  fi
+  ip netns del fdi-wire-$$
+  FDI_IN_NAMESPACE=1 exec unshare --net "$0" "$(realpath "$1")" "$modules"
+fi
+ip link set lo up multicast on
+ip route add 224.0.0.0/4 dev lo
 source "$tests/system/programs.sh" "$1"
 seconds=${FDI_WIRE_SECONDS:-60}
 valves=${FDI_WIRE_VALVES:-8}
-rate=$((seconds > 200 ? 2 : 10))  # Rows a second.
+if [ "$seconds" -gt 200 ]; then
+  rate=2 away=20 cut=60  # Rows a second; how long a part and a link are away [s].
+  ways=(broker client out monitor server plant gateway:STOP plant:CUT
+    gateway plant:STOP broker:CUT client:STOP monitor:STOP out:STOP)
+else
+  rate=10 away=0 cut=0
+  ways=(broker client out monitor server plant gateway:STOP plant:CUT)
+fi
 plant_port=$((16000 + domain)) port=$((15000 + domain)) mqtt_port=$((17000 + domain))
 export FDI_GATEWAY=$bin/fdi-gateway FDI_STORE=$bin/fdi-store
 declare -A part  # By name, the group of its processes.
@@ -31,9 +57,23 @@ finish() {
     kill -CONT -- "-${part[$name]}" || true
     kill -9 -- "-${part[$name]}" || true
   done
+  ip netns del "$plant_host"
+  ip netns del "$broker_host"
   rm -rf "$work"
 }
+plant_host=fdi-plant-$$ broker_host=fdi-broker-$$
 trap finish EXIT
+add_host() {  # NAMESPACE LINK NET
+  ip netns add "$1"
+  ip link add "$2" type veth peer name eth0 netns "$1"
+  ip addr add "$3.1/24" dev "$2"
+  ip -n "$1" addr add "$3.2/24" dev eth0
+  ip link set "$2" up
+  ip -n "$1" link set lo up
+  ip -n "$1" link set eth0 up
+}
+add_host "$plant_host" plant 10.78.1
+add_host "$broker_host" broker 10.78.2
 set -m
 launch() {  # NAME: a group of processes that write NAME.log.
   "run_$1" >>"$1.log" 2>&1 &
@@ -45,7 +85,7 @@ kill_part() {
   wait "${part[$1]}" 2>/dev/null || true
 }
 
-cp "$tests"/../gateway/opcua/*.mjs "$tests/gateway/plant_server.mjs" .
+cp "$tests"/../gateway/opcua/*.mjs "$tests"/gateway/{plant_server,opcua}.mjs .
 ln -s "$modules" node_modules
 "$bin/fdi-trainer" train --campaign "$tests/survival/quick.toml" >/dev/null 2>train.log
 rows=$((rate * (seconds + 900)))
@@ -72,21 +112,23 @@ done
   for i in $(seq "$valves"); do printf '[[loop]]\nname = "FV-%d"\n' $((100 + i)); done
 } >plant.toml
 echo "anna:$(openssl passwd -6 secret):acknowledge" >users
-printf 'listener %s 127.0.0.1\nallow_anonymous true\nuser %s\npersistence false\n' \
+printf 'listener %s\nallow_anonymous true\nuser %s\npersistence false\n' \
   $mqtt_port "$(id -un)" >broker.conf
 
-export PLANT_BEGAN_MS
+export PLANT_BEGAN_MS PLANT_HOST=10.78.1.2
 PLANT_BEGAN_MS=$(date +%s%3N)
-run_plant() { exec node plant_server.mjs $plant_port "$valves" $rate "${tables[@]}"; }
-run_broker() { exec mosquitto -c broker.conf; }
+run_plant() {
+  exec ip netns exec "$plant_host" node plant_server.mjs $plant_port "$valves" $rate "${tables[@]}"
+}
+run_broker() { exec ip netns exec "$broker_host" mosquitto -c broker.conf; }
 run_monitor() { exec "$bin/fdi-monitor" --domain "$domain" run --model-set quick; }
 run_in() {
-  node client.mjs plant.toml --endpoint "opc.tcp://127.0.0.1:$plant_port" --interval 0 |
+  node client.mjs plant.toml --endpoint "opc.tcp://10.78.1.2:$plant_port" --interval 0 |
     "$bin/fdi-gateway" --domain "$domain" in --plant plant.toml --lines -
 }
 run_out() {
   exec "$bin/fdi-gateway" --domain "$domain" out --plant plant.toml \
-    --mqtt "mqtt://127.0.0.1:$mqtt_port"
+    --mqtt "mqtt://10.78.2.2:$mqtt_port"
 }
 run_server() {
   exec node server.mjs --port $port --users users -- --domain "$domain" --plant plant.toml
@@ -97,15 +139,24 @@ for name in $names; do
   [ $name != plant ] || await 60 grep -q ready plant.log
 done
 
-# VALVE and HEALTH of each retained state, in the order of the valves.
-states() {
-  mosquitto_sub -p $mqtt_port -W 3 --retained-only -t 'fdi/plant/+/state' -F '%p' 2>/dev/null ||
-    true
+# The retained messages of TOPIC, COUNT of them.
+retained() {
+  ip netns exec "$broker_host" mosquitto_sub -p $mqtt_port -W 3 -C "$2" --retained-only \
+    -t "fdi/plant/$1" -F '%p' 2>/dev/null || true
 }
-healthy_valves() { states | grep -c '"health":"NORMAL"' || true; }
+states() { retained +/state "$valves"; }
+# While the gateway is away, no state is current.
+healthy_valves() {
+  retained monitor 1 | grep -q '"alive":true' || { echo 0 && return; }
+  states | grep -c '"health":"NORMAL"' || true
+}
 some_are_normal() { [ "$(healthy_valves)" -gt 0 ]; }
-none_is_normal() {
-  [ "$(states | wc -l)" -eq "$valves" ] && [ "$(healthy_valves)" -eq 0 ]
+none_is_normal() { [ "$(healthy_valves)" -eq 0 ]; }
+all_are_told() { [ "$(states | wc -l)" -eq "$valves" ]; }
+# VALVE and DeviceHealth, as numbers of OPC 10000-100, of all valves by OPC UA.
+healths() {
+  node opcua.mjs $port read $(seq -f 'FV-%.0f/DeviceHealth' 101 $((100 + valves))) 2>opcua.log |
+    sed -n 's=/DeviceHealth Good= =p' | tr -s ' '
 }
 alarms() { node alarm_client.mjs --endpoint "opc.tcp://127.0.0.1:$port" "$@" 2>client.log; }
 acks=0
@@ -117,39 +168,78 @@ acknowledge() {  # The first alarm that nobody has acknowledged, if there is one
   fi
 }
 
+none_is_normal_by_opcua() {
+  healths >healths.txt && [ "$(wc -l <healths.txt)" -eq "$valves" ] &&
+    ! grep -q ' 0$' healths.txt
+}
+# The processes of a part; the client and the gateway behind it are one service.
+pids_of() {  # NAME
+  case $1 in
+  client) pgrep -g "${part[in]}" node ;;
+  gateway) pgrep -g "${part[in]}" fdi-gateway ;;
+  *) echo "-${part[$1]}" ;;
+  esac
+}
+service_of() { case $1 in client | gateway) echo in ;; *) echo "$1" ;; esac; }
+take_away() {  # NAME WAY
+  case $2 in
+  CUT) ip link set "$1" down ;;
+  STOP) kill -STOP -- $(pids_of "$1") ;;
+  *)
+    kill -9 -- $(pids_of "$1")
+    # When one end of the pipe is gone, the other one ends by itself.
+    wait "${part[$(service_of "$1")]}" 2>/dev/null || true
+    ;;
+  esac
+}
+bring_back() {  # NAME WAY
+  case $2 in
+  CUT) ip link set "$1" up ;;
+  STOP) kill -CONT -- $(pids_of "$1") ;;
+  *) launch "$(service_of "$1")" ;;
+  esac
+}
+# Without the part nobody judges a valve, so that none may be normal until it is
+# back. The longest time until none is goes to `blind_ms`.
+blind_ms=0
+stay_blind() {  # NAME WAY
+  local begin_ms end=$((SECONDS + away))
+  begin_ms=$(date +%s%3N)
+  [ "$2" != CUT ] || end=$((SECONDS + cut))
+  await 60 none_is_normal
+  local took=$(($(date +%s%3N) - begin_ms))
+  echo "$SECONDS s: $1 $2, no valve normal after $took ms" >>rounds.log
+  [ $took -le $blind_ms ] || blind_ms=$took
+  case $1 in
+  broker | out) ;;
+  *) await 30 none_is_normal_by_opcua ;;
+  esac
+  while [ $SECONDS -lt $end ]; do
+    none_is_normal || fail "normal without $1 ($2): $(states)"
+    sleep 1
+  done
+  case $1 in
+  broker | out) ;;
+  *) none_is_normal_by_opcua || fail "OPC UA without $1 ($2): $(healths)" ;;
+  esac
+}
+
 await 120 some_are_normal
 end=$((SECONDS + seconds)) round=0
-while [ $SECONDS -lt $end ] || [ $round -lt 8 ]; do
-  case $((round % 8)) in
-  0) name=broker ;;
-  1) name=in ;;
-  2) name=out ;;
-  3) name=monitor ;;
-  4) name=server ;;
-  5) name=plant ;;
-  6) name=in way=STOP ;;
-  7) name=plant way=STOP ;;
+while [ $SECONDS -lt $end ] || [ $round -lt ${#ways[@]} ]; do
+  way=${ways[round % ${#ways[@]}]}
+  name=${way%:*} way=${way#"$name"} way=${way#:}
+  take_away $name "${way:=KILL}"
+  case $name:$way in
+  # There is nobody to ask, or the page of the broker has nothing to do with it.
+  broker:KILL | server:*) sleep $((away + 2)) ;;
+  *) stay_blind $name $way ;;
   esac
-  if [ "${way:-}" = STOP ]; then
-    kill -STOP -- "-${part[$name]}"
-  else
-    kill_part $name
-  fi
-  # Nobody judges a valve whose readings do not come.
-  case $name in
-  plant | in) await 60 none_is_normal ;;
-  *) sleep 2 ;;
-  esac
-  if [ "${way:-}" = STOP ]; then
-    kill -CONT -- "-${part[$name]}"
-  else
-    launch $name
-  fi
-  way=
+  bring_back $name $way
+  back_ms=$(date +%s%3N)
   acknowledge
-  case $name in
-  plant | in | monitor) await 120 some_are_normal ;;
-  esac
+  await 120 some_are_normal
+  echo "$SECONDS s: $name $way, normal again within $(($(date +%s%3N) - back_ms)) ms" >>rounds.log
   round=$((round + 1))
 done
 for name in $names; do
@@ -173,17 +263,29 @@ by_opcua() {
     split($3, s, "/"); acked = s[2] == "Acknowledged"
     print $1, (s[1] == "Active" ? (acked ? "ACKED" : "UNACK") : "RTN_UNACK"), $8 }' | sort
 }
+# Health of each valve, the same by both.
+same_health() {
+  states | node -e '
+    const health = {NORMAL: 0, FAILURE: 1, CHECK_FUNCTION: 2, OFF_SPEC: 3, MAINTENANCE_REQUIRED: 4};
+    const lines = require("fs").readFileSync(0, "utf8").trim().split("\n").map(JSON.parse);
+    for (const one of lines) console.log(one.valve_id, health[one.health]);' |
+    sort >mqtt_health.txt && healths | sort >opcua_health.txt &&
+    [ "$(wc -l <mqtt_health.txt)" -eq "$valves" ] && cmp -s mqtt_health.txt opcua_health.txt
+}
 agree() {
-  by_history >history.txt && by_mqtt >mqtt.txt && by_opcua >opcua.txt &&
+  same_health && by_history >history.txt && by_mqtt >mqtt.txt && by_opcua >opcua.txt &&
     [ -s history.txt ] && cmp -s history.txt mqtt.txt && cmp -s history.txt opcua.txt
 }
 for _ in $(seq 30); do
   ! agree || break
   sleep 1
 done
-agree || fail "they differ: history $(cat history.txt), MQTT $(cat mqtt.txt), OPC UA $(cat opcua.txt)"
+agree || fail "they differ: $(diff mqtt_health.txt opcua_health.txt), history $(cat history.txt), MQTT $(cat mqtt.txt), OPC UA $(cat opcua.txt)"
 stored=$(history "select count(*) from episode_event where kind = 'ACK'")
 [ "$stored" = "$acks" ] || fail "$stored acknowledgements in the history, $acks given"
 [ "$acks" -gt 0 ] || fail "no acknowledgement"
-echo "wire: $round rounds, $(history "select count(*) from episode") episodes," \
-  "$(wc -l <history.txt) alarms the same in all three, $acks acknowledged once"
+echo "wire: $round rounds, $(history "select count(*) || ' episodes of ' ||
+  count(distinct valve_id) || ' valves' from episode")," \
+  "$(wc -l <history.txt) alarms the same in all three, $acks acknowledged once," \
+  "no valve normal after $blind_ms ms at most"
+cat rounds.log
