@@ -1,10 +1,12 @@
 #!/usr/bin/env bash
 # The samples of a runs.db by SQL (fdi_samples.so), with the sqlite3 shell and
-# with Python, are those of `runs export`; what cannot be read is an SQL error.
+# with Python, are those of `runs export`, the hours of health in a history.db are
+# those of `fdi-store health`; what cannot be read is an SQL error.
 # Skipped (77) without the sqlite3 shell.
 # Usage: samples_module.sh BUILD_DIRECTORY
 set -euo pipefail
 build=$(cd "$1" && pwd)
+tests=$(cd "$(dirname "$0")" && pwd)
 command -v sqlite3 >/dev/null || exit 77
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
@@ -114,4 +116,78 @@ sql damaged.db "select count(*) from sample where valve_id = 'FV-101'
   fail "a damaged chunk spoils others"
 echo garbage >garbage.db
 refuses garbage.db 'not a database' "select * from sample"
+
+# The hours of health that a monitor makes of two valves.
+if grep -q '^FDI_PLANNER:BOOL=OFF' "$build/CMakeCache.txt"; then
+  echo "samples_module: as exported, without hours of health"
+  exit
+fi
+source "$tests/domain.sh"
+"$build/bin/fdi-trainer" train --campaign "$tests/survival/quick.toml" \
+  --activate >/dev/null 2>train.log || fail "$(cat train.log)"
+"$build/bin/fdi-monitor" --domain "$domain" run >monitor.log 2>&1 &
+monitor=$!
+timeout 30 sh -c 'until grep -q monitor_ready monitor.log; do sleep 0.05; done' ||
+  fail "$(cat monitor.log)"
+"$build/bin/fdi-simulator" --domain "$domain" run --valve LV --count 2 \
+  --parameters paper-operating-point --fault f19:abrupt@3000:strength=0.5 \
+  --duration 7500 --end-now --speed max --log-level error >/dev/null
+kill "$monitor"
+wait "$monitor" || fail "the monitor ended with $?"
+for valve in LV-1 LV-2; do
+  fdi_store health --valve "$valve" --hourly --json >"$valve.json"
+done
+health='
+import json, sqlite3, sys
+con = sqlite3.connect("file:history.db?mode=ro", uri=True)
+con.enable_load_extension(True)
+con.load_extension(sys.argv[1])
+names = set()
+for valve in "LV-1", "LV-2":
+    for hour in json.load(open(valve + ".json"))["hours"]:
+        rows = con.execute("select name, part, cv_from, samples, value from"
+                           " health_hour_value where valve_id = ? and hour_utc = ?"
+                           " and model_hash = ?", (valve,
+                           hour["hour_utc"][:19] + "Z", hour["model_hash"])).fetchall()
+        assert len(rows) > 12, (valve, hour)
+        bins = {(c["signal"], b["cv_from"]): b for c in hour["channels"] for b in c["bins"]}
+        assert len([r for r in rows if r[0] == "residual"]) == len(bins)
+        faults = {s["fault"]: s for s in hour["strengths"]}
+        for name, part, cv_from, samples, value in rows:
+            names.add(name)
+            if name == "reading":
+                continue
+            expected = (bins[part, cv_from]["mean"] if name == "residual" else
+                        bins[part, cv_from]["rms"] if name == "residual_rms" else
+                        faults[part]["strength"] if name == "strength" else hour[name])
+            assert abs(value - expected) <= 1e-5 * abs(expected), (name, value, expected)
+            if name.startswith("residual"):
+                assert samples == bins[part, cv_from]["samples"]
+assert {"residual", "reading", "strength", "d0", "seen_h"} <= names, names
+'
+if [ -n "$python" ]; then
+  "$python" -c "$health" "$build/lib/fdi_samples.so" || fail "$python"
+fi
+same() {  # TWO STATEMENTS on history.db
+  local one two
+  one=$(sql history.db "$1") && two=$(sql history.db "$2") || fail "$1"
+  [ -n "$one" ] && [ "$one" = "$two" ] || fail "$1: $one, but $two"
+}
+same "select valve_id, hour_utc, round(sum(value), 6) from health_hour_value
+    where name = 'live_h' group by 1, 2 order by 1, 2" \
+  "select valve_id, hour_utc, round(hours, 6) from judged_hours order by 1, 2"
+all="select count(*) from health_hour_value"
+same "$all" "select count(distinct rowid) from health_hour_value"
+same "$all" "$all where valve_id glob 'LV-*' or hour_utc > '2000-01-01'"
+same "$all" "select count(*) from health_hour_value v join judged_hours j
+  on v.valve_id = j.valve_id and v.hour_utc = j.hour_utc"
+same "select 0" "$all where valve_id = 'FV-101' or hour_utc < '2026-01-01'"
+refuses runs.db 'none of the open databases is a history.db' "$all"
+refuses history.db 'may not be modified' "delete from health_hour_value"
+cp history.db damaged.db
+sqlite3 damaged.db "update health_hour set bytes = substr(bytes, 1, 9)
+  where valve_id = 'LV-2'"
+refuses damaged.db 'health of LV-2 is damaged: bytes are missing' "$all"
+sql damaged.db "$all where valve_id = 'LV-1'" >/dev/null ||
+  fail "a damaged hour spoils others"
 echo "samples_module: as exported"

@@ -12,8 +12,8 @@
 
 namespace fdi::storage {
 
-/// The sums of an hour as bytes; health.cpp has the format. Its key and live_ms
-/// are separate columns.
+/// The sums of an hour as bytes; health_codec.cpp has the format. Its key and
+/// live_ms are separate columns.
 std::vector<std::byte> PackHealth(const HealthHour& hour);
 
 /// Decodes bytes from PackHealth() into `hour`, whose key is already set.

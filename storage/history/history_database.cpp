@@ -13,7 +13,7 @@ namespace sql = history_sql;
 const Schema& HistorySchema() {
   static const Schema schema{
       "history",
-      0x46444948,  // "FDIH"
+      kHistoryApplicationId,
       Synchronous::kFull,
       {sql::kMigrations.begin(), sql::kMigrations.end()},
       sql::kBaseline,

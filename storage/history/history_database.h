@@ -9,6 +9,8 @@
 
 namespace fdi::storage {
 
+inline constexpr std::int32_t kHistoryApplicationId = 0x46444948;  // "FDIH"
+
 /// Schema of history.db: tables episode, episode_fault, episode_event,
 /// event_outbox, episode_trace, monitor_session, data_gap and the view
 /// fault_history; see docs/data.md. Times in tables are INTEGER ns UTC; the
