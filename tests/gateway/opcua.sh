@@ -12,10 +12,10 @@ modules=$(realpath -m "$2")
 }
 tests=$(cd "$(dirname "$0")/.." && pwd)
 source "$tests/system/programs.sh" "$1"
-server= feed= third= healthy= broker= out= mqtt= listener=
+server= feed= third= healthy= broker= out= mqtt= listener= page=
 finish() {
   exec 2>/dev/null
-  kill -9 $server $feed $third $healthy $broker $out $mqtt $listener ${monitor:-} || true
+  kill -9 $server $feed $third $healthy $broker $out $mqtt $listener $page ${monitor:-} || true
   rm -rf "$work"
 }
 trap finish EXIT
@@ -60,7 +60,9 @@ client follow V2/DeviceHealth 600 >health.txt &
 listener=$!
 await 60 test -s health.txt
 
-start --model-set quick
+console=  # Port of the page, unless it is left out of the build.
+[ ! -d "$bin/../share/fdi/console" ] || console=$((port + 600))
+start --model-set quick ${console:+--console=$console}
 run() {  # VALVE OPTIONS
   exec "$bin/fdi-simulator" --domain "$domain" run --valve "$1" --speed 20 --seed 7 \
     --parameters paper-operating-point --set excitation.amplitude_pct=8 \
@@ -110,10 +112,24 @@ if command -v mosquitto >/dev/null && command -v mosquitto_sub >/dev/null; then
   mqtt=$!
   await 20 grep -q '"state":"UNACK"' broker.txt
 fi
+if [ -n "$console" ]; then  # When the page has it [ms since 1970].
+  node --input-type=module -e '
+    const ours = /"acked_by": ?"anna".*"ack_comment": ?"V3"/;
+    for (let page = ""; !ours.test(page);) {
+      await new Promise(resolve => setTimeout(resolve, 50));
+      page = await (await fetch(process.argv[1])).text();
+    }
+    console.log(Date.now());' "http://127.0.0.1:$console/api/v1/alarms" >page.txt 2>page.log &
+  page=$!
+fi
 called=$(OPCUA_USER=anna client acknowledge V3)
 await 10 test "$(history "select acked_by from fault_history where valve_id = 'V3'")" = anna
 after="history $(history "select (max(recorded_ns) - ${called}000000) / 1000000
   from episode_event where kind = 'ACK' and who = 'anna' and comment = 'V3'") ms"
+if [ -n "$console" ]; then
+  await 10 test -s page.txt
+  after+=", page $(($(cat page.txt) - called)) ms"
+fi
 if [ -n "$broker" ]; then
   await 10 grep -q '"acked_by":"anna"' broker.txt
   after+=", MQTT $(awk -v t="$called" '/"acked_by":"anna"/ { printf "%d", 1000 * $1 - t; exit }' broker.txt) ms"
