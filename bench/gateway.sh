@@ -3,8 +3,11 @@
 # once a second, then 10 000 readings a second, and as fast as a pipe gives them;
 # by MQTT, where mosquitto is; and, with NODE_MODULES, by OPC UA, from a server
 # with 1800 nodes through client.mjs. Beside a monitor that records nothing and
-# has no models. With a WAY, only that one.
-# Usage: gateway.sh FOLDER-OF-PROGRAMS [SECONDS [NODE_MODULES [lines|mqtt|opcua]]]
+# has no models; what it received is counted. Then three things that go wrong at one
+# of the 300 valves each: one tag of 1800 falls silent, a source's clock leaps by
+# 90 s, a device takes its tags away; how soon that is said, and which valves lack
+# signals. With a WAY, only that one.
+# Usage: gateway.sh FOLDER-OF-PROGRAMS [SECONDS [NODE_MODULES [lines|mqtt|opcua|wrong]]]
 set -euo pipefail
 PATH=$PATH:/usr/sbin
 seconds=${2:-30}
@@ -34,7 +37,7 @@ cat >feed.pl <<'END'
 use strict;
 use IO::Socket::INET;
 use Time::HiRes qw(time sleep);
-my ($rate, $seconds, $valves, $port) = @ARGV;
+my ($rate, $seconds, $valves, $port, $wrong) = @ARGV;
 my $out = \*STDOUT;
 # A packet of MQTT 3.1.1: type, length in groups of 7 bits, body.
 sub packet {
@@ -52,6 +55,7 @@ my @tags = map { my $v = 100 + $_; map { "FV-$v.$_" } qw(OP ZT FT P1 P2 T1) } 1 
 my $begin = time;
 my $start = int($begin) - ($rate ? 0 : 86400);
 my $total = ($rate || 20000) * $seconds;
+printf STDERR "wrong from %.1f to %.1f\n", $begin + $seconds / 3, $begin + 2 * $seconds / 3 if $wrong;
 for (my $n = 0; $n < $total;) {
   my $text = "";
   my $part = $rate ? $rate / 20 : 1800;
@@ -64,8 +68,16 @@ for (my $n = 0; $n < $total;) {
       $n += 5, $i += 5;
       next;
     }
-    $text .= sprintf("{\"tag\":\"%s\",\"t\":%.3f,\"v\":%.3f,\"q\":\"good\"}\n",
-      $tags[$n % @tags], $t, 50 + $n % 37);
+    my ($tag, $quality) = ($tags[$n % @tags], "good");
+    my $source = "";
+    if ($wrong) {  # For the second third of the time.
+      my $now = $n > $total / 3 && $n <= 2 * $total / 3;
+      next if $now && $tag eq "FV-150.P1";
+      $quality = "bad" if $now && $tag =~ /^FV-250/;
+      ($t, $source) = ($t + ($now ? 90 : 0), ",\"source\":\"plc\"") if $tag =~ /^FV-200/;
+    }
+    $text .= sprintf("{\"tag\":\"%s\",\"t\":%.3f,\"v\":%.3f,\"q\":\"%s\"%s}\n",
+      $tag, $t, 50 + $n % 37, $quality, $source);
   }
   print $out $text;
   if ($rate) {
@@ -98,7 +110,8 @@ report() {  # WHAT
   stop
   echo "$1: $(awk '{ gsub(/[",:]/, " ") }
     $1 ~ /^(readings|samples|late|not_sent)$/ { printf "%s %d, ", $1, $2 }' totals.json
-  )gateway $(share $used $begin $end), $hwm MB"
+  )received $(sed -n 's/.*monitor_status.*received=\([0-9]*\).*/\1/p' monitor.log |
+    tail -n 1), gateway $(share $used $begin $end), $hwm MB"
 }
 by_lines() {  # READINGS a second
   start
@@ -164,6 +177,29 @@ by_opcua() {
   echo "  client $used; a reading is printed after $(cat lag.txt)"
   kill $server
   server=
+  rm pipe copy
+}
+wrong() {
+  start --record
+  mkfifo -m 600 pipe
+  sed 's/^topic.*/report = "periodic"/' plant.toml >periodic.toml
+  "$bin/fdi-gateway" --domain "$domain" in --plant periodic.toml --lines pipe \
+    >totals.txt 2>gateway.log &
+  gateway=$!
+  perl feed.pl 1800 "$seconds" $valves 0 1 >pipe 2>wrong.txt
+  wait $gateway
+  gateway=
+  stop
+  echo "one thing wrong at each of three valves, $(cat wrong.txt)"
+  grep -E ' (tag|source)_' gateway.log
+  echo "valves of which samples or signals are missing:"
+  sqlite3 -readonly "$FDI_DATA/runs.db" ".load $bin/../lib/fdi_samples" "
+    with valve as (select valve_id, count(*) samples, sum(p1 is null) p1, sum(x is null) x
+      from sample group by 1)
+    select valve_id, samples || ' of ' || max(samples) over () || ' samples',
+      p1 || ' without P1', x || ' without X' from valve order by samples + 0" |
+    awk -F"|" '$3 + 0 || $4 + 0 || split($2, n, " ") && n[1] < n[3] - 1'
+  rm pipe
 }
 way=${4:-}
 case ${way:-lines} in lines) for rate in 1800 10000 0; do by_lines $rate; done ;; esac
@@ -171,3 +207,4 @@ case ${way:-mqtt} in
 mqtt) ! command -v mosquitto >/dev/null || for rate in 1800 10000; do by_mqtt $rate; done ;;
 esac
 [ -z "$modules" ] || case ${way:-opcua} in opcua) by_opcua ;; esac
+case ${way:-wrong} in wrong) wrong ;; esac
