@@ -134,6 +134,11 @@ struct LiveBoard::Slot {
     spark_count = 0;
   }
 
+  void ShowUnjudged(std::int64_t since_ns, std::string why) REQUIRES(mutex) {
+    now.unjudged_ns = since_ns;
+    now.why = std::move(why);
+  }
+
   void AddSpark(const Verdict& verdict) REQUIRES(mutex) {
     // A clock that was set back begins a new line.
     if (verdict.stamp_ns < spark_stamp_ns) {
@@ -298,6 +303,12 @@ void LiveBoard::OnVerdict(const std::string& valve_id, const Sample& sample,
     facts = models != nullptr ? Facts(*models) : nullptr;
   }
   slot.now.missing = outcome.missing;
+  const Verdict& verdict = outcome.verdict;
+  slot.ShowUnjudged(
+      outcome.unjudged_ns.value_or(0),
+      outcome.unjudged_ns
+          ? WhyUnjudged(verdict.quality, verdict.intake, verdict.uncovered)
+          : "");
   slot.now.refused = RefusedSignals(facts ? facts->required : SignalMask{0},
                                     sample, outcome.verdict.intake);
   ShowLocked(slot, sample, outcome.verdict, std::move(facts));
@@ -316,11 +327,22 @@ void LiveBoard::ShowRemote(const std::string& valve_id, const Verdict& verdict,
   ShowLocked(slot, sample, verdict, std::move(models));
 }
 
+void LiveBoard::ShowUnjudged(const std::string& valve_id, std::int64_t since_ns,
+                             const std::string& why) {
+  Slot& slot = At(valve_id);
+  const MutexLock lock(slot.mutex);
+  if (slot.now.unjudged_ns != since_ns || slot.now.why != why) {
+    slot.ShowUnjudged(since_ns, why);
+    ++slot.now.version;
+  }
+}
+
 void LiveBoard::OnSilence(const std::string& valve_id,
                           monitor::Silence silence) {
   Slot& slot = At(valve_id);
   const MutexLock lock(slot.mutex);
   slot.now.silence = silence;
+  slot.ShowUnjudged(0, "");
   ++slot.now.version;
 }
 

@@ -31,6 +31,8 @@ struct ValveState {
   SignalMask refused{0};                ///< Because of these signals.
   std::vector<std::string> unjudged{};  ///< Channels that abstain now.
   bool contested{false};                ///< See monitor::ValveOutcome.
+  std::int64_t unjudged_ns{0};  ///< See monitor::ValveOutcome; 0: judged.
+  std::string why{};            ///< WhyUnjudged(), if it is not.
   bool blind{false};  ///< Every known fault looks normal to the model set.
   FaultSet isolated{0};
   double factor{0.0};    ///< The largest of the isolated set [-].
@@ -90,6 +92,10 @@ class LiveBoard : public monitor::ValveListener {
   void ShowRemote(const std::string& valve_id, const Verdict& verdict,
                   std::shared_ptr<const ModelFacts> models,
                   const std::string& monitor);
+  /// What a monitor says of the valve: it sends and is not judged since
+  /// `since_ns`, because of `why`. @param since_ns 0: it is judged.
+  void ShowUnjudged(const std::string& valve_id, std::int64_t since_ns,
+                    const std::string& why);
   /// Nothing was heard of the valve's monitor since `heard_ns`.
   void ShowMonitorSilence(const std::string& valve_id, std::int64_t heard_ns);
 

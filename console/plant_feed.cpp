@@ -81,6 +81,7 @@ void PlantFeed::Add(const idl::ValveStateMessage& state,
   if (!valves_.contains(state.valve_id)) {
     board_.Expect(state.valve_id, state.as_of_ns);
   }
+  board_.ShowUnjudged(state.valve_id, state.unjudged_ns, state.why);
 }
 
 void PlantFeed::Add(const idl::MonitorStatusMessage& status,

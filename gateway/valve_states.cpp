@@ -236,6 +236,11 @@ Json ValveStates::StateOf(const Json& row, bool monitored) const {
   } else if (state != "NORMAL") {
     health = "CHECK_FUNCTION";
     reason = ReasonOf(row["quality"]);
+    if (!row["unjudged_utc"].is_null()) {
+      reason = reason.get<std::string>() + ": not judged since " +
+               row["unjudged_utc"].get<std::string>() + " because " +
+               row["why"].get<std::string>();
+    }
   }
   const auto when = [&](bool shown, Json value) {
     return shown ? std::move(value) : Json();

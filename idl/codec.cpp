@@ -336,7 +336,7 @@ bool AreFaults(const std::string& names) {
 void Fields(auto& t, Is<ValveStateMessage> auto& m, auto& w) {
   FDI_FOR_EACH(FDI_FIELD, monitor, as_of_ns, quality, state, partly,
                unconfirmed_ns, episode_id, fault, look_alikes, certainty, layer,
-               strength, since_ns, model_set)
+               strength, since_ns, unjudged_ns, why, model_set)
   t.Ranged("priority", m.priority, w.priority(), 0, kSeverityCount);
   t.Require("fault", AreFaults(m.fault) && AreFaults(m.look_alikes));
 }

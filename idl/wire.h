@@ -126,6 +126,9 @@ struct ValveStateMessage {
   int priority{0};          ///< PriorityOf() its severity.
   double strength{0.0};     ///< Signed [-]; 0 before a name.
   std::int64_t since_ns{0};
+  /// Since when the valve sends and is not judged; 0: it is judged.
+  std::int64_t unjudged_ns{0};
+  std::string why;  ///< WhyUnjudged(); empty: it is judged.
 
   bool operator==(const ValveStateMessage&) const = default;
 };

@@ -59,11 +59,10 @@ void CountUnjudged(const ValveMonitor& monitor, ValveCensus& census) {
     return;
   }
   const Verdict& verdict = monitor.verdict();
-  const std::string reasons = CoverageReasonsName(verdict.uncovered);
   census.unjudged_valve = monitor.id();
   census.unjudged_ns = *since_ns;
-  census.unjudged_reason = QualityName(verdict.quality);
-  census.unjudged_reason += reasons.empty() ? "" : " " + reasons;
+  census.unjudged_reason =
+      WhyUnjudged(verdict.quality, verdict.intake, verdict.uncovered);
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -159,6 +160,8 @@ struct ValveOutcome {
   SignalMask missing{0};
   double period_s{0.0};   ///< The time that the sample stands for.
   bool contested{false};  ///< See ValveMonitor::Contested().
+  /// See ValveMonitor::unjudged_since_ns(); nothing: it is judged.
+  std::optional<std::int64_t> unjudged_ns{};
   bool found_normal{
       false};  ///< With this sample, as EpisodeOutlet::OnNormal().
 };

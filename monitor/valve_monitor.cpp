@@ -151,6 +151,7 @@ ValveOutcome ValveMonitor::Step(const Sample& sample, std::uint64_t writer,
           .model_swapped = swapped,
           .missing = missing,
           .period_s = period_s(),
+          .unjudged_ns = unjudged_since_ns(),
           .found_normal = std::exchange(found_normal_, false)};
 }
 

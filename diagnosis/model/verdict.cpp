@@ -68,6 +68,19 @@ std::string CoverageReasonsName(CoverageReasons reasons) {
   return name;
 }
 
+std::string WhyUnjudged(Quality quality, Intake intake,
+                        CoverageReasons reasons) {
+  std::string why(QualityName(quality));
+  if (reasons != 0) {
+    why += " " + CoverageReasonsName(reasons);
+  } else if (intake != Intake::kAccepted) {
+    why.append(" ").append(IntakeName(intake));
+  } else if (quality == Quality::kBadInput) {
+    why += " no_readings";
+  }
+  return why;
+}
+
 std::string_view TransitionName(TransitionKind kind) {
   return NameOf(kind, std::array<std::string_view, 7>{
                           "DETECTED", "ISOLATED", "REISOLATED", "CLEARED",

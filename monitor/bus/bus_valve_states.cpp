@@ -125,11 +125,16 @@ void BusValveStates::OnVerdict(const std::string& valve_id,
   const bool news = valve.silent || valve.quality != verdict.quality ||
                     valve.state != verdict.state || valve.partly != partly ||
                     valve.models != outcome.models || outcome.model_swapped ||
+                    valve.unjudged_ns != outcome.unjudged_ns ||
                     (valve.left && (verdict.detected || outcome.found_normal));
   valve.silent = false;
   valve.quality = verdict.quality;
   valve.state = verdict.state;
   valve.partly = partly;
+  valve.unjudged_ns = outcome.unjudged_ns;
+  if (valve.unjudged_ns) {
+    valve.why = WhyUnjudged(verdict.quality, verdict.intake, verdict.uncovered);
+  }
   if (news) {
     valve.models = outcome.models;
     valve.model_set = outcome.models != nullptr ? NameOf(*outcome.models) : "";
@@ -188,6 +193,10 @@ idl::ValveStateMessage BusValveStates::StateOf(const std::string& valve_id,
         valve.alarm->unconfirmed_ns.value_or(valve.alarm->last_ns);
   } else if (valve.silent) {
     state.unconfirmed_ns = valve.as_of_ns;
+  }
+  if (valve.unjudged_ns && !valve.silent) {
+    state.unjudged_ns = *valve.unjudged_ns;
+    state.why = valve.why;
   }
   return state;
 }

@@ -59,6 +59,8 @@ class BusValveStates : public ValveListener {
     State state{State::kNormal};
     bool partly{false};
     bool silent{true};
+    std::optional<std::int64_t> unjudged_ns;  // As in ValveOutcome,
+    std::string why;                          // and why.
     std::int64_t as_of_ns{0};
     idl::ValveStateMessage told;
   };

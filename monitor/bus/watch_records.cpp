@@ -230,6 +230,10 @@ void WatchRecords::Add(const idl::ValveStateMessage& message,
       (message.unconfirmed_ns == 0
            ? state
            : "not confirmed since " + FormatTime(message.unconfirmed_ns, utc_));
+  if (message.unjudged_ns != 0) {
+    line += " not judged since " + FormatTime(message.unjudged_ns, utc_) +
+            " because " + message.why;
+  }
   if (message.episode_id != 0) {
     line += " " + message.certainty + " " + message.fault +
             (named ? " strength=" + FormatNumber(message.strength, 2) : "") +
@@ -242,6 +246,8 @@ void WatchRecords::Add(const idl::ValveStateMessage& message,
           {"quality", QualityName(message.quality)},
           {"state", message.unconfirmed_ns == 0 ? state : "NOT_CONFIRMED"},
           {"unconfirmed_utc", utc(message.unconfirmed_ns)},
+          {"unjudged_utc", utc(message.unjudged_ns)},
+          {"why", text(message.why)},
           {"episode_id",
            message.episode_id == 0 ? Json() : Json(Hex(message.episode_id))},
           {"fault", text(message.fault)},

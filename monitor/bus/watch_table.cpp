@@ -116,16 +116,23 @@ report::Report WatchTable::Valves(std::int64_t now_ns,
   }
   using Format = report::Format;
   const auto state = [utc = utc_](const Json& row) {
-    return row["unconfirmed_utc"].is_null()
-               ? row["state"].get<std::string>()
-               : "not confirmed since " +
-                     FormatTime(NsOf(row, "unconfirmed_utc"), utc);
+    const auto since = [&row, utc](const char* what, const char* key) {
+      return what + FormatTime(NsOf(row, key), utc);
+    };
+    return !row["unconfirmed_utc"].is_null()
+               ? since("not confirmed since ", "unconfirmed_utc")
+           : row["state"] == "NOT_JUDGED" && !row["unjudged_utc"].is_null()
+               ? since("not judged since ", "unjudged_utc")
+               : row["state"].get<std::string>();
+  };
+  const auto quality = [](const Json& row) {
+    return row[row["why"].is_null() ? "quality" : "why"].get<std::string>();
   };
   return report.Table(
       "valves",
       {{.heading = "valve", .key = "valve_id", .tone = ToneOf},
        {.heading = "state", .text = state, .tone = ToneOf},
-       {.heading = "quality", .key = "quality", .spare = 3},
+       {.heading = "quality", .spare = 3, .text = quality},
        {.heading = "fault", .spare = 4, .text = FaultText, .tone = ToneOf},
        {.heading = "how sure", .key = "certainty", .tone = ToneOf},
        {.heading = "meaning", .key = "name", .least_width = 15},

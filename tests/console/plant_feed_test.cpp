@@ -49,6 +49,22 @@ class PlantFeedTest : public testing::Test {
   PlantFeed feed_{board_};
 };
 
+TEST_F(PlantFeedTest, SinceWhenAValveIsNotJudgedIsToldByItsMonitor) {
+  Status(kA);
+  Vector(kA, 1);
+  idl::ValveStateMessage state;
+  state.valve_id = "V1";
+  state.unjudged_ns = 5;
+  state.why = "UNCOVERED cv";
+  feed_.Add(state, From(kA), now_);
+  EXPECT_EQ(Valve().unjudged_ns, 5);
+  EXPECT_EQ(Valve().why, "UNCOVERED cv");
+  state.unjudged_ns = 0;
+  state.why = "";
+  feed_.Add(state, From(kA), now_);
+  EXPECT_EQ(Valve().unjudged_ns, 0);
+}
+
 TEST_F(PlantFeedTest, ASilentMonitorIsToldFromASilentValve) {
   Status(kA);
   Status(kB);

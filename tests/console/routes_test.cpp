@@ -147,6 +147,14 @@ TEST_F(ConsoleRoutesTest, WhatIsPartlyJudgedIsNotCalledNormal) {
   EXPECT_EQ(refused["state"], "NOT_JUDGED");
   EXPECT_EQ(refused["refused"]["reason"], "range");
   EXPECT_EQ(refused["refused"]["signals"], Json::array({"X"}));
+  EXPECT_TRUE(refused["unjudged_since_ms"].is_null());
+  EXPECT_TRUE(refused["why"].is_null());
+
+  outcome.unjudged_ns = 3'000'000'000;
+  console_->live().OnVerdict("V1", monitor::PlantSample(4), outcome);
+  const Json since = Get("/api/v1/valves")["valves"][0];
+  EXPECT_EQ(since["unjudged_since_ms"], 3000);
+  EXPECT_EQ(since["why"], "BAD_INPUT range");
 }
 
 TEST_F(ConsoleRoutesTest, OpenCommonCausesAndWhatALabelMayBe) {

@@ -301,6 +301,10 @@ test('what is judged in part only is said, with the reason', async () => {
     refused: {reason: 'range', signals: ['P1'], flow_unit: 'm3/h'}}),
   tile('mass', 'NOT_JUDGED', [], {quality: 'BAD_INPUT',
     refused: {reason: 'unit', signals: ['F'], flow_unit: 'm3/h'}}),
+  tile('blind', 'NOT_JUDGED', [], {quality: 'UNCOVERED', why: 'UNCOVERED cv',
+    unjudged_since_ms: kNowMs - 700e3}),
+  tile('held', 'NOT_JUDGED', [], {quality: 'BAD_INPUT',
+    why: 'BAD_INPUT no_readings', unjudged_since_ms: kNowMs - 700e3}),
   tile('well', 'NORMAL')]);
   const page = await openShared(browser, address, '#/');
   const said = (id) => page.locator('.tile', {hasText: id}).innerText();
@@ -311,9 +315,12 @@ test('what is judged in part only is said, with the reason', async () => {
   assert.match(await said('twin'), /two publishers send it, the newest counts/);
   assert.match(await said('bar'), /bad input: P1 implausible: in another unit/);
   assert.match(await said('mass'), /flow in another unit than m³\/h/);
+  assert.match(await said('blind'),
+      /not judged since [^]*command beyond what was trained/);
+  assert.match(await said('held'), /not judged since [^]*no new readings/);
   assert.deepEqual(await page.locator('.tile .tile-id').allTextContents(),
-      ['bar', 'half', 'mass', 'twin', 'wide', 'well']);
-  await page.getByRole('button', {name: /Not or partly judged 5/}).waitFor();
+      ['bar', 'blind', 'half', 'held', 'mass', 'twin', 'wide', 'well']);
+  await page.getByRole('button', {name: /Not or partly judged 7/}).waitFor();
 
   monitor.answers['valves/half/trend'] = {...trend({state: 'NORMAL', d0: 1,
     d: [0, 0]}), words: 'as the normal model expects'};

@@ -101,6 +101,21 @@ TEST_F(ValveStatesTest, WhatIsNotJudgedIsNotNormal) {
   EXPECT_THAT(StateTold()["reason"], HasSubstr("no models"));
 }
 
+TEST_F(ValveStatesTest, WhatIsNotJudgedForLongSaysSinceWhenAndWhy) {
+  idl::ValveStateMessage blind;
+  blind.valve_id = "FV/1";
+  blind.monitor = "host:1";
+  blind.quality = Quality::kUncovered;
+  blind.as_of_ns = 700 * kSecond;
+  blind.unjudged_ns = 60 * kSecond;
+  blind.why = "UNCOVERED cv";
+  Hear(blind);
+  EXPECT_EQ(StateTold()["health"], "CHECK_FUNCTION");
+  EXPECT_EQ(StateTold()["reason"],
+            "it works where its models do not know it: not judged since "
+            "1970-01-01T00:01:00Z because UNCOVERED cv");
+}
+
 TEST_F(ValveStatesTest, AFaultHasItsClassAndWords) {
   idl::ValveStateMessage ill;
   ill.valve_id = "FV/1";

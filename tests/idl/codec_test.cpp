@@ -345,6 +345,8 @@ TEST(CodecTest, AValveStateArrivesWhole) {
   sent.priority = 2;
   sent.strength = -0.25;
   sent.since_ns = 5;
+  sent.unjudged_ns = 4;
+  sent.why = "UNCOVERED cv|dp";
 
   EXPECT_EQ(RoundTrip(sent), sent);
   for (const char* fault : {"", "unknown", "f19"}) {

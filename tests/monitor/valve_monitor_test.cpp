@@ -439,10 +439,29 @@ TEST_F(ValveMonitorTest, AValveThatIsNotJudgedForLongSaysSinceWhen) {
   }
   ASSERT_EQ(valve_.verdict().quality, Quality::kSettling);
   EXPECT_EQ(valve_.unjudged_since_ns(), PlantSample(99).stamp_ns);
-  Feed(740, 800);
+  EXPECT_EQ(Feed(PlantSample(740)).unjudged_ns, PlantSample(99).stamp_ns);
+  Feed(741, 800);
   EXPECT_FALSE(valve_.unjudged_since_ns());
   // Samples that were not there could not be judged.
   Feed(90'000, 90'010);
+  EXPECT_FALSE(valve_.unjudged_since_ns());
+}
+
+// A value that its source repeats as UNCERTAIN is no new reading.
+TEST_F(ValveMonitorTest, AValveWhoseReadingsAreHeldIsNotJudged) {
+  Feed(0, 100);
+  for (std::uint64_t k = 100; k < 800; ++k) {
+    Sample held = PlantSample(k);
+    held.quality.fill(SignalQuality::kUncertain);
+    Feed(held);
+  }
+  ASSERT_TRUE(valve_.unjudged_since_ns());
+  EXPECT_GE(*valve_.unjudged_since_ns(), PlantSample(99).stamp_ns);
+  EXPECT_LE(*valve_.unjudged_since_ns(), PlantSample(161).stamp_ns);
+  const Verdict& verdict = valve_.verdict();
+  EXPECT_EQ(WhyUnjudged(verdict.quality, verdict.intake, verdict.uncovered),
+            "BAD_INPUT no_readings");
+  Feed(800, 900);
   EXPECT_FALSE(valve_.unjudged_since_ns());
 }
 

@@ -161,6 +161,24 @@ TEST_F(WatchSystemTest, AnAlarmWhoseEndSomebodyAcknowledgedLeavesTheBus) {
   EXPECT_EQ(table["valves"][0]["certainty"], nullptr);
 }
 
+// Two of each twelve samples are missing, so the observers never settle.
+TEST_F(WatchSystemTest, SinceWhenAValveIsNotJudgedIsOnTheBus) {
+  Publish(60, 160);
+  for (std::uint64_t k = 162; k < 900; k += 12) {
+    Publish(k, k + 10);
+  }
+  idl::Participant here(participant_->options());
+  idl::Subscriber<idl::ValveStateMessage> states(here);
+  idl::ValveStateMessage last;
+  EXPECT_TRUE(Await([&] {
+    states.Take({[&](const auto& state, const auto&) { last = state; }, {}},
+                std::chrono::milliseconds(10));
+    return last.unjudged_ns != 0;
+  }));
+  EXPECT_EQ(last.unjudged_ns, PlantSample(159).stamp_ns);
+  EXPECT_EQ(last.why.substr(0, 8), "SETTLING");
+}
+
 // It stands as long as its data come.
 TEST_F(WatchSystemTest, AnAcknowledgedAlarmStaysOnTheBusWhileItStands) {
   storage::HistoryEditor(data_ / "history.db")

@@ -133,6 +133,7 @@ const kReasonWords = {
   parked: 'parked at an end of travel', dp: 'pressure drop outside normal',
   t1: 'T1 outside normal', p1: 'P1 outside normal', p2: 'P2 outside normal',
   waiting: 'back inside, but not for long enough yet',
+  no_readings: 'no new readings',
 };
 const kRefusalWords = {
   bad_quality: 'marked bad at the source', not_finite: 'no number',
@@ -162,15 +163,17 @@ function lackText({quality, missing, unjudged, refused, blind, contested}) {
 /** Why a valve is not judged, or only in part; empty if it is. */
 export function qualityText(tile) {
   const {quality, stamp_ms: stamp, reasons, monitor,
-    monitor_silent_since_ms: silent} = tile;
+    monitor_silent_since_ms: silent, unjudged_since_ms: since} = tile;
   if (quality === 'LIVE') return lackText(tile);
   if (silent) return `monitor ${monitor} silent since ${timeText(silent)}`;
-  const why = quality === 'BAD_INPUT' || tile.contested ? lackText(tile) :
-    (reasons ?? '')
-      .split('|').map((r) => kReasonWords[r] ?? r).join(', ');
+  const lack =
+    quality === 'BAD_INPUT' || tile.contested ? lackText(tile) : '';
+  const why = lack || (reasons || (tile.why ?? '').split(' ')[1] || '')
+    .split('|').map((r) => kReasonWords[r] ?? r).join(', ');
   return (kQualityWords[quality] ?? plain(quality)) +
       (stamp && quality === 'STALE' ? ` since ${timeText(stamp)}` :
-        stamp && quality === 'ENDED' ? ` at ${timeText(stamp)}` : '') +
+        stamp && quality === 'ENDED' ? ` at ${timeText(stamp)}` :
+          since ? `, not judged since ${timeText(since)}` : '') +
       (why ? `: ${why}` : '');
 }
 

@@ -103,6 +103,23 @@ TEST_F(WatchTableTest, TheWorstStandFirst) {
   EXPECT_THAT(Text(), HasSubstr("not confirmed since 1970-01-01T00:01:30Z"));
 }
 
+TEST_F(WatchTableTest, WhatIsNotJudgedForLongSaysSinceWhenAndWhy) {
+  idl::ValveStateMessage blind = State("blind");
+  blind.quality = Quality::kUncovered;
+  Hear(blind);
+  EXPECT_TRUE(Row("blind")["unjudged_utc"].is_null());
+  EXPECT_TRUE(Row("blind")["why"].is_null());
+
+  blind.unjudged_ns = 30 * kSecond;
+  blind.why = "UNCOVERED cv";
+  Hear(blind);
+  EXPECT_EQ(Row("blind")["state"], "NOT_JUDGED");
+  EXPECT_EQ(Row("blind")["unjudged_utc"], "1970-01-01T00:00:30Z");
+  EXPECT_EQ(Row("blind")["why"], "UNCOVERED cv");
+  EXPECT_THAT(Text(), HasSubstr("not judged since 1970-01-01T00:00:30Z"));
+  EXPECT_THAT(Text(), HasSubstr("UNCOVERED cv"));
+}
+
 TEST_F(WatchTableTest, AnAlarmHasItsNameAndHowSureItIs) {
   Hear(Named("ill"));
 
