@@ -904,6 +904,60 @@ test('a click counts though the list is made anew while it is pressed',
       await close(page);
     });
 
+test('paper is light, has no buttons, and shows every column and plot whole',
+    async () => {
+      const episode = '0000000000000001';
+      monitor.reset([tile('V', 'ISOLATED', ['f19'])],
+          [alarm(episode, 'V', 'f19', {check: kWork.check})]);
+      Object.assign(monitor.answers.status,
+          {write: true, user: 'anna', role: 'engineer'});
+      monitor.answers.worklist = kList;
+      monitor.answers[`episodes/${episode}`] = {episode: alarm(episode, 'V',
+          'f19'), model_hash: '0123456789abcdef', events: [], look: null,
+      growth: [], trace: {...trend({state: 'ISOLATED', d0: 0, d: [1, 0.4]}),
+        valve: 'V'}};
+      const page = await openShared(browser, address, '#/alarms',
+          {viewport: {width: 1400, height: 900}});
+      await setScheme(page, 'dark');
+      for (const [hash, seen, layout] of [['alarms', 'tbody tr', 'landscape'],
+        ['worklist', 'tbody tr', 'landscape'],
+        [`episode/${episode}`, '.panel canvas', 'portrait']]) {
+        await page.goto(`${address}/#/${hash}`);
+        await page.locator(seen).first().waitFor();
+        const columns = await page.locator('thead th:not(.for-hand)').count();
+        // Between the margins of A4, at 96 pixels an inch.
+        const width = layout === 'landscape' ? 1047 : 718;
+        await page.setViewportSize({width, height: 900});
+        await page.emulateMedia({media: 'print', colorScheme: 'dark'});
+        await page.evaluate(() => dispatchEvent(new Event('beforeprint')));
+        const paper = await page.evaluate(() => ({
+          theme: document.documentElement.dataset.theme,
+          page: getComputedStyle(document.querySelector('main')).page,
+          ground: getComputedStyle(document.documentElement).backgroundColor,
+          printed: document.querySelector('main').dataset.printed,
+          buttons: [...document.querySelectorAll('button, a.button, input')]
+              .filter((node) => !node.closest('.legend') &&
+                node.checkVisibility()).map((node) => node.textContent),
+          columns: [...document.querySelectorAll('thead th')].filter((node) =>
+            node.checkVisibility() &&
+            node.getBoundingClientRect().right <= innerWidth + 1).length,
+          plots: [...document.querySelectorAll('.panel canvas')].filter(
+              (node) => node.getBoundingClientRect().right >
+                innerWidth).length}));
+        assert.match(paper.printed, /^Printed \d{4}-\d\d-\d\d \d\d:/, hash);
+        delete paper.printed;
+        assert.deepEqual(paper, {theme: 'light', ground: 'rgb(255, 255, 255)',
+          page: layout === 'landscape' ? 'list' : 'auto', buttons: [],
+          columns, plots: 0}, hash);
+        await page.evaluate(() => dispatchEvent(new Event('afterprint')));
+        await page.emulateMedia({media: 'screen', colorScheme: 'dark'});
+        await page.setViewportSize({width: 1400, height: 900});
+        assert.equal(await page.evaluate(() =>
+          document.documentElement.dataset.theme), 'dark');
+      }
+      await close(page);
+    });
+
 test('every kind of tile can be read, at any size, light and dark',
     async () => {
       const episode = '0000000000000001';

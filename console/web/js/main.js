@@ -1,6 +1,7 @@
 // Starts the page: what is on top, which view a link means.
 
 import {replace} from './dom.js';
+import {clockText, dateText, zoneName} from './format.js';
 import {parseRoute} from './route.js';
 import {applyTheme, settings} from './settings.js';
 import {createShell, startAnnouncements} from './shell.js';
@@ -45,6 +46,9 @@ settings.addEventListener('change', ({detail}) => {
   if (detail === 'theme') applyTheme();
   if (detail === 'theme' || detail === 'utc') show(false);
 });
+// A time of today has no date, and paper outlasts the day.
+addEventListener('beforeprint', () => main.dataset.printed =
+  `Printed ${dateText(Date.now())} ${clockText(Date.now())}, ${zoneName()}`);
 await store.start();
 show(false);
 addEventListener('hashchange', () => show(true));

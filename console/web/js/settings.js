@@ -37,8 +37,9 @@ export const settings = new Settings();
 
 const dark = matchMedia('(prefers-color-scheme: dark)');
 
-export function applyTheme() {
-  const choice = settings.get('theme');
+/** Paper is light. */
+export function applyTheme(onPaper = false) {
+  const choice = onPaper ? 'light' : settings.get('theme');
   const theme = choice === 'auto' ? (dark.matches ? 'dark' : 'light') : choice;
   document.documentElement.dataset.theme = theme;
 }
@@ -52,3 +53,11 @@ dark.addEventListener('change', () => {
   applyTheme();
   settings.dispatchEvent(new CustomEvent('change', {detail: 'theme'}));
 });
+
+// Plots are pictures, so they are drawn again for paper.
+for (const event of ['beforeprint', 'afterprint']) {
+  addEventListener(event, () => {
+    applyTheme(event === 'beforeprint');
+    settings.dispatchEvent(new CustomEvent('change', {detail: 'paper'}));
+  });
+}

@@ -4,6 +4,7 @@
 import {button, h, replace, setText} from '../dom.js';
 import {markWord} from '../faults.js';
 import {durationText, timeText} from '../format.js';
+import {settings} from '../settings.js';
 import {reasonText} from './overlay.js';
 import {PanelStack} from './panel.js';
 import {panelsOf} from './panels.js';
@@ -30,6 +31,9 @@ export class Timeline {
   #everyFault = false;
   #shownLines = '';
   #data;
+  #repaint = ({detail}) => {
+    if (detail === 'paper') this.rebuild();
+  };
 
   /**
    * `live`: the newest is where it goes on; else all of it is shown.
@@ -51,9 +55,11 @@ export class Timeline {
     this.element = h('div', {class: 'timeline'}, this.#buttons, this.#panelBox,
         this.#summary);
     this.#makeButtons();
+    settings.addEventListener('change', this.#repaint);
   }
 
   destroy() {
+    settings.removeEventListener('change', this.#repaint);
     this.#stack.destroy();
   }
 

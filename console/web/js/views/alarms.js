@@ -114,8 +114,9 @@ class Alarms extends View {
       store.status?.user ? 'Read-only: your role is view.' :
       'Read-only: whoever acts opens the page through nginx.');
     replace(this.#head, headRow([
-      ...(canAct() ? [{text: h('span', {class: 'sr-only'}, 'Selected')}] : []),
-      ...kColumns, ...(canAct() ? [{text: 'Actions'}] : [])]));
+      ...(canAct() ? [{class: 'for-hand',
+        text: h('span', {class: 'sr-only'}, 'Selected')}] : []),
+      ...kColumns, ...(canAct() ? [{text: 'Actions', class: 'for-hand'}] : [])]));
     replace(this.#body, rows.map((row) => this.#row(row)));
     this.#showCounts(rows);
     this.#restoreFocus(focused);
@@ -128,8 +129,8 @@ class Alarms extends View {
       'onchange': () => this.#toggle(row.episode)});
     const acting = canAct();
     return bodyRow([
-      ...(acting ? [{cell: () => box}] : []), ...kColumns,
-      ...(acting ? [{cell: () =>
+      ...(acting ? [{class: 'for-hand', cell: () => box}] : []), ...kColumns,
+      ...(acting ? [{class: 'for-hand', cell: () =>
         h('div', {class: 'row-actions'}, actionButtons(row))}] : []),
     ], row, {
       'class': `group-${groupOf(row)}` +
