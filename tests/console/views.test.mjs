@@ -305,6 +305,8 @@ test('what is judged in part only is said, with the reason', async () => {
     unjudged_since_ms: kNowMs - 700e3}),
   tile('held', 'NOT_JUDGED', [], {quality: 'BAD_INPUT',
     why: 'BAD_INPUT no_readings', unjudged_since_ms: kNowMs - 700e3}),
+  tile('press', 'NOT_JUDGED', [], {quality: 'BAD_INPUT',
+    refused: {reason: 'unit', signals: ['P1', 'P2'], flow_unit: 'm3/h'}}),
   tile('well', 'NORMAL')]);
   const page = await openShared(browser, address, '#/');
   const said = (id) => page.locator('.tile', {hasText: id}).innerText();
@@ -318,9 +320,10 @@ test('what is judged in part only is said, with the reason', async () => {
   assert.match(await said('blind'),
       /not judged since [^]*command beyond what was trained/);
   assert.match(await said('held'), /not judged since [^]*no new readings/);
+  assert.match(await said('press'), /P1 or P2 in another unit than trained/);
   assert.deepEqual(await page.locator('.tile .tile-id').allTextContents(),
-      ['bar', 'blind', 'half', 'held', 'mass', 'twin', 'wide', 'well']);
-  await page.getByRole('button', {name: /Not or partly judged 7/}).waitFor();
+      ['bar', 'blind', 'half', 'held', 'mass', 'press', 'twin', 'wide', 'well']);
+  await page.getByRole('button', {name: /Not or partly judged 8/}).waitFor();
 
   monitor.answers['valves/half/trend'] = {...trend({state: 'NORMAL', d0: 1,
     d: [0, 0]}), words: 'as the normal model expects'};
@@ -688,6 +691,7 @@ test('a narrow screen keeps what to check', async () => {
 const kWork = {rank: 1, valve_id: kLongId, kind: 'episode', fault: 'f6',
   name: '<b>Plug worn', severity: 'high', severity_points: 4, grade: 1,
   grade_factor: 2, certainty: 'likely', confidence: 0.75, score: 6, open: true,
+  look_alikes: ['f19'],
   unconfirmed_utc: null, shares: 'cause: air header',
   why: 'Plug worn: stands for 3 days, and it grows by 2 % a day',
   check: 'Look at it, and at what stands beside it; then compare it with ' +
@@ -721,7 +725,8 @@ test('the work list has the order of its document, factors, and what nobody ' +
     '1 · 2.0', 'likely · 0.75', '6.00', 'shares cause: air header',
     'no data came', '25.0 %', 'mechanical or instrument', 'returned',
     'stands; acknowledged', 'in work, order 4711, expected back 2026-11-26',
-    'Done, and watched for their return', 'recalibrated']) {
+    'Done, and watched for their return', 'recalibrated',
+    '<b>Plug worn (f6) or Flow transmitter wrong (f19)']) {
     assert.ok(text.includes(part), part);
   }
   assert.deepEqual(await page.getByRole('table', {name: 'Work list'})

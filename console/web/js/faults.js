@@ -142,7 +142,9 @@ const kRefusalWords = {
 
 function refusalText({reason, signals, flow_unit: unit}) {
   if (reason === 'unit') {
-    return `flow in another unit than ${unitText(unit)}`;
+    return signals.some((signal) => signal !== 'F') ?
+      `${signals.join(' or ')} in another unit than trained` :
+      `flow in another unit than ${unitText(unit)}`;
   }
   if (reason === 'period') return 'samples at another interval than trained';
   return kRefusalWords[reason] ?

@@ -39,8 +39,10 @@ function facts({episode: row, model_hash: hash}) {
         [rowTitle(row) + moreText(row), row.witness]
             .filter(Boolean).join(', '))],
     ['Priority', priorityNames[priorityOf(row)]],
-    ['State', [`${stateWord(row.state)}; ${groupName(row).toLowerCase()}`,
-      unconfirmedText(row)].filter(Boolean).join(', ')],
+    // What only the data of ended is not closed, it stands.
+    ['State', unconfirmedText(row) ?
+      `${unconfirmedText(row)}; ${groupName(row).toLowerCase()}` :
+      `${stateWord(row.state)}; ${groupName(row).toLowerCase()}`],
     ['Detected', timeCell(row.detected_ms)],
     ['Named', row.isolated_ms === null ? '–' : h('span', {},
         timeCell(row.isolated_ms), `, ${durationText(
@@ -85,7 +87,8 @@ const withRepairs = ({events, repairs}) => [...events, ...(repairs ?? []).map(
 
 const kEventColumns = [
   {text: 'Time', cell: (event) => timeCell(event.at_ms)},
-  {text: 'What', header: true, cell: (event) => markWord(event.kind)},
+  {text: 'What', header: true, class: 'word', cell: (event) =>
+    markWord(event.kind)},
   {text: 'Details', class: 'remark', cell: eventText},
   {text: 'Who', cell: (event) => event.who ?? ''},
   {text: 'From where', class: 'wide', cell: (event) => event.origin ?? ''},

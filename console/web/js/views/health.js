@@ -73,7 +73,8 @@ function countsOf(health) {
 
 const kCountColumns = [
   {text: 'Count', header: true, cell: (row) => row.text},
-  {text: 'Value', cell: (row) => `${numberText(row.value)} ${row.unit}`},
+  {text: 'Value', cell: ({value, unit}) =>
+    `${Number.isInteger(value) ? value : numberText(value)} ${unit}`},
   {text: 'Limit', cell: (row) => row.exceeded ? 'exceeded' : ''},
 ];
 

@@ -63,12 +63,13 @@ function judged({residual, low, high, away, blind}) {
 const kServices = {F: 'flow', P: 'pressure', L: 'level', T: 'temperature',
   A: 'analysis'};
 
-/** "Level, globe DN100, grade 1, group north. "; empty if nothing is known. */
+/** "Service: level, globe, grade 1. ", "Globe. "; empty if nothing is known. */
 function serviceText({service, type, grade, group}) {
   const words = [kServices[service] ?? service, type,
     grade && `grade ${grade}`, group && `group ${group}`]
       .filter(Boolean).join(', ');
-  return words ? `Service: ${words}. ` : '';
+  return !words ? '' : service ? `Service: ${words}. ` :
+    `${words[0].toUpperCase()}${words.slice(1)}. `;
 }
 
 /** ". Last work: recalibrated, 2026-11-20 by bo"; empty while none is done. */

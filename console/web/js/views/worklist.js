@@ -3,6 +3,7 @@
 
 import {get, url} from '../api.js';
 import {button, errorNote, h, replace} from '../dom.js';
+import {moreText} from '../faults.js';
 import {timeText} from '../format.js';
 import {link} from '../route.js';
 import {columns, dataTable, forText, timeCell, valveCell, valveLink}
@@ -15,8 +16,9 @@ const utcCell = (text) => timeCell(text && Date.parse(text));
 
 const utcText = (text) => timeText(Date.parse(text));
 
-function findingCell({name, fault, episode_id: id}) {
-  const text = fault && fault !== 'unknown' ? `${name} (${fault})` : name;
+function findingCell({name, fault, episode_id: id, ...row}) {
+  const text = (fault && fault !== 'unknown' ? `${name} (${fault})` : name) +
+    moreText(row);
   return id ? h('a', {href: link('episode', id)}, text) : text;
 }
 
@@ -33,7 +35,7 @@ const kRows = [
   columns.priority,
   {text: 'Valve', header: true, cell: (row) => valveCell(row.valve_id, row)},
   {text: 'Finding', class: 'fault', cell: findingCell},
-  {text: 'Why', class: 'remark', cell: ({why, shares}) =>
+  {text: 'Why', class: 'remark why', cell: ({why, shares}) =>
     shares ? `${why}; shares ${shares}` : why},
   {text: 'State', cell: stateText},
   {text: 'Severity', class: 'wide', cell: (row) =>
