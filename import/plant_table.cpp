@@ -9,6 +9,7 @@
 #include "base/text.h"
 #include "base/time_text.h"
 #include "base/toml_reader.h"
+#include "diagnosis/model/valve_costs.h"
 #include "import/tag_map.h"
 
 // Both forms of the table, TOML and CSV, are first read into a RawTable: cells
@@ -24,9 +25,9 @@ using NamedCells = std::map<std::string, std::string>;
 constexpr std::array<std::string_view, kLoopTagCount> kTagNames = {
     "op", "pv", "sp", "mode", "x", "f", "p1", "p2", "t1"};
 constexpr std::string_view kOtherKeys[] = {
-    "name",  "sense", "service",     "type",     "grade",   "group",   "file",
-    "from",  "to",    "auto",        "manual",   "report",  "max_age", "topic",
-    "value", "time",  "description", "location", "document"};
+    "name",  "sense", "service",     "type",     "grade",    "group",   "file",
+    "from",  "to",    "auto",        "manual",   "report",   "max_age", "topic",
+    "value", "time",  "description", "location", "document", "costs"};
 // How rows without a model set are told apart from a forgotten type.
 constexpr std::string_view kDataOnly = "data only";
 
@@ -223,6 +224,12 @@ class RowReader {
     row_.description = Filled(Cell("description"));
     row_.location = Filled(Cell("location"));
     row_.document = Filled(Cell("document"));
+    row_.costs = Cell("costs");
+    try {
+      ParseCosts(row_.costs);
+    } catch (const ConfigError& error) {
+      Refuse(error.what());
+    }
   }
 
   // How the tags come while the plant runs.

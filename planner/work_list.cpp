@@ -32,6 +32,20 @@ Json TimeOrNull(const std::optional<std::int64_t>& stamp_ns) {
   return stamp_ns ? Json(FormatTime(*stamp_ns, true)) : Json();
 }
 
+Json WaitingJson(const Waiting& waiting) {
+  const ValveCosts& costs = waiting.costs;
+  const auto range = [](const Range& of) -> Json {
+    return {{"value", SixDigits(of.value)},
+            {"lowest", SixDigits(of.lowest)},
+            {"highest", SixDigits(of.highest)}};
+  };
+  return {{"loss", range(waiting.loss)},
+          {"unit", FlowUnitName(waiting.unit)},
+          {"price", *costs.medium},
+          {"week", range(waiting.week())},
+          {"currency", costs.currency}};
+}
+
 Json RowJson(const WorkRow& row, std::size_t rank,
              const std::map<std::string, ValveLife>& lives) {
   const Finding& f = row.finding;
@@ -80,6 +94,12 @@ Json RowJson(const WorkRow& row, std::size_t rank,
       {"service_hours", SixDigits(life.service_hours)},
       {"live_share", SixDigits(life.live_share)},
       {"last_utc", found == lives.end() ? Json() : TimeOrNull(life.last_ns)}};
+  if (row.waiting && row.waiting->loss.value > 0.0) {
+    json["waiting"] = WaitingJson(*row.waiting);
+  }
+  if (row.stop) {
+    json["safe_until_stop"] = row.stop->safe;
+  }
   if (!f.monitor.empty()) {
     json.update({{"host", f.host}, {"monitor", f.monitor}});
   }

@@ -47,6 +47,7 @@ struct WorkQuery {
   std::int64_t since_ns{0};     ///< Episodes from then on, and open ones.
   std::vector<HealthLimit> limits{};
   std::string discipline{};  ///< Rows of this one only; empty: any.
+  std::optional<std::int64_t> stop_ns{};  ///< Can a finding wait until then?
   std::string software{};
   std::vector<PlannedLoop> loops{};
   std::vector<Repair> repairs{};  ///< RepairsOf(models)

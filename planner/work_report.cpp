@@ -1,5 +1,6 @@
 #include "planner/work_report.h"
 
+#include <algorithm>
 #include <functional>
 #include <sstream>
 #include <string>
@@ -153,7 +154,19 @@ void AddCsv(report::Report& report) {
                                    "travel_strokes",
                                    "service_hours"};
   const Json& rows = report.document["rows"];
-  if (!rows.empty() && rows.front().contains("monitor")) {
+  const auto any = [&rows](const char* key) {
+    return std::ranges::any_of(
+        rows, [key](const Json& row) { return row.contains(key); });
+  };
+  if (any("waiting")) {
+    keys.insert(keys.end(), {"waiting/week/value", "waiting/week/lowest",
+                             "waiting/week/highest", "waiting/currency",
+                             "waiting/loss/value", "waiting/unit"});
+  }
+  if (any("safe_until_stop")) {
+    keys.emplace_back("safe_until_stop");
+  }
+  if (any("monitor")) {
     keys.insert(keys.end(), {"host", "monitor"});
   }
   report.Csv("rows", std::move(keys));

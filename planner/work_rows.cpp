@@ -47,6 +47,11 @@ std::string SpanText(std::int64_t span_ns) {
   return std::to_string(std::lround(hours / 24.0)) + " days";
 }
 
+// "2026-12-03"
+std::string DayText(std::int64_t stamp_ns) {
+  return FormatTime(stamp_ns, true).substr(0, std::size("2026-12-03") - 1);
+}
+
 // "stands for 3 h, not confirmed for 1 h, severity high, strength -50 %"
 std::string EpisodeText(const Finding& finding, std::int64_t now_ns) {
   // A monitor's clock may be ahead of this one. Spans up to an earlier time
@@ -207,12 +212,15 @@ class RowReader {
                  std::map<std::string, ValveLife>& lives);
   void AddAudits();
   void AddOrders();
+  void AddStop();
   std::vector<WorkRow> Ranked() &&;
   std::vector<DoneFinding> TakeDone() { return std::move(done_); }
 
  private:
   void FindDone(SameFault& same, storage::History& history) const;
-  void AddFault(SameFault& same);
+  void AddFault(SameFault& same, storage::History& history);
+  void AddCosts(std::uint64_t episode, storage::History& history,
+                WorkRow& row) const;
   bool JoinFault(const LoopAudits::Window& audit, const std::string& text);
   void AddFigures(const Finding& of, const std::vector<HealthHour>& hours);
   Finding Low(const Finding& of, const char* kind,
@@ -247,7 +255,7 @@ void RowReader::FindDone(SameFault& same, storage::History& history) const {
   }
 }
 
-void RowReader::AddFault(SameFault& same) {
+void RowReader::AddFault(SameFault& same, storage::History& history) {
   const Episode& episode = *same.episodes.back();
   Finding finding = findings::FindingOf(episode, texts_, facts_);
   if (same.done) {
@@ -291,7 +299,32 @@ void RowReader::AddFault(SameFault& same) {
                    : "; still, " + SpanText(query_.now_ns - same.done->at_ns) +
                          " after" + done;
   }
+  if (row.finding.stands()) {
+    AddCosts(episode.id, history, row);
+  }
   rows_.push_back(std::move(row));
+}
+
+// What waiting costs, and whether the fault can wait until the stop. Strengths
+// and hours are read only where somebody asks.
+void RowReader::AddCosts(std::uint64_t episode, storage::History& history,
+                         WorkRow& row) const {
+  const Finding& finding = row.finding;
+  if (finding.about.costs.empty() && !query_.stop_ns) {
+    return;
+  }
+  const auto strengths = history.Strengths(episode);
+  if (!finding.about.costs.empty()) {
+    row.waiting =
+        WaitingOf(finding, strengths,
+                  history.Health({finding.valve_id, *finding.since_ns}));
+  }
+  if (row.waiting) {
+    row.why += "; " + row.waiting->text;
+  }
+  if (query_.stop_ns) {
+    row.stop = SafeUntil(finding, strengths, texts_, *query_.stop_ns);
+  }
 }
 
 void RowReader::AddEpisodes(storage::History& history) {
@@ -330,7 +363,7 @@ void RowReader::AddEpisodes(storage::History& history) {
   }
   for (auto& [key, same] : faults) {
     FindDone(same, history);
-    AddFault(same);
+    AddFault(same, history);
   }
   std::ranges::stable_sort(
       done_, std::greater<>(),
@@ -573,6 +606,32 @@ void RowReader::AddOrders() {
   }
 }
 
+// A figure, a drift and a verdict have no trend, so nobody knows.
+void RowReader::AddStop() {
+  if (!query_.stop_ns) {
+    return;
+  }
+  const std::string question =
+      "; safe until the stop on " + DayText(*query_.stop_ns) + ": ";
+  for (WorkRow& row : rows_) {
+    if (!row.finding.stands()) {
+      continue;
+    }
+    if (row.trend) {
+      row.stop = SafeUntil(row.trend->forecast, *query_.stop_ns);
+    } else if (!row.stop) {
+      row.stop = StopAnswer{"not known", "no trend of it is stored"};
+    }
+    row.why += question + row.stop->safe + ", " + row.stop->text;
+    const ValveCosts costs = ParseCosts(row.finding.about.costs);
+    if (costs.downtime && row.stop->safe != "yes") {
+      row.why += "; an hour of downtime costs " +
+                 report::FormatNumber(*costs.downtime, 0) + " " +
+                 costs.currency;
+    }
+  }
+}
+
 std::vector<WorkRow> RowReader::Ranked() && {
   if (!query_.discipline.empty()) {
     std::erase_if(rows_, [this](const WorkRow& row) {
@@ -619,6 +678,7 @@ std::vector<WorkRow> ReadRows(storage::History* history,
   }
   rows.AddAudits();
   rows.AddOrders();
+  rows.AddStop();
   done = rows.TakeDone();
   return std::move(rows).Ranked();
 }

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "planner/health_view.h"
+#include "planner/work_costs.h"
 #include "planner/work_list.h"
 #include "report/fault_texts.h"
 #include "report/findings/finding.h"
@@ -24,6 +25,8 @@ struct WorkRow {
   std::optional<std::int64_t> done_ns{};
   /// The newest order for its valve, if nothing was done since.
   std::optional<Repair> in_work{};
+  std::optional<Waiting> waiting{};
+  std::optional<StopAnswer> stop{};  ///< If the query asks, and it stands.
 };
 
 /// A finding that is done, and has not come back.

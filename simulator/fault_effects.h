@@ -5,6 +5,7 @@
 #include <iterator>
 
 #include "diagnosis/model/fault_catalogue.h"
+#include "diagnosis/model/leakage.h"
 #include "simulator/valve_parameters.h"
 
 namespace fdi::simulator {
@@ -114,7 +115,10 @@ inline constexpr Effect kEffects[] = {
       e.kv_factor *= 1.0 + 0.1 * s;
     },
     /* f4 */ [](double s, FaultEffects& e) { e.play_offset += s; },
-    /* f5 */ [](double s, FaultEffects& e) { e.external_loss += 0.05 * s; },
+    /* f5 */
+    [](double s, FaultEffects& e) {
+      e.external_loss += kExternalLeakShare * s;
+    },
     /* f6 */ [](double s, FaultEffects& e) { e.opening_offset += 0.10 * s; },
     /* f7 */
     [](double s, FaultEffects& e) {

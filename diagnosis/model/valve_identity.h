@@ -12,6 +12,7 @@ struct ValveIdentity {
   std::string description{};   ///< "Feed to column C-101"
   std::string location{};      ///< "Hall 2, level 3"
   std::string document{};      ///< Address or number of its data sheet.
+  std::string costs{};         ///< As ParseCosts() reads it.
 
   bool operator==(const ValveIdentity&) const = default;
 };

@@ -158,6 +158,7 @@ struct WorkListOptions {
   std::size_t rows{10};
   int audit_windows{0};
   std::string html;
+  std::string stop;
   PlantOptions plant;
 };
 
@@ -196,6 +197,13 @@ Report WorkList(const WorkListOptions& options, const Context& context) {
   if (query.since_ns >= query.now_ns) {
     throw ConfigError("--from " + options.from +
                       " is not in the past; try 7d or 2026-10-01");
+  }
+  if (!options.stop.empty()) {
+    query.stop_ns = ParseTime(options.stop, context.options.utc);
+    if (*query.stop_ns <= query.now_ns) {
+      throw ConfigError("--stop " + options.stop +
+                        " is not in the future; type the day of the next stop");
+    }
   }
   query.discipline = options.discipline;
   query.limits = planner::ParseLimits(options.limits);
@@ -274,6 +282,10 @@ void AddPlannerVerbs(report::Program& program) {
                   "Limits of trends, as of `health`; may be repeated "
                   "(default: F=-10% and F=10%)")
       ->type_name("NAME=VALUE");
+  list.add_option("--stop", options.stop,
+                  "Also say of each finding whether it can wait until this "
+                  "time: 2026-12-03")
+      ->type_name("TIME");
   list.add_option("--audit-windows", options.audit_windows,
                   "Windows of two hours to audit of each loop's newest stored "
                   "run")

@@ -11,6 +11,7 @@
 #include "base/csv_cells.h"
 #include "base/error.h"
 #include "base/toml_text.h"
+#include "diagnosis/model/valve_costs.h"
 #include "diagnosis/records/valve_glob.h"
 #include "import/plant_table.h"
 #include "programs/store/verbs.h"
@@ -52,6 +53,7 @@ Json EntryJson(const ValveEntry& entry) {
 Json LoopJson(const PlantLoop& loop) {
   return {{"loop", loop.name},
           {"about", findings::AboutJson(loop)},
+          {"costs", loop.costs.empty() ? Json() : Json(loop.costs)},
           {"type", loop.type.empty() ? Json() : Json(loop.type)},
           {"group", loop.group.empty() ? Json() : Json(loop.group)},
           {"watched_by", LoopWatchName(loop.watch)},
@@ -414,9 +416,10 @@ Report AddValves(const AddOptions& options, const Context& context) {
   if (options.says_who() &&
       options.pattern.find_first_of("*?[") != std::string::npos) {
     throw ConfigError(options.pattern +
-                      " is a glob: --description, --location, --document and "
-                      "--grade are of one valve");
+                      " is a glob: --description, --location, --document, "
+                      "--costs and --grade are of one valve");
   }
+  ParseCosts(options.about.costs);
   ValveEntry entry;
   entry.pattern = options.pattern;
   entry.type = options.type;
@@ -655,7 +658,13 @@ void AddAdd(report::Program& program, CLI::App& group) {
        &ValveIdentity::location},
       {verb.add_option("--document", options.about.document,
                        "Address or number of its data sheet"),
-       &ValveIdentity::document}};
+       &ValveIdentity::document},
+      {verb.add_option("--costs", options.about.costs,
+                       "Value of the medium, of an hour of downtime and of a "
+                       "visit, as far as known: \"12.5 EUR/t, 4000 EUR/h, "
+                       "350 EUR\"")
+           ->type_name("FIGURES"),
+       &ValveIdentity::costs}};
   verb.add_option("--grade", options.about.grade,
                   "How much the plant depends on it: 1 counts 2 in the rank of "
                   "its findings, 2 or none 1, 3 a half")

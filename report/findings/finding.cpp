@@ -84,7 +84,9 @@ report::Json AboutJson(const ValveIdentity& valve) {
   const auto text = [](const std::string& stated) {
     return stated.empty() ? report::Json() : report::Json(stated);
   };
-  if (valve == ValveIdentity{}) {
+  ValveIdentity who = valve;
+  who.costs.clear();
+  if (who == ValveIdentity{}) {
     return nullptr;
   }
   return {{"description", text(valve.description)},

@@ -38,7 +38,7 @@ void ModelStore::StoreLoop(const PlantLoop& loop) {
   database_.Run(sql::put_loop, loop.name, loop.service, loop.type, loop.grade,
                 loop.group, loop.watch, loop.state, loop.finding,
                 loop.input_hash, NowNs(), loop.description, loop.location,
-                loop.document);
+                loop.document, loop.costs);
 }
 
 bool ModelStore::IsEntry(std::string_view pattern) {
@@ -103,7 +103,8 @@ std::vector<PlantLoop> ReadLoops(Database& database,
     PlantLoop& loop = loops.emplace_back();
     rows.Read(0, loop.name, loop.service, loop.type, loop.grade, loop.group,
               loop.watch, loop.state, loop.finding, loop.input_hash,
-              loop.checked_ns, loop.description, loop.location, loop.document);
+              loop.checked_ns, loop.description, loop.location, loop.document,
+              loop.costs);
   }
   return loops;
 }

@@ -106,15 +106,15 @@ SELECT name, created_ns, summary, length(bytes) FROM valve_type ORDER BY name
 
 -- ---- Loops of the plant.
 -- name: put_loop
-INSERT INTO plant_loop VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)
+INSERT INTO plant_loop VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)
 ON CONFLICT (name) DO UPDATE SET service = excluded.service,
   type = excluded.type, grade = excluded.grade,
   loop_group = excluded.loop_group, watch = excluded.watch,
   state = excluded.state, finding = excluded.finding,
   input_hash = excluded.input_hash, checked_ns = excluded.checked_ns,
   description = excluded.description, location = excluded.location,
-  document = excluded.document
+  document = excluded.document, costs = excluded.costs
 -- name: loops
 SELECT name, service, type, grade, loop_group, watch, state, finding,
-  input_hash, checked_ns, description, location, document
+  input_hash, checked_ns, description, location, document, costs
 FROM plant_loop WHERE ?1 IS NULL OR name = ?1 ORDER BY name

@@ -33,6 +33,7 @@ constexpr const char* kToml = R"(
 files = ["day.csv"]
 [defaults]
 document = "https://d/{loop}"
+costs = ["12.5 EUR/t", "350 EUR"]
 op = "{loop}.OP"
 sense = "opening"
 [group.boiler]
@@ -53,10 +54,10 @@ type = "data only"
 )";
 constexpr const char* kCsv =
     "name,group,op,x,op_range,sense,service,grade,type,description,location,"
-    "document\n"
-    "*,,{loop}.OP,,,opening,,,,,,https://d/{loop}\n"
-    "*,boiler,,{loop}.ZT,0..1,,,,,,,\n"
-    "FIC1,boiler,,,,,f,2,lublin-actuator-3,Feed,Hall 2,\n"
+    "document,costs\n"
+    "*,,{loop}.OP,,,opening,,,,,,https://d/{loop},\"12.5 EUR/t,350 EUR\"\n"
+    "*,boiler,,{loop}.ZT,0..1,,,,,,,,\n"
+    "FIC1,boiler,,,,,f,2,lublin-actuator-3,Feed,Hall 2,,\n"
     "LIC2,,,,,,L,,data only\n";
 
 // As in plants that number their loops so.
@@ -89,6 +90,7 @@ TEST_F(PlantTableTest, TomlAndCsvSayTheSame) {
     EXPECT_EQ(first.description, "Feed");
     EXPECT_EQ(first.location, "Hall 2");
     EXPECT_EQ(first.document, "https://d/FIC1");
+    EXPECT_EQ(first.costs, "12.5 EUR/t,350 EUR");
     EXPECT_EQ(first.type, "lublin-actuator-3");
     const PlantRow& second = table.rows[1];
     EXPECT_EQ(second[LoopTag::kOp].pattern, "LIC2.OP");

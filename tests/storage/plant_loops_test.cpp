@@ -28,6 +28,7 @@ class PlantLoopsTest : public ::testing::Test {
     loop.description = "Feed";
     loop.location = "Hall 2";
     loop.document = "DS-1";
+    loop.costs = "350 EUR";
     loop.group = "unit 1";
     loop.watch = LoopWatch::kFaults;
     loop.state = LoopState::kOnboarded;

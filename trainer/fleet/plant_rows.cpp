@@ -12,7 +12,7 @@ storage::PlantLoop LoopOf(const importer::PlantRow& row,
   identity.grade = identity.grade ? identity.grade : before.grade;
   for (const auto member :
        {&ValveIdentity::description, &ValveIdentity::location,
-        &ValveIdentity::document}) {
+        &ValveIdentity::document, &ValveIdentity::costs}) {
     if ((identity.*member).empty()) {
       identity.*member = before.*member;
     }

@@ -91,6 +91,14 @@ TEST_F(FdiStoreHistoryTest, WhoAValveIsStandsInEveryList) {
   EXPECT_EQ(about["location"], "Hall 2");
   EXPECT_EQ(StoreJson("worklist")["rows"][0]["grade_factor"], 2.0);
   EXPECT_EQ(StoreJson("valves list")["loops"][0]["about"], about);
+
+  const Outcome wrong = Store("valves add " + valve + " --costs '-1 EUR/t'");
+  EXPECT_EQ(wrong.code, 2);
+  EXPECT_THAT(wrong.err, HasSubstr("an amount is not negative"));
+  EXPECT_TRUE(StoreJson("valves list")["loops"][0]["costs"].is_null());
+  ASSERT_EQ(Store("valves add " + valve + " --costs '2 EUR/t, 350 EUR'").code,
+            0);
+  EXPECT_EQ(StoreJson("valves list")["loops"][0]["costs"], "2 EUR/t, 350 EUR");
 }
 
 TEST_F(FdiStoreHistoryTest, WhoAValveIsChangesNoEntry) {
@@ -135,6 +143,10 @@ TEST_F(FdiStoreHistoryTest, WhatTheTableDoesNotStateStays) {
   EXPECT_EQ(loops[0]["about"]["location"], "Hall");
   EXPECT_EQ(loops[1]["about"]["grade"], 3);
   EXPECT_EQ(loops[1]["about"]["description"], "Feed");
+  Write("plant.csv", "name,op,pv,costs\nFIC1,OP,PV,3 EUR/kg\n");
+  const Outcome refused = Store("valves add --plant plant.csv");
+  EXPECT_EQ(refused.code, 3);
+  EXPECT_THAT(refused.out, HasSubstr("none of /t, /m3 and /h"));
 }
 
 TEST_F(FdiStoreHistoryTest, WorkOnAValveStandsInItsEpisode) {

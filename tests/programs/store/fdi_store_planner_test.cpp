@@ -138,6 +138,9 @@ TEST_F(FdiStorePlannerTest, WorkListRefusesWhatItCannotUse) {
   EXPECT_EQ(Store("worklist").code, 0);
   EXPECT_EQ(Store("worklist --from 2100-01-01").code, 2);
   EXPECT_EQ(Store("worklist --from soon").code, 2);
+  const Outcome past = Store("worklist --stop 2020-01-01");
+  EXPECT_EQ(past.code, 2);
+  EXPECT_THAT(past.err, HasSubstr("--stop 2020-01-01 is not in the future"));
   EXPECT_EQ(Store("worklist --html no/such/week.html").code, 3);
   Write("week.json", "[1]");
   const Outcome foreign = Store("worklist --html week.html");

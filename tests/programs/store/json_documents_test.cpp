@@ -231,6 +231,30 @@ class JsonDocumentsTest : public FdiStoreTest {
     models.SaveTemplate("globe", std::vector<std::byte>(7), "19 faults");
   }
 
+  // One that stands, for what waiting costs.
+  void StoreLeak() {
+    models_.faults = {1, 5, 19};
+    HistoryWriter writer(path_);
+    const auto record = [&](TransitionKind kind, double s, FaultSet faults) {
+      writer.Record(Event(kind, s, faults, 0.8, EndReason::kNone, "LV-2"),
+                    kDetected);
+    };
+    record(TransitionKind::kDetected, 0, 0);
+    record(TransitionKind::kIsolated, 20, 0b010);
+    writer.StoreStrength({Id("LV-2"), kDetected + 600 * kSecond, 5, 0.5, 0.4,
+                          0.6, Layer::kObservers});
+    HealthHour hour;
+    hour.valve_id = "LV-2";
+    hour.hour = kDetected / (3600 * kSecond) + 1;
+    hour.model_hash = 1;
+    hour.seen_ms = hour.live_ms = 3'600'000;
+    hour.channels = {{Signal::kF, 0}};
+    hour.bins[5] = {{3600, 0, 0, 3600 * 100}};
+    Checkpoint checkpoint;
+    checkpoint.health = {hour};
+    writer.CommitCheckpoint(checkpoint);
+  }
+
   void StoreHistory() {
     HistoryWriter writer(path_);
     RecordEpisode(writer, 0b010);
@@ -395,6 +419,9 @@ TEST_F(JsonDocumentsTest, ProgramsAndPageHaveTheSameKeys) {
     called_.insert("fdi-store history plot");
   }
   Printed(page, "runs delete", id);
+  StoreLeak();
+  Printed(page, "valves add", "LV-2 --costs '2 EUR/m3'");
+  Printed(page, "worklist", "--from 2020-01-01 --stop 2100-01-01");
 
   EXPECT_THAT(page.complaints(), IsEmpty());
   // The page also has the records of components that are left out.
