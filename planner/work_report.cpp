@@ -30,12 +30,16 @@ std::string Where(const Json& row) {
                                  : "";
 }
 
-// "Flow transmitter wrong (f19)"
+// "Valve leaks through when shut (f6), or f18"
 std::string FindingText(const Json& row) {
-  return row["name"].get<std::string>() +
-         (row["fault"].is_null() || row["fault"] == "unknown"
-              ? ""
-              : " (" + row["fault"].get<std::string>() + ")");
+  std::string text = row["name"].get<std::string>() +
+                     (row["fault"].is_null() || row["fault"] == "unknown"
+                          ? ""
+                          : " (" + row["fault"].get<std::string>() + ")");
+  for (const Json& other : row["look_alikes"]) {
+    text += ", or " + other.get<std::string>();
+  }
+  return text;
 }
 
 std::string SeverityText(const Json& row) {

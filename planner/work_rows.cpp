@@ -52,16 +52,21 @@ std::string DayText(std::int64_t stamp_ns) {
   return FormatTime(stamp_ns, true).substr(0, std::size("2026-12-03") - 1);
 }
 
-// "stands for 3 h, not confirmed for 1 h, severity high, strength -50 %"
-std::string EpisodeText(const Finding& finding, std::int64_t now_ns) {
+// "Valve leaks through when shut or Bypass open: stands for 3 h, not confirmed
+// for 1 h, severity high, strength -50 %"
+std::string EpisodeText(const Finding& finding, const report::FaultTexts& texts,
+                        std::int64_t now_ns) {
   // A monitor's clock may be ahead of this one. Spans up to an earlier time
   // than the newest evidence would be too short.
   now_ns = std::max(now_ns, finding.last_ns);
-  std::string text =
-      finding.words.name + ": " +
-      (finding.ended_ns
-           ? "returned " + SpanText(now_ns - *finding.ended_ns) + " ago"
-           : "stands for " + SpanText(now_ns - *finding.since_ns));
+  std::string text = finding.words.name;
+  for (const std::string& other : finding.look_alikes) {
+    text += " or " + texts.Of(ParseFinding(other).value_or(0)).name;
+  }
+  text +=
+      ": " + (finding.ended_ns
+                  ? "returned " + SpanText(now_ns - *finding.ended_ns) + " ago"
+                  : "stands for " + SpanText(now_ns - *finding.since_ns));
   if (finding.unconfirmed_ns) {
     text += ", not confirmed for " + SpanText(now_ns - *finding.unconfirmed_ns);
   }
@@ -272,6 +277,7 @@ void RowReader::AddFault(SameFault& same, storage::History& history) {
   if (same.confirmed) {
     finding.confirmed = true;
     finding.confidence = 1.0;
+    finding.look_alikes.clear();
   }
   // A label that names another fault changes what to check. The severity is
   // that of the alarm in every view.
@@ -282,7 +288,7 @@ void RowReader::AddFault(SameFault& same, storage::History& history) {
     finding.words = texts_.Words(fault, episode.strength);
     finding.words.severity = severity;
   }
-  std::string why = EpisodeText(finding, query_.now_ns);
+  std::string why = EpisodeText(finding, texts_, query_.now_ns);
   if (const auto labels = facts_.labels.find(episode.fault.value_or(""));
       !finding.confirmed && labels != facts_.labels.end() &&
       labels->second.wrong > labels->second.right) {

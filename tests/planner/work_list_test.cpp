@@ -228,6 +228,21 @@ TEST_F(WorkListTest, ALabelDoesNotChangeTheSeverityOfTheAlarm) {
   EXPECT_EQ(Rows().at(0)["severity"], before);
 }
 
+// As in the list of alarms, until somebody says which of them it is.
+TEST_F(WorkListTest, WhatLooksTheSameIsNamedBesideTheFault) {
+  models_.faults = {1, 6, 19};
+  RecordOpen("V1", 0b010);
+  EXPECT_EQ(Rows().at(0)["look_alikes"], Json({"f18"}));
+  EXPECT_THAT(
+      Rows()[0]["why"].get<std::string>(),
+      testing::StartsWith("Valve leaks through when shut or Bypass open: "));
+  EXPECT_THAT(Html(), HasSubstr("Valve leaks through when shut (f6), or f18"));
+  Label("V1", "f6");
+  EXPECT_EQ(Rows().at(0)["look_alikes"], Json::array());
+  EXPECT_THAT(Rows()[0]["why"].get<std::string>(),
+              testing::StartsWith("Valve leaks through when shut: "));
+}
+
 TEST_F(WorkListTest, WhatIsLabelledAndOverIsDone) {
   RecordEpisode(writer_, 0b100, "V1");
   RecordOpen("V2", 0b100);
