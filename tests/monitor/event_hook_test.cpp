@@ -262,6 +262,39 @@ TEST_F(EventHookTest, ADeliveryThatThrowsFailsAndTheNextOneIsMade) {
   EXPECT_THAT(log_, HasSubstr("event_hook_failed reason=\"no thread\""));
 }
 
+// The example of the documents, with the keys that an event has.
+TEST_F(ProgramDeliveryTest, AnEventBecomesARequestOfMaximoAndARowOfSap) {
+  const report::FaultTexts texts(report::SharedFile("faults.toml"));
+  FaultEvent event;
+  event.valve_id = "V1";
+  event.episode_id = 0xAB;
+  event.models = SharedLinearModels();
+  event.transition.kind = TransitionKind::kIsolated;
+  event.transition.faults = 2;  // f7
+  event.transition.strength = 0.7;
+  ValveIdentity about;
+  about.location = "Hall 2";
+  const auto made = [&](const std::string& form) {
+    const auto delivery =
+        MakeEventDelivery("sh -c \"python3 '" FDI_WORK_ORDERS "' " + form +
+                              " > '" + Out().string() + "'\"",
+                          seconds(60));
+    EXPECT_EQ(
+        delivery->Deliver(EventJson(event, true, texts, {}, about).dump()),
+        std::nullopt);
+    return Slurp(Out());
+  };
+  const auto request = report::Json::parse(made("maximo"));
+  EXPECT_EQ(request["assetnum"], "V1");
+  EXPECT_EQ(request["location"], "Hall 2");
+  EXPECT_EQ(request["reportedpriority"], 1);
+  EXPECT_EQ(request["externalrecid"], "00000000000000ab");
+  EXPECT_THAT(made("sap"), HasSubstr("\nM2,V1,V1: Flashing or critical flow,1,"
+                                     "19700101,000000,"));
+  event.transition.kind = TransitionKind::kChanged;  // It is ordered already.
+  EXPECT_EQ(made("maximo"), "");
+}
+
 TEST(EventJsonTest, EventSpeaksTheLanguageOfTheCatalogue) {
   const report::FaultTexts texts(report::SharedFile("faults.toml"));
   FaultEvent event;

@@ -132,6 +132,34 @@ TEST_F(FdiStorePlannerTest, WorkListIsWrittenAsAPageAndCompared) {
               HasSubstr("\n1,LV-1,episode,f19,Flow transmitter wrong,high,4"));
 }
 
+// What stands becomes one order; what is ordered, over or shelved none.
+TEST_F(FdiStorePlannerTest, AWorkListBecomesRowsOfSapAndMaximo) {
+  {
+    HistoryWriter writer(path_);
+    writer.Record(Event(TransitionKind::kDetected, 0, 0, 0.3), kDetected);
+    writer.Record(Event(TransitionKind::kIsolated, 20, 0b100, 0.8), kDetected);
+    RecordEpisode(writer, 0b100, "LV-2");
+  }
+  const auto orders = [this](const std::string& form) {
+    return Store(
+        "worklist --from 2026-11-01 --csv --rows 0 2>/dev/null"
+        " | python3 " FDI_WORK_ORDERS " " +
+        form);
+  };
+  const std::string sap = orders("sap").out;
+  EXPECT_THAT(sap, testing::StartsWith("NOTIF_TYPE,FUNCT_LOC,SHORT_TEXT,"));
+  EXPECT_THAT(sap, HasSubstr("\nM2,LV-1,LV-1: Flow transmitter wrong,2,"
+                             "20261120,145611,"));
+  EXPECT_THAT(sap, testing::Not(HasSubstr("LV-2")));
+  const json maximo = json::parse(orders("maximo").out);
+  EXPECT_EQ(maximo["assetnum"], "LV-1");
+  EXPECT_EQ(maximo["reportedpriority"], 2);
+  EXPECT_EQ(maximo["reportdate"], "2026-11-20T14:56:11Z");
+  EXPECT_EQ(maximo["externalrecid"], EpisodeIdText(Id()));
+  ASSERT_EQ(Store("valves repaired LV-1 ordered --order 4711").code, 0);
+  EXPECT_EQ(orders("sap").out, "");
+}
+
 TEST_F(FdiStorePlannerTest, WorkListRefusesWhatItCannotUse) {
   EXPECT_EQ(Store("worklist").code, 3);  // There is nothing at all.
   { const HistoryWriter writer(path_); }
