@@ -191,7 +191,8 @@ const std::vector<std::string>& EpisodeKeys() {
       "end_reason",        "label",     "acked_by",     "strength",
       "worst_strength",    "severity",  "priority",     "unconfirmed_utc",
       "fault_name",        "acked_utc", "ack_comment",  "alarm_state",
-      "shelved_until_utc", "second"};
+      "shelved_until_utc", "second",    "certainty",    "look_alikes",
+      "about/description"};
   return keys;
 }
 

@@ -10,6 +10,7 @@
 
 #include "base/csv_cells.h"
 #include "base/error.h"
+#include "base/time_units.h"
 #include "base/toml_text.h"
 #include "diagnosis/model/valve_costs.h"
 #include "diagnosis/records/valve_glob.h"
@@ -486,7 +487,10 @@ Report Repaired(const RepairedOptions& options, const Context& context) {
   ValveEvent event;
   event.kind = ParseValveEventKind(options.kind);
   event.note = options.note.comment;
-  event.at_ns = options.at.empty() ? NowNs() : ParseTime(options.at, true);
+  // Whole seconds, as the work list counts: it would take a later one for
+  // planned.
+  event.at_ns = options.at.empty() ? NowNs() / kNsPerSecond * kNsPerSecond
+                                   : ParseTime(options.at, true);
   event.who = options.note.who;
   event.order = options.order;
   if (!options.expected.empty()) {

@@ -669,7 +669,8 @@ TEST_F(ShipTest, TheVerbsReadThePlant) {
   EXPECT_THAT(
       list.out,
       HasSubstr("unconfirmed_utc,fault_name,acked_utc,ack_comment,alarm_state,"
-                "shelved_until_utc,second,host,monitor\n"));
+                "shelved_until_utc,second,certainty,look_alikes,"
+                "about_description,host,monitor\n"));
   EXPECT_THAT(list.out, HasSubstr(",a\n"));
   EXPECT_THAT(Store("history list --db '" + Url() + "' --monitor b").out,
               HasSubstr("no episode matches"));

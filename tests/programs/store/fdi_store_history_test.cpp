@@ -86,6 +86,11 @@ TEST_F(FdiStoreHistoryTest, WhoAValveIsStandsInEveryList) {
   for (const char* verb : {"history list", "history show last", "worklist"}) {
     EXPECT_THAT(Store(verb).out, HasSubstr("Feed to C-101")) << verb;
   }
+  EXPECT_THAT(
+      Store("history list --csv").out,
+      testing::AllOf(
+          HasSubstr(",second,certainty,look_alikes,about_description\n"),
+          HasSubstr(",likely,,Feed to C-101\n")));
   const json about = StoreJson("history list")["episodes"][0]["about"];
   EXPECT_EQ(about["grade"], 1);
   EXPECT_EQ(about["location"], "Hall 2");
@@ -291,9 +296,9 @@ TEST_F(FdiStoreHistoryTest, AcknowledgedAndLabelledEpisodeSaysSo) {
   const std::string csv = Store("history list --csv").out;
   EXPECT_THAT(csv, HasSubstr("unconfirmed_utc,fault_name,acked_utc,"
                              "ack_comment,alarm_state,shelved_until_utc,"
-                             "second\n"));
+                             "second,certainty,"));
   EXPECT_THAT(csv, testing::ContainsRegex("Flashing or critical flow,20[0-9TZ:"
-                                          ".-]+,seat worn,ACKED,,\n"));
+                                          ".-]+,seat worn,ACKED,,,likely,,\n"));
   EXPECT_THAT(Store("history show last").out,
               testing::ContainsRegex("acknowledged: +by anna at 20.+: seat "
                                      "worn\n"));
