@@ -30,10 +30,16 @@ void PushBounded(std::deque<T>& queue, T value, std::size_t limit) {
   }
 }
 
-bool IsReason(Intake intake, const Sample& sample, Signal signal) {
+// A pressure or temperature in another unit is told by its size, and which one
+// it is stays with the engine.
+bool IsReason(Intake intake, const Sample& sample, Signal signal,
+              FlowUnit flow_unit) {
   switch (intake) {
     case Intake::kUnit:
-      return signal == Signal::kF;
+      return sample.flow_unit != flow_unit
+                 ? signal == Signal::kF
+                 : signal == Signal::kP1 || signal == Signal::kP2 ||
+                       signal == Signal::kT1;
     case Intake::kBadQuality:
       return sample.quality[Index(signal)] == SignalQuality::kBad;
     case Intake::kNotFinite:
@@ -45,14 +51,17 @@ bool IsReason(Intake intake, const Sample& sample, Signal signal) {
   }
 }
 
-// The signals of `required` because of which the sample was refused.
-SignalMask RefusedSignals(SignalMask required, const Sample& sample,
+// The required signals because of which the sample was refused, or may be.
+SignalMask RefusedSignals(const ModelFacts* facts, const Sample& sample,
                           Intake intake) {
   SignalMask refused = 0;
+  if (facts == nullptr) {
+    return refused;
+  }
   for (std::size_t i = 0; i < kSignalCount; ++i) {
     const auto signal = static_cast<Signal>(i);
-    if ((required & MaskOf(signal)) != 0 && sample.Has(signal) &&
-        IsReason(intake, sample, signal)) {
+    if ((facts->required & MaskOf(signal)) != 0 && sample.Has(signal) &&
+        IsReason(intake, sample, signal, facts->flow_unit)) {
       refused = static_cast<SignalMask>(refused | MaskOf(signal));
     }
   }
@@ -309,8 +318,8 @@ void LiveBoard::OnVerdict(const std::string& valve_id, const Sample& sample,
       outcome.unjudged_ns
           ? WhyUnjudged(verdict.quality, verdict.intake, verdict.uncovered)
           : "");
-  slot.now.refused = RefusedSignals(facts ? facts->required : SignalMask{0},
-                                    sample, outcome.verdict.intake);
+  slot.now.refused =
+      RefusedSignals(facts.get(), sample, outcome.verdict.intake);
   ShowLocked(slot, sample, outcome.verdict, std::move(facts));
 }
 
