@@ -14,7 +14,7 @@ std::vector<fdi::report::VerbExamples> Examples() {
       {"",
        {{"Diagnose what is on the bus, with a page to look at",
          "fdi-monitor run --model-set paper --console"},
-        {"The same without a page; store the samples",
+        {"The same, and store the samples",
          "fdi-monitor run --model-set paper --record"},
         {"Watch it in another terminal", "fdi-monitor watch --table"}}},
       {"run",

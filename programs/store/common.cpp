@@ -44,14 +44,20 @@ void EpisodeOptions::AddTo(CLI::App& verb) {
       ->type_name(JoinText(EpisodeStateNames(), "|"));
 }
 
+void ShowWithPlant(CLI::Option* option) {
+  if (!ReadsPlants()) {
+    option->group("");
+  }
+}
+
 void PlantOptions::AddTo(CLI::App& verb) {
-  verb.add_option("--db", url,
-                  "Read the history of the whole plant instead: "
-                  "postgresql://user@host/database")
-      ->type_name("URL");
-  verb.add_option("--monitor", monitor,
-                  "With --db: only what this monitor recorded")
-      ->type_name("NAME");
+  ShowWithPlant(verb.add_option("--db", url,
+                                "Read the history of the whole plant instead: "
+                                "postgresql://user@host/database")
+                    ->type_name("URL"));
+  ShowWithPlant(verb.add_option("--monitor", monitor,
+                                "With --db: only what this monitor recorded")
+                    ->type_name("NAME"));
 }
 
 bool PlantOptions::asked() const {

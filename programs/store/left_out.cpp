@@ -17,6 +17,10 @@ void AddShipVerb(report::Program& program) {
   program.AddLeftOut("", "ship", "FDI_PLANT");
 }
 
+bool ReadsPlants() {
+  return false;
+}
+
 std::unique_ptr<History> OpenPlant(const PlantOptions& /*plant*/) {
   throw ConfigError(report::LeftOut("--db", "FDI_PLANT"));
 }

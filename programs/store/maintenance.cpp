@@ -377,6 +377,7 @@ void AddPrune(report::Program& program) {
                       "Delete from the plant's history instead, as its owner: "
                       "postgresql:///database")
           ->type_name("URL");
+  ShowWithPlant(url);
   for (auto& [what, limits] :
        {std::pair<std::string, AgeAndSize*>("--runs", &options.runs),
         {"--history", &options.history}}) {

@@ -229,6 +229,10 @@ Report PrunePlant(const PlantPrune& options, const Context& context) {
                                  {"protected", "protected"}});
 }
 
+bool ReadsPlants() {
+  return true;
+}
+
 std::unique_ptr<History> OpenPlant(const PlantOptions& plant) {
   return std::make_unique<PlantReader>(plant.url, plant.monitor);
 }

@@ -469,8 +469,8 @@ struct RepairedOptions {
   NoteOptions note;
 };
 
-// "FV-101: in work, order 4711, expected back 2026-12-03T06:00:00Z; it stays on
-// the work list until it is noted as repaired"
+// "FV-101: in work, order 4711, expected back 2026-12-03T06:00:00Z, until it is
+// noted what was done"
 std::string OrderedText(const RepairedOptions& options, const ValveEvent& event,
                         const Context& context) {
   return options.pattern + ": in work" +
@@ -478,7 +478,7 @@ std::string OrderedText(const RepairedOptions& options, const ValveEvent& event,
          (event.expected_ns
               ? ", expected back " + TimeText(event.expected_ns, context)
               : "") +
-         "; it stays on the work list until it is noted what was done";
+         ", until it is noted what was done";
 }
 
 // A replaced valve is a different one to models of its own. One that was
@@ -678,8 +678,8 @@ void AddAdd(report::Program& program, CLI::App& group) {
 void AddRepaired(report::Program& program, CLI::App& group) {
   auto [verb, options] = AddVerb(
       program, group, "repaired",
-      "Note what was done to a valve: its findings leave the work list until "
-      "they come back. A replaced valve has to be onboarded again. `ordered` "
+      "Note what was done to a valve: its findings are done, until they come "
+      "back. A replaced valve has to be onboarded again. `ordered` "
       "notes that it is in work",
       Repaired);
   verb.add_option("valve", options.pattern, "Id or glob")->required();

@@ -120,7 +120,12 @@ struct PlantPrune {
 };
 Report PrunePlant(const PlantPrune& options, const Context& context);
 
-/// The plant's history; an optional component, too.
+/// This build has the plant's history, an optional component.
+bool ReadsPlants();
+/// Hides an option of the plant's history in a build without it; OpenPlant()
+/// and PrunePlant() refuse it there.
+void ShowWithPlant(CLI::Option* option);
+/// The plant's history.
 std::unique_ptr<History> OpenPlant(const PlantOptions& plant);
 /// The history of --data, or the plant's.
 std::unique_ptr<History> OpenHistory(const PlantOptions& plant,

@@ -3,7 +3,7 @@
 import {replace} from './dom.js';
 import {clockText, dateText, zoneName} from './format.js';
 import {parseRoute} from './route.js';
-import {applyTheme, settings} from './settings.js';
+import {applyTheme, isEverywhere, settings} from './settings.js';
 import {createShell, startAnnouncements} from './shell.js';
 import {startShortcuts} from './shortcuts.js';
 import {store} from './store.js';
@@ -44,7 +44,7 @@ const shell = createShell(document.getElementById('top'),
 startAnnouncements(document.getElementById('announcer'));
 settings.addEventListener('change', ({detail}) => {
   if (detail === 'theme') applyTheme();
-  if (detail === 'theme' || detail === 'utc') show(false);
+  if (isEverywhere(detail)) show(false);
 });
 // A time of today has no date, and paper outlasts the day.
 addEventListener('beforeprint', () => main.dataset.printed =

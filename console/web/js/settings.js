@@ -4,6 +4,9 @@ const kDefaults = {
   theme: 'auto', utc: false, density: 'comfortable', shortcuts: true,
 };
 
+/** Every view shows it, so all is drawn again; the others one view follows. */
+export const isEverywhere = (name) => ['theme', 'utc'].includes(name);
+
 function read(name) {
   try {
     const text = localStorage.getItem('fdi.' + name);
