@@ -22,6 +22,9 @@ starts=(0:0 30:0 120:0 600:0 0:-15 30:-15 120:-15 0:15 30:15 600:15 0:0:wide
   30:0:wide 120:-15:wide 30:0:seat 30:0:low 30:15:low 0:0:steps 30:0:steps
   0:0:pump 30:0:pump)
 
+monitor=
+trap '[ -z "$monitor" ] || kill "$monitor" || true' EXIT
+
 quietly() { "$@" >"$dir/out" 2>"$dir/log" || { cat "$dir/log" >&2; exit 1; }; }
 
 simulate() {  # FILE SEED SECONDS EXCITATION
@@ -76,8 +79,11 @@ for signals in CV,X,F CV,X,F,P1,P2,T1; do
     quietly "$bin/fdi-simulator" replay --valve "${start//:/_}" --speed max \
       --keep-stamps --wait-reader 60 --file "$dir/${start//:/_}.csv"
   done
-  kill -INT $monitor
-  wait $monitor || true
+  kill "$monitor"
+  wait "$monitor"
+  monitor=
   "$bin/fdi-store" history list --rows 1000 --csv >"$dir/$set.csv"
-  echo "$set: $((${#starts[@]})) starts, $(($(wc -l <"$dir/$set.csv") - 1)) episodes"
+  echo "$set: ${#starts[@]} starts, $(sqlite3 -readonly "$FDI_DATA/history.db" \
+    "SELECT round(sum(hours), 1) FROM judged_hours") hours judged," \
+    "$(($(wc -l <"$dir/$set.csv") - 1)) episodes"
 done

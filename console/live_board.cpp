@@ -360,6 +360,7 @@ void LiveBoard::ShowMonitorSilence(const std::string& valve_id,
   Slot& slot = At(valve_id);
   const MutexLock lock(slot.mutex);
   slot.now.silence = monitor::Silence::kMonitor;
+  slot.ShowUnjudged(0, "");
   slot.now.heard_ns = heard_ns;
   ++slot.now.version;
 }

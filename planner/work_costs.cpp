@@ -45,11 +45,13 @@ bool IsLeak(const findings::Finding& finding, Leak leak) {
              faults, [leak](int fault) { return LeakOf(fault) == leak; });
 }
 
-// The ends of the interval of |strength|.
+// The ends of the interval of |strength|, which may hold both signs.
 Range SizeOf(const StrengthPoint& point) {
   const double low = std::abs(point.lowest);
   const double high = std::abs(point.highest);
-  return {std::abs(point.strength), std::min(low, high), std::max(low, high)};
+  const bool both_signs = point.lowest < 0.0 && point.highest > 0.0;
+  return {std::abs(point.strength), both_signs ? 0.0 : std::min(low, high),
+          std::max(low, high)};
 }
 
 // Sums of F over bins of CV, in its unit.
@@ -112,16 +114,20 @@ std::optional<Range> LossThrough(const std::vector<HealthHour>& hours) {
   }
   std::ranges::sort(means);
   const double share = shut_ms / seen_ms;
+  const double mean = all.residual / all.samples;
   const std::size_t outside = means.size() / 20;  // 5 % at either end.
-  return Range{share * all.residual / all.samples,
-               share * std::max(0.0, means[outside]),
-               share * means[means.size() - 1 - outside]};
+  // Hours differ in samples, so the mean may be beyond the percentiles.
+  const double lowest = std::clamp(means[outside], 0.0, mean);
+  const double highest = std::max(means[means.size() - 1 - outside], mean);
+  return Range{share * mean, share * lowest, share * highest};
 }
 
-// Three digits, as "0.31" and "1240"; an interval says no more.
+// Three digits or more, as "0.0310" and "1240"; an interval says no more.
 std::string Digits(double value) {
   const double size = std::abs(value);
-  return FormatNumber(value, size < 1.0 ? 3 : size < 10.0 ? 2 : 0);
+  const int whole =
+      size > 0.0 ? static_cast<int>(std::floor(std::log10(size))) : 0;
+  return FormatNumber(value, std::clamp(2 - whole, 0, 6));
 }
 
 std::string RangeText(const Range& range, const std::string& unit) {
@@ -134,11 +140,14 @@ std::string WaitingText(const Waiting& waiting, Leak leak, bool sure) {
   const std::string unit(FlowUnitName(waiting.unit));
   const Range week = waiting.week();
   std::string text =
-      std::string(sure ? "" : "if it is a leak, ") + "waiting a week costs " +
-      RangeText(week, costs.currency) + ": " + RangeText(waiting.loss, unit) +
+      std::string(sure                     ? ""
+                  : leak == Leak::kOutside ? "if it leaks outside, "
+                                           : "if it leaks through, ") +
+      "waiting a week costs " + RangeText(week, costs.currency) + ": " +
+      RangeText(waiting.loss, unit) +
       (leak == Leak::kOutside ? " leak out"
                               : " pass the shut valve, on average") +
-      " at " + FormatNumber(*costs.medium, 2) + " " + costs.currency + "/" +
+      " at " + Digits(*costs.medium) + " " + costs.currency + "/" +
       unit.substr(0, unit.find('/'));
   if (costs.visit && week.value > 0.0) {
     text += "; a visit (" + Digits(*costs.visit) + " " + costs.currency +
@@ -171,8 +180,9 @@ std::optional<Waiting> WaitingOf(const findings::Finding& finding,
     return std::nullopt;
   }
   std::vector<HealthHour> hours = all;
-  std::erase_if(hours, [last = all.back().hour](const HealthHour& hour) {
-    return static_cast<double>(last - hour.hour) >= kHoursOfWeek;
+  std::erase_if(hours, [&last = all.back()](const HealthHour& hour) {
+    return static_cast<double>(last.hour - hour.hour) >= kHoursOfWeek ||
+           hour.flow_unit != last.flow_unit;
   });
   const Leak leak = LeakOf(*leaking);
   std::optional<Range> loss;
@@ -203,10 +213,14 @@ StopAnswer SafeUntil(const findings::Finding& finding,
   if (now == Severity::kCritical) {
     return {"no", "it is critical now"};
   }
-  StopAnswer answer{"not known", "it has no name"};
+  const std::vector<int> faults = FaultsOf(finding);
+  if (faults.empty()) {
+    return {"not known", "it has no name"};
+  }
+  StopAnswer answer;
   bool graver = false;  // Somewhere in the interval.
   bool no_graver = false;
-  for (const int fault : FaultsOf(finding)) {
+  for (const int fault : faults) {
     const auto growth = GrowthOf(strengths, fault);
     if (!growth || !growth->rate) {
       return {"not known", "too few strengths of it are stored"};
@@ -221,8 +235,10 @@ StopAnswer SafeUntil(const findings::Finding& finding,
     const SeverityBands& bands = texts.Of(fault).bands;
     graver = graver || SeverityAt(bands, high) > now;
     no_graver = no_graver || SeverityAt(bands, low) <= now;
-    answer.text = "strength " + PercentText(low) + ".." + PercentText(high) +
-                  " % by then";
+    answer.text += (answer.text.empty() ? "" : "; ") +
+                   (faults.size() > 1 ? FaultName(fault) + ": " : "") +
+                   "strength " + PercentText(low) + ".." + PercentText(high) +
+                   " % by then";
     for (const SeverityBand& band : bands) {
       if (band.level > now) {
         answer.text += ", " + std::string(SeverityName(band.level)) + " from " +

@@ -48,6 +48,7 @@ struct WorkQuery {
   std::vector<HealthLimit> limits{};
   std::string discipline{};  ///< Rows of this one only; empty: any.
   std::optional<std::int64_t> stop_ns{};  ///< Can a finding wait until then?
+  bool utc{true};                         ///< The day of the stop is of UTC.
   std::string software{};
   std::vector<PlannedLoop> loops{};
   std::vector<Repair> repairs{};  ///< RepairsOf(models)

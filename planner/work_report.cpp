@@ -156,7 +156,8 @@ void AddCsv(report::Report& report) {
                                    "namur",
                                    "check",
                                    "travel_strokes",
-                                   "service_hours"};
+                                   "service_hours",
+                                   "look_alikes"};
   const Json& rows = report.document["rows"];
   const auto any = [&rows](const char* key) {
     return std::ranges::any_of(

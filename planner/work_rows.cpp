@@ -48,8 +48,8 @@ std::string SpanText(std::int64_t span_ns) {
 }
 
 // "2026-12-03"
-std::string DayText(std::int64_t stamp_ns) {
-  return FormatTime(stamp_ns, true).substr(0, std::size("2026-12-03") - 1);
+std::string DayText(std::int64_t stamp_ns, bool utc) {
+  return FormatTime(stamp_ns, utc).substr(0, std::size("2026-12-03") - 1);
 }
 
 // "Valve leaks through when shut or Bypass open: stands for 3 h, not confirmed
@@ -216,6 +216,8 @@ class RowReader {
   void AddHealth(const std::string& valve, const std::vector<HealthHour>& hours,
                  std::map<std::string, ValveLife>& lives);
   void AddAudits();
+  /// After AddAudits(), which may doubt a name.
+  void AddCosts(storage::History& history);
   void AddOrders();
   void AddStop();
   std::vector<WorkRow> Ranked() &&;
@@ -223,9 +225,7 @@ class RowReader {
 
  private:
   void FindDone(SameFault& same, storage::History& history) const;
-  void AddFault(SameFault& same, storage::History& history);
-  void AddCosts(std::uint64_t episode, storage::History& history,
-                WorkRow& row) const;
+  void AddFault(SameFault& same);
   bool JoinFault(const LoopAudits::Window& audit, const std::string& text);
   void AddFigures(const Finding& of, const std::vector<HealthHour>& hours);
   Finding Low(const Finding& of, const char* kind,
@@ -260,7 +260,7 @@ void RowReader::FindDone(SameFault& same, storage::History& history) const {
   }
 }
 
-void RowReader::AddFault(SameFault& same, storage::History& history) {
+void RowReader::AddFault(SameFault& same) {
   const Episode& episode = *same.episodes.back();
   Finding finding = findings::FindingOf(episode, texts_, facts_);
   if (same.done) {
@@ -305,31 +305,31 @@ void RowReader::AddFault(SameFault& same, storage::History& history) {
                    : "; still, " + SpanText(query_.now_ns - same.done->at_ns) +
                          " after" + done;
   }
-  if (row.finding.stands()) {
-    AddCosts(episode.id, history, row);
-  }
+  row.episode = episode.id;
   rows_.push_back(std::move(row));
 }
 
-// What waiting costs, and whether the fault can wait until the stop. Strengths
-// and hours are read only where somebody asks.
-void RowReader::AddCosts(std::uint64_t episode, storage::History& history,
-                         WorkRow& row) const {
-  const Finding& finding = row.finding;
-  if (finding.about.costs.empty() && !query_.stop_ns) {
-    return;
-  }
-  const auto strengths = history.Strengths(episode);
-  if (!finding.about.costs.empty()) {
-    row.waiting =
-        WaitingOf(finding, strengths,
-                  history.Health({finding.valve_id, *finding.since_ns}));
-  }
-  if (row.waiting) {
-    row.why += "; " + row.waiting->text;
-  }
-  if (query_.stop_ns) {
-    row.stop = SafeUntil(finding, strengths, texts_, *query_.stop_ns);
+// Tells what waiting costs, and whether the fault can wait until the stop.
+// Strengths and hours are read only where somebody asks.
+void RowReader::AddCosts(storage::History& history) {
+  for (WorkRow& row : rows_) {
+    const Finding& finding = row.finding;
+    const bool priced = !finding.about.costs.empty();
+    if (row.episode == 0 || !finding.stands() || (!priced && !query_.stop_ns)) {
+      continue;
+    }
+    const auto strengths = history.Strengths(row.episode);
+    if (priced) {
+      row.waiting =
+          WaitingOf(finding, strengths,
+                    history.Health({finding.valve_id, *finding.since_ns}));
+    }
+    if (row.waiting) {
+      row.why += "; " + row.waiting->text;
+    }
+    if (query_.stop_ns) {
+      row.stop = SafeUntil(finding, strengths, texts_, *query_.stop_ns);
+    }
   }
 }
 
@@ -369,7 +369,7 @@ void RowReader::AddEpisodes(storage::History& history) {
   }
   for (auto& [key, same] : faults) {
     FindDone(same, history);
-    AddFault(same, history);
+    AddFault(same);
   }
   std::ranges::stable_sort(
       done_, std::greater<>(),
@@ -618,7 +618,7 @@ void RowReader::AddStop() {
     return;
   }
   const std::string question =
-      "; safe until the stop on " + DayText(*query_.stop_ns) + ": ";
+      "; safe until the stop on " + DayText(*query_.stop_ns, query_.utc) + ": ";
   for (WorkRow& row : rows_) {
     if (!row.finding.stands()) {
       continue;
@@ -683,6 +683,9 @@ std::vector<WorkRow> ReadRows(storage::History* history,
     }
   }
   rows.AddAudits();
+  if (history != nullptr) {
+    rows.AddCosts(*history);
+  }
   rows.AddOrders();
   rows.AddStop();
   done = rows.TakeDone();

@@ -27,6 +27,7 @@ struct WorkRow {
   std::optional<Repair> in_work{};
   std::optional<Waiting> waiting{};
   std::optional<StopAnswer> stop{};  ///< If the query asks, and it stands.
+  std::uint64_t episode{0};  ///< Episode::id of the newest; 0: of no episode.
 };
 
 /// A finding that is done, and has not come back.

@@ -9,7 +9,8 @@ build=$(cd "$1" && pwd)
 tests=$(cd "$(dirname "$0")" && pwd)
 command -v sqlite3 >/dev/null || exit 77
 folder=$(mktemp -d)
-trap 'rm -rf "$folder"' EXIT
+monitor=
+trap '[ -z "$monitor" ] || kill "$monitor" || true; rm -rf "$folder"' EXIT
 cd "$folder"
 fail() {
   echo "samples_module: $*" >&2
@@ -134,6 +135,7 @@ timeout 30 sh -c 'until grep -q monitor_ready monitor.log; do sleep 0.05; done' 
   --duration 7500 --end-now --speed max --log-level error >/dev/null
 kill "$monitor"
 wait "$monitor" || fail "the monitor ended with $?"
+monitor=
 for valve in LV-1 LV-2; do
   fdi_store health --valve "$valve" --hourly --json >"$valve.json"
 done

@@ -198,6 +198,7 @@ Report WorkList(const WorkListOptions& options, const Context& context) {
     throw ConfigError("--from " + options.from +
                       " is not in the past; try 7d or 2026-10-01");
   }
+  query.utc = context.options.utc;
   if (!options.stop.empty()) {
     query.stop_ns = ParseTime(options.stop, context.options.utc);
     if (*query.stop_ns <= query.now_ns) {

@@ -146,6 +146,9 @@ Finding FindingOf(const storage::Episode& episode,
   finding.acked_by = episode.acked_by;
   finding.label = episode.label;
   finding.confirmed = episode.label && *episode.label != "false";
+  if (finding.confirmed) {
+    finding.look_alikes.clear();
+  }
   finding.confidence = finding.confirmed
                            ? 1.0
                            : CertaintyFactor(*finding.certainty) *

@@ -113,12 +113,21 @@ TEST_F(WorkCostsTest, ALeakOutsideLosesAShareOfTheFlowExpected) {
   EXPECT_NEAR(waiting->week().value, 0.5 * 10.0 * 168.0, 1e-3);
   EXPECT_EQ(waiting->text,
             "waiting a week costs 840 EUR (672..1008): 0.500 t/h "
-            "(0.400..0.600) leak out at 10.00 EUR/t; a visit (84 EUR) is paid "
+            "(0.400..0.600) leak out at 10.0 EUR/t; a visit (84.0 EUR) is paid "
             "for in 0.700 days");
   EXPECT_THAT(WaitingOf(Of("f5", Certainty::kOneOf), strengths, hours)->text,
-              testing::StartsWith("if it is a leak, waiting"));
+              testing::StartsWith("if it leaks outside, waiting"));
   EXPECT_THAT(WaitingOf(Of("f2|f5"), strengths, hours)->text,
-              testing::StartsWith("if it is a leak, waiting"));
+              testing::StartsWith("if it leaks outside, waiting"));
+  // A strength of either sign: the interval begins at nothing.
+  const auto either = WaitingOf(Of("f5"), {Point(5, 1.0, 0.05)}, hours);
+  EXPECT_EQ(either->loss.lowest, 0.0);
+  EXPECT_NEAR(either->loss.highest, 0.05 * 0.15 * 20.0, 1e-6);
+  // Hours in another unit, before the valve was onboarded again, do not count.
+  auto mixed = hours;
+  mixed.insert(mixed.begin(), Hour(-1, 4, 40.0));
+  mixed.front().flow_unit = FlowUnit::kM3PerHour;
+  EXPECT_NEAR(WaitingOf(Of("f5"), strengths, mixed)->loss.value, 0.5, 1e-6);
   // Neither a strength nor hours: nobody knows.
   EXPECT_FALSE(WaitingOf(Of("f5"), {}, hours));
   EXPECT_FALSE(WaitingOf(Of("f5"), strengths, {}));
@@ -140,10 +149,19 @@ TEST_F(WorkCostsTest, ALeakThroughLosesWhatPassesTheShutValve) {
   // Whichever of two it is, it is a leak.
   findings::Finding one_of = Of("f6", Certainty::kOneOf);
   EXPECT_THAT(WaitingOf(one_of, {}, hours)->text,
-              testing::StartsWith("if it is a leak, "));
+              testing::StartsWith("if it leaks through, "));
   one_of.look_alikes = {"f18"};
   EXPECT_THAT(WaitingOf(one_of, {}, hours)->text,
               testing::StartsWith("waiting a week"));
+  // Most samples are of one hour, which the percentiles leave out.
+  std::vector<HealthHour> one(30, Hour(1, 9, 0.1, 0.01));
+  for (HealthHour& hour : one) {
+    hour.bins[9][1] = {36, 36 * 102, 0, 36 * 20 * 1024};
+  }
+  one.back() = Hour(1, 9, 10.0, 1.0);
+  const auto uneven = WaitingOf(Of("f6"), {}, one);
+  EXPECT_LE(uneven->loss.lowest, uneven->loss.value);
+  EXPECT_GE(uneven->loss.highest, uneven->loss.value);
   // A week ago counts no more, and one hour has no interval.
   hours.push_back(Hour(300, 9, 2.0, 1.0));
   EXPECT_FALSE(WaitingOf(Of("f6"), {}, hours));
@@ -181,6 +199,17 @@ TEST_F(WorkCostsTest, SafeIsWhatGetsNoGraverBeforeTheStop) {
   EXPECT_EQ(safe(16).safe, "perhaps");
   EXPECT_EQ(safe(40).safe, "no");
   EXPECT_THAT(safe(16).text, HasSubstr(" % by then, high from 25 %"));
+  // Two faults: each with its reason.
+  auto both = points;
+  for (StrengthPoint point : points) {
+    point.fault = 2;
+    both.push_back(point);
+  }
+  EXPECT_THAT(SafeUntil(Of("f2|f19"), both, Catalogue(),
+                        points.back().stamp_ns + 16 * kNsPerDay)
+                  .text,
+              AllOf(testing::StartsWith("f2: strength "),
+                    HasSubstr("; f19: strength ")));
   findings::Finding finding = Of("f19");
   finding.words.severity = Severity::kCritical;
   EXPECT_EQ(SafeUntil(finding, points, Catalogue(), kBeginNs).safe, "no");

@@ -57,8 +57,8 @@ finish() {
     kill -CONT -- "-${part[$name]}" || true
     kill -9 -- "-${part[$name]}" || true
   done
-  ip netns del "$plant_host"
-  ip netns del "$broker_host"
+  ip netns del "$plant_host" || true
+  ip netns del "$broker_host" || true
   rm -rf "$work"
 }
 plant_host=fdi-plant-$$ broker_host=fdi-broker-$$

@@ -142,6 +142,7 @@ const kRefusalWords = {
 
 function refusalText({reason, signals, flow_unit: unit}) {
   if (reason === 'unit') {
+    if (!signals.length) return 'a reading in another unit than trained';
     return signals.some((signal) => signal !== 'F') ?
       `${signals.join(' or ')} in another unit than trained` :
       `flow in another unit than ${unitText(unit)}`;
@@ -184,7 +185,7 @@ export function notJudgedText(tile) {
   if (!tile || tile.quality === 'LIVE') return '';
   return ['STALE', 'ENDED', 'MONITOR_SILENT'].includes(tile.quality) ?
     `not confirmed since ${timeText(tile.stamp_ms)}` :
-    `not judged: ${qualityText(tile)}`;
+    `${tile.unjudged_since_ms ? '' : 'not judged: '}${qualityText(tile)}`;
 }
 
 const kMarkWords = {

@@ -6,7 +6,8 @@
 
 sap writes the fields of a PM notification (BAPI_ALM_NOTIF_CREATE), one a line of
 CSV; maximo writes service requests (object structure MXSR), one a line of JSON.
-The id of the episode is the external reference: import each of them once.
+The id of the episode is the external reference: import each of them once. Rows
+without an episode, such as a trend, are left out: they have no such id.
 """
 import csv
 import json
@@ -20,11 +21,11 @@ def findings(text):
     if not text.lstrip().startswith("{"):
         for row in csv.DictReader(text.splitlines()):
             # What is ordered already, or over, needs no further order.
-            if row["open"] == "true" and not row["in_work_utc"]:
+            if (row["open"] == "true" and row["episode_id"]
+                    and not row["in_work_utc"]):
                 yield {**row, "utc": row["detected_utc"],
                        "location": row["about_location"],
-                       "reference": row["episode_id"]
-                       or f"{row['valve_id']} {row['name']}"}
+                       "reference": row["episode_id"]}
         return
     event = json.loads(text)
     if event["kind"] != "ISOLATED" or event["shelved"]:
@@ -33,7 +34,8 @@ def findings(text):
     yield {**event, "utc": event["stamp_utc"],
            "location": about.get("location") or "",
            "reference": event["episode_id"],
-           "why": f"{event['name']}, {event['certainty']}"}
+           "why": " or ".join([event["name"], *event["look_alikes"]])
+                  + f", {event['certainty']}"}
 
 
 def sap(row):
