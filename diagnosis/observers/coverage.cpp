@@ -7,6 +7,7 @@ namespace fdi {
 namespace {
 
 constexpr double kEndOfTravel = 2.0;  // from 0 or 100 [% of CV]
+constexpr int kParked = 60;           // samples without flow there
 
 std::optional<int> ChannelOf(const ModelSet& models, Signal output) {
   for (std::size_t c = 0; c < models.channels.size(); ++c) {
@@ -81,9 +82,9 @@ bool Coverage::IsParked(const Sample& sample) {
   const bool no_flow =
       sample.Has(Signal::kF) && sample[Signal::kF] < region.flow_cutoff;
   at_end_ = no_flow && (closed || open_without_pressure)
-                ? std::min(at_end_ + 1, region.rearm_samples)
+                ? std::min(at_end_ + 1, kParked)
                 : 0;
-  return at_end_ >= region.rearm_samples;
+  return at_end_ >= kParked;
 }
 
 // Reasons that come from the operation of the process.

@@ -1,5 +1,6 @@
 #include "trainer/training.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -82,6 +83,12 @@ TEST(TrainingTest, OneObserverPerConditionTheNormalOneFirst) {
             (std::vector<int>{6, 8, 19, 201, 202, 203, 204, 205, 206}));
   EXPECT_GT(models.observers[0].channels[0].validation.vaf, 99.0);
   EXPECT_GT(models.observers[0].channels[1].validation.vaf, 99.0);
+}
+
+TEST(TrainingTest, AValveThatIsBackIsLeftAloneForMinutes) {
+  const ModelSet& models = Trained();
+  EXPECT_EQ(models.validity.rearm_samples,
+            std::max(60, static_cast<int>(200.0 / models.sample_period_s)));
 }
 
 TEST(TrainingTest, FaultsAreNamedAtTrainedAndUntrainedStrengths) {
