@@ -51,7 +51,7 @@ readings() {
         if (name[i] in tag) row[FNR] = row[FNR] " " valve "." tag[name[i]] " " $i }
     END { for (n = 2; n <= FNR; ++n) print first + n - 2 row[n] }' FV-10[123].csv
 }
-# Of LABEL: the samples and episodes that the monitor has stored.
+# Prints the samples and episodes that the monitor has stored for LABEL.
 keep() {
   stop
   sqlite3 -readonly "$FDI_DATA/runs.db" ".load $module" "select valve_id, stamp_ns, cv, p1, p2, t1, x, f

@@ -92,7 +92,7 @@ class LiveBoard : public monitor::ValveListener {
   void ShowRemote(const std::string& valve_id, const Verdict& verdict,
                   std::shared_ptr<const ModelFacts> models,
                   const std::string& monitor);
-  /// What a monitor says of the valve: it sends and is not judged since
+  /// A monitor reports that the valve sends and is not judged since
   /// `since_ns`, because of `why`. @param since_ns 0: it is judged.
   void ShowUnjudged(const std::string& valve_id, std::int64_t since_ns,
                     const std::string& why);

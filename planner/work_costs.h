@@ -21,7 +21,7 @@ struct Range {
   double highest{0.0};
 };
 
-/// What a leak that stands costs.
+/// The cost of a leak that stands.
 struct Waiting {
   Range loss;  ///< Lost on average [`unit`].
   FlowUnit unit{FlowUnit::kM3PerHour};
@@ -38,7 +38,7 @@ struct StopAnswer {
   std::string text;  ///< Why, one sentence.
 };
 
-/// What an episode that stands loses. Two kinds of faults have a loss:
+/// The loss of an episode that stands. Two kinds of faults have one:
 ///
 /// - external leakage, f5: kExternalLeakShare x |strength| x F expected, with
 ///   the 95 % interval of the strength;

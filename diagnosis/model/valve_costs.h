@@ -8,7 +8,7 @@
 
 namespace fdi {
 
-/// What waiting and work cost at a valve. What is not stated is not known.
+/// Costs of waiting and of work at a valve. A missing figure is not known.
 struct ValveCosts {
   std::string currency{};              ///< "EUR"; of all figures.
   std::optional<double> medium{};      ///< Of one t or m3 of what flows.

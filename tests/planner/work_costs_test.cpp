@@ -1,4 +1,4 @@
-// What waiting costs, and whether a finding can wait until the stop.
+// The cost of waiting, and whether a finding can wait until the stop.
 #include "planner/work_costs.h"
 
 #include <sstream>

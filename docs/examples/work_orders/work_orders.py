@@ -17,10 +17,10 @@ PRIORITIES = {"critical": 1, "high": 2, "medium": 3, "low": 4}
 
 
 def findings(text):
-    """What stands in a work list, or the name of an event, as dictionaries."""
+    """The rows of a work list that stand, or the name of an event."""
     if not text.lstrip().startswith("{"):
         for row in csv.DictReader(text.splitlines()):
-            # What is ordered already, or over, needs no further order.
+            # A row that is over or ordered already needs no further order.
             if (row["open"] == "true" and row["episode_id"]
                     and not row["in_work_utc"]):
                 yield {**row, "utc": row["detected_utc"],

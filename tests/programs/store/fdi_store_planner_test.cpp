@@ -132,7 +132,7 @@ TEST_F(FdiStorePlannerTest, WorkListIsWrittenAsAPageAndCompared) {
               HasSubstr("\n1,LV-1,episode,f19,Flow transmitter wrong,high,4"));
 }
 
-// What stands becomes one order; what is ordered, over or shelved none.
+// A row that stands becomes one order; one ordered, over or shelved none.
 TEST_F(FdiStorePlannerTest, AWorkListBecomesRowsOfSapAndMaximo) {
   {
     HistoryWriter writer(path_);

@@ -39,7 +39,7 @@ function facts({episode: row, model_hash: hash}) {
         [rowTitle(row) + moreText(row), row.witness]
             .filter(Boolean).join(', '))],
     ['Priority', priorityNames[priorityOf(row)]],
-    // What only the data of ended is not closed, it stands.
+    // An episode with data that ended is not closed: it stands.
     ['State', unconfirmedText(row) ?
       `${unconfirmedText(row)}; ${groupName(row).toLowerCase()}` :
       `${stateWord(row.state)}; ${groupName(row).toLowerCase()}`],
