@@ -32,7 +32,7 @@ struct Waiting {
   Range week() const;
 };
 
-/// Whether a finding can wait until the stop.
+/// Answers if a finding can wait until the stop.
 struct StopAnswer {
   std::string safe;  ///< "yes", "no", "perhaps" or "not known".
   std::string text;  ///< Why, one sentence.

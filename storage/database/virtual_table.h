@@ -17,6 +17,8 @@
 
 #include <sqlite3ext.h>
 
+#include "base/time_units.h"
+
 SQLITE_EXTENSION_INIT3
 
 /// The frame of the tables that fdi_samples.so adds to an SQLite that loads it.
@@ -25,7 +27,6 @@ namespace fdi::storage::loadable {
 
 inline constexpr auto kEarliest = std::numeric_limits<std::int64_t>::min();
 inline constexpr auto kLatest = std::numeric_limits<std::int64_t>::max();
-inline constexpr std::int64_t kSecondNs = 1'000'000'000;
 
 struct Finalize {
   void operator()(sqlite3_stmt* statement) const {
@@ -97,8 +98,9 @@ inline std::string FindDatabase(sqlite3* database, std::int64_t application_id,
 /// "2026-11-20T14:56:11.250Z", as the views of the databases write times, so
 /// that the order of the texts is that of the times.
 inline std::string UtcText(std::int64_t stamp_ns) {
-  const std::int64_t of_second = (stamp_ns % kSecondNs + kSecondNs) % kSecondNs;
-  const std::time_t seconds = (stamp_ns - of_second) / kSecondNs;
+  const std::int64_t of_second =
+      (stamp_ns % kNsPerSecond + kNsPerSecond) % kNsPerSecond;
+  const std::time_t seconds = (stamp_ns - of_second) / kNsPerSecond;
   std::tm fields{};
   gmtime_r(&seconds, &fields);
   std::array<char, 40> text{};
@@ -138,9 +140,10 @@ inline void NarrowByUtc(int op, const std::string& text, Window& window) {
       continue;
     }
     const std::int64_t seconds = timegm(&fields);
-    if (std::abs(seconds) < kLatest / kSecondNs - 86'400 &&
-        UtcText(seconds * kSecondNs).compare(0, size, text, 0, size) == 0) {
-      window.Narrow(op, seconds * kSecondNs, (seconds + length_s) * kSecondNs);
+    if (std::abs(seconds) < kLatest / kNsPerSecond - 86'400 &&
+        UtcText(seconds * kNsPerSecond).compare(0, size, text, 0, size) == 0) {
+      window.Narrow(op, seconds * kNsPerSecond,
+                    (seconds + length_s) * kNsPerSecond);
       return;
     }
   }

@@ -21,22 +21,9 @@
 #include "storage/history/history_database.h"
 #include "storage/history/sql.h"
 
-namespace fdi::storage {
+namespace fdi::storage::loadable {
 namespace sql = history_sql;
 namespace {
-
-using loadable::FindDatabase;
-using loadable::kEarliest;
-using loadable::kLatest;
-using loadable::NarrowByUtc;
-using loadable::Prepare;
-using loadable::ResultText;
-using loadable::Rows;
-using loadable::Step;
-using loadable::Text;
-using loadable::UtcText;
-using loadable::VirtualTable;
-using loadable::Window;
 
 enum Column {
   kHealthValveId,
@@ -282,9 +269,12 @@ void HealthCursor::Result(sqlite3_context* context, int column) const {
 }
 
 }  // namespace
+}  // namespace fdi::storage::loadable
+
+namespace fdi::storage {
 
 sqlite3_module HealthTable() {
-  return VirtualTable<HealthCursor>::Module();
+  return loadable::VirtualTable<loadable::HealthCursor>::Module();
 }
 
 }  // namespace fdi::storage

@@ -15,20 +15,9 @@
 #include "storage/runs/sample_codec.h"
 #include "storage/runs/sql.h"
 
-namespace fdi::storage {
+namespace fdi::storage::loadable {
 namespace sql = runs_sql;
 namespace {
-
-using loadable::FindDatabase;
-using loadable::NarrowByUtc;
-using loadable::Prepare;
-using loadable::ResultText;
-using loadable::Rows;
-using loadable::Step;
-using loadable::Text;
-using loadable::UtcText;
-using loadable::VirtualTable;
-using loadable::Window;
 
 // Behind these columns come the signals, by Index(Signal).
 enum Column {
@@ -238,9 +227,12 @@ bool SampleCursor::Narrows(int column, int op) {
 }
 
 }  // namespace
+}  // namespace fdi::storage::loadable
+
+namespace fdi::storage {
 
 sqlite3_module SampleTable() {
-  return VirtualTable<SampleCursor>::Module();
+  return loadable::VirtualTable<loadable::SampleCursor>::Module();
 }
 
 }  // namespace fdi::storage

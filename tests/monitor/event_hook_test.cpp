@@ -262,9 +262,7 @@ TEST_F(EventHookTest, ADeliveryThatThrowsFailsAndTheNextOneIsMade) {
   EXPECT_THAT(log_, HasSubstr("event_hook_failed reason=\"no thread\""));
 }
 
-// The example of the documents, with the keys that an event has.
-TEST_F(ProgramDeliveryTest, AnEventBecomesARequestOfMaximoAndARowOfSap) {
-  const report::FaultTexts texts(report::SharedFile("faults.toml"));
+FaultEvent Flashing() {
   FaultEvent event;
   event.valve_id = "V1";
   event.episode_id = 0xAB;
@@ -272,6 +270,13 @@ TEST_F(ProgramDeliveryTest, AnEventBecomesARequestOfMaximoAndARowOfSap) {
   event.transition.kind = TransitionKind::kIsolated;
   event.transition.faults = 2;  // f7
   event.transition.strength = 0.7;
+  return event;
+}
+
+// The example of the documents, with the keys that an event has.
+TEST_F(ProgramDeliveryTest, AnEventBecomesARequestOfMaximoAndARowOfSap) {
+  const report::FaultTexts texts(report::SharedFile("faults.toml"));
+  FaultEvent event = Flashing();
   ValveIdentity about;
   about.location = "Hall 2";
   const auto made = [&](const std::string& form) {
@@ -297,16 +302,10 @@ TEST_F(ProgramDeliveryTest, AnEventBecomesARequestOfMaximoAndARowOfSap) {
 
 TEST(EventJsonTest, EventSpeaksTheLanguageOfTheCatalogue) {
   const report::FaultTexts texts(report::SharedFile("faults.toml"));
-  FaultEvent event;
-  event.valve_id = "V1";
-  event.episode_id = 0xAB;
-  event.models = SharedLinearModels();
+  FaultEvent event = Flashing();
   event.model_set = "linear";
   event.model_version = 1;
-  event.transition.kind = TransitionKind::kIsolated;
   event.transition.stamp_ns = 5'000'000;
-  event.transition.faults = 2;  // f7
-  event.transition.strength = 0.7;
 
   const report::Json json = EventJson(event, true, texts);
   EXPECT_EQ(json["kind"], "ISOLATED");

@@ -97,7 +97,7 @@ TEST_F(OperationTest, AnHourInManualIsInhibitedAndTheRestJudged) {
   const Outcome outcome = Replay(Simulate("manual"));
   EXPECT_EQ(outcome.episodes, 0);
   EXPECT_EQ(outcome.seconds[Quality::kInhibited], 3600U);
-  // Of 1800, less the 200 that it is left alone.
+  // The valve is left alone for 200 of the 1800.
   EXPECT_GT(outcome.seconds[Quality::kLive], 1530U);
 }
 
