@@ -66,7 +66,7 @@ class BoundedQueue {
     return !closed_ || !batch.empty();
   }
 
-  /// Whether PopAll() made room in a full queue since the last call.
+  /// True if PopAll() made room in a full queue since the last call.
   bool Reopened() {
     const MutexLock lock(mutex_);
     return std::exchange(reopened_, false);

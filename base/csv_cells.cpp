@@ -23,7 +23,7 @@ bool IsBlank(char c) {
   return c == ' ' || c == '\t' || c == '\r';
 }
 
-// Whether a spreadsheet would evaluate the cell as a formula. Numbers are not
+// True if a spreadsheet would evaluate the cell as a formula. Numbers are not
 // formulas, not even hexadecimal ones.
 bool IsFormula(const std::string& cell) {
   if (cell.size() < 2 || std::string_view("=+-@\t\r").find(cell.front()) ==

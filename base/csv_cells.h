@@ -39,7 +39,7 @@ class CsvCells {
       cells_.pop_back();
     }
   }
-  /// Whether that record is a blank line.
+  /// True if that record is a blank line.
   bool blank() const { return cells_.size() == 1 && cells_.front().empty(); }
 
  private:
@@ -110,7 +110,7 @@ std::string ReadTextFile(const std::filesystem::path& path);
 /// The same for bytes in memory, except for gzip.
 std::string ToUtf8(std::string bytes, const std::string& source);
 
-/// Whether two column names are equal, ignoring case.
+/// True if two column names are equal, ignoring case.
 bool SameName(std::string_view a, std::string_view b);
 
 /// Writes a record. Text that a spreadsheet would evaluate as a formula (it

@@ -7,9 +7,9 @@
 
 namespace fdi {
 
-/// Whether one signal rises or falls with another: the sign that most stretches
-/// of 60 pairs have. A fault that lasts, such as a shut line, says nothing
-/// about it, and would decide a correlation of the whole record.
+/// Tells if one signal rises or falls with another: the sign that most
+/// stretches of 60 pairs have. A fault that lasts, such as a shut line, says
+/// nothing about it, and would decide a correlation of the whole record.
 class LocalSense {
  public:
   void Add(double u, double v) {

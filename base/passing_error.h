@@ -15,7 +15,7 @@ class PassingError : public std::runtime_error {
 
 inline constexpr int kExitPassing = 6;  ///< Same for all programs.
 
-/// Whether a call that failed with this value of errno may succeed later.
+/// True if a call that failed with this value of errno may succeed later.
 inline bool MayPass(int error) {
   return error == EMFILE || error == ENFILE || error == ENOMEM ||
          error == ENOBUFS || error == EAGAIN || error == EINTR;

@@ -31,7 +31,7 @@ class TextLines {
   /// From the last line to `last`.
   void ForEachBackwards(const Take& take, std::size_t last = 1) const;
 
-  /// Whether the file was a gzip.
+  /// True if the file was a gzip.
   bool packed() const { return packed_; }
   /// Size of the text.
   std::size_t bytes() const { return end_ - begin_; }

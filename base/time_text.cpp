@@ -399,7 +399,7 @@ std::optional<CivilTime> ScanCtime(Scanner in) {
              : std::nullopt;
 }
 
-// Whether a time begins with eight or fourteen digits, of this century or the
+// True if a time begins with eight or fourteen digits, of this century or the
 // last: "20260310T0900", "20260310090000".
 bool IsBasic(std::string_view text) {
   const std::size_t digits =

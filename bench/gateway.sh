@@ -154,7 +154,7 @@ by_opcua() {
   start
   mkfifo -m 600 pipe copy
   begin_gateway --lines pipe
-  # How old a reading is when the client prints it.
+  # Prints the age of each reading at the moment the client prints it.
   perl -MTime::HiRes=time -MTime::Local -ne '
     next unless /"t":"(\d+)-(\d+)-(\d+)T(\d+):(\d+):([\d.]+)Z","v"/ && $. > 3600;
     my $lag = time - timegm(0, $5, $4, $3, $2 - 1, $1) - $6;

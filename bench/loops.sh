@@ -34,7 +34,7 @@ until grep -qs filled "$out/publish"; do
   kill -0 "$publisher"
   sleep 0.2
 done
-sleep 2  # What is acknowledged may not be judged yet.
+sleep 2  # Acknowledged samples may not be judged yet.
 begin=$(usage)
 wait "$publisher"
 end=$(usage)

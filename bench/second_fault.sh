@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# What is found of a second fault: twelve pairs of a transmitter's and a valve's
-# fault, the second one 600 s after the first, in open loop with the benchmark's
-# set (campaigns/benchmark.toml, needs FDI_REFERENCE_DATA), and in the level loop
+# Finds second faults: twelve pairs of a transmitter's and a valve's fault, the
+# second one 600 s after the first, in open loop with the benchmark's set
+# (campaigns/benchmark.toml, needs FDI_REFERENCE_DATA), and in the level loop
 # with a set onboarded on two healthy hours of the valve. One line for each run:
 # the name of the first at the end, what is on top of it and since when [s].
 #

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# What the service costs beside bare DDS: a publisher of 1000 valves against a
-# bare reader, against the monitor alone and with a subscriber of its vectors;
-# round trips at 1 kHz against an echo. In turn, on loopback, about a minute.
+# Compares the service with bare DDS: a publisher of 1000 valves against a bare
+# reader, against the monitor alone and with a subscriber of its vectors; round
+# trips at 1 kHz against an echo. In turn, on loopback, about a minute.
 #
 #     cmake --preset release -DFDI_BENCH=ON && cmake --build --preset release
 #     bench/service.sh [BIN]          # BIN: build/release/bin

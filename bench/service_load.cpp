@@ -75,7 +75,7 @@ double SecondsBetween(Clock::time_point from, Clock::time_point to) {
   return std::chrono::duration<double>(to - from).count();
 }
 
-// What a data-only loop has of `samples`.
+// Leaves only the signals of a data-only loop in `samples`.
 void KeepLoop(std::vector<Sample>& samples) {
   for (Sample& sample : samples) {
     sample.present = static_cast<SignalMask>(

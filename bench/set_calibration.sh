@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# How often the final set holds the fault: 20 faults at strengths between those
-# of the observers, in the level loop of valves whose Kv, positioner gain,
+# Counts how often the final set holds the fault: 20 faults at strengths between
+# those of the observers, in the level loop of valves whose Kv, positioner gain,
 # viscous friction or supply is 15 % off the data sheet that onboarding starts
 # from; by name also valves that differ in kind, and valves of another medium,
 # trim or action in a loop of their own (gas, gas-linear, steam, linear,
@@ -151,7 +151,7 @@ for name in "${names[@]}"; do
     --no-coverage >"$work/log" 2>&1 || { cat "$work/log"; exit 1; }
   files=()
   for fault in "${faults[@]}"; do
-    # Of water alone it is known when it evaporates.
+    # Only for water is it known when it evaporates.
     [[ $fault != f7=* || ${types[$name]:-} != *gas* ]] || continue
     [[ $fault != f7=* || ${types[$name]:-} != *steam* ]] || continue
     simulate "$work/$fault.csv" "$rows" --fault \

@@ -1,6 +1,6 @@
-// What an hour of one valve costs with CVODE, against RK4 with a fixed step of
-// 2.5 ms on the same right-hand side. Ratios of the same run, errors against
-// CVODE at a thousandth of its tolerances.
+// Measures the cost of an hour of one valve with CVODE, against RK4 with a
+// fixed step of 2.5 ms on the same right-hand side. Ratios of the same run,
+// errors against CVODE at a thousandth of its tolerances.
 //
 //     build/release/bin/fdi-bench-simulator
 #include <algorithm>

@@ -144,7 +144,7 @@ Observer Condition(int i, int count, const std::vector<int>& faults) {
   return observer;
 }
 
-// What the fault of `observer` adds to the channel: its own pattern.
+// Effect of the fault of `observer` on the channel: its own pattern.
 double Effect(const Observer& observer, std::size_t channel) {
   const double pattern =
       observer.fault == 0

@@ -133,7 +133,7 @@ train() {  # CAMPAIGN NAME LINE...
 }
 
 # The set of ours that a method takes, into `model`; none: it does not exist for
-# the data. What onboarding fits has no switch for its rules.
+# the data. A fit by onboarding has no switch for its rules.
 make_variant() {  # METHOD
   model=$set_name$variant
   [ "$1" != ours ] || return 0

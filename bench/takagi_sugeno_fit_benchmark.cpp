@@ -1,4 +1,4 @@
-// How long a fit takes on one core: F from X, P1, P2 under the benchmark's
+// Measures a fit on one core: F from X, P1, P2 under the benchmark's
 // excitation, 2000 samples, 6 rules; and the evaluation of its rules.
 #include <cstdlib>
 #include <fstream>

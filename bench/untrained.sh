@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# What a set of the paper's five faults calls a fault that it does not know:
-# every other fault and sign at .3 and .6, abrupt, and the answer at the end of
-# the run: unknown, a set, or one wrong name.
+# Shows how a set of the paper's five faults answers to a fault that it does not
+# know: every other fault and sign at .3 and .6, abrupt, and the answer at the
+# end of the run: unknown, a set, or one wrong name.
 #
 # A fault counts as different if its run, without noise, is further from that of
 # every trained fault at every strength (.01 to .05, .1, ... 1, and what lies

@@ -82,7 +82,7 @@ SELECT s.*,
    JOIN main.episode e USING (episode_id)
    WHERE e.valve_id = s.name AND v.kind IN ('ISOLATED', 'REISOLATED')
      AND instr(v.faults, '|') = 0 AND v.faults <> s.fault
-     -- What the floor finds is no fault.
+     -- Findings of the floor are no faults.
      AND v.faults NOT IN ('travel_deviation', 'shut_flow', 'excess_flow',
                           'x_stuck', 'f_stuck', 'low_flow')) AS wrong
 FROM scenario s;

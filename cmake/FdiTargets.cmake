@@ -12,7 +12,7 @@ if(CMAKE_CXX_COMPILER_ID STREQUAL GNU AND CMAKE_CXX_COMPILER_VERSION VERSION_LES
        -Wno-stringop-overread)
 endif()
 
-# What a mutex guards: base/mutex.h.
+# Clang checks the use of members that a mutex guards: base/mutex.h.
 if(CMAKE_CXX_COMPILER_ID STREQUAL Clang)
   list(APPEND FDI_WARNINGS -Werror=thread-safety)
 endif()
@@ -122,8 +122,8 @@ function(fdi_program name)
 endfunction()
 
 # fdi_component(target FDI_COMPONENT SOURCES a.cpp ... LIBRARIES lib ...)
-# What the target has of a component if that option is ON; left_out.cpp, which
-# sees the option as 0 or 1, stands in for it.
+# Adds the component's part to the target if that option is ON; left_out.cpp,
+# which sees the option as 0 or 1, stands in for it.
 function(fdi_component target option)
   cmake_parse_arguments(ARG "" "" "SOURCES;LIBRARIES" ${ARGN})
   set_property(SOURCE left_out.cpp APPEND PROPERTY

@@ -65,7 +65,7 @@ bool SameSecret(const std::string& given, const std::string& secret) {
   return differs == 0;
 }
 
-// Whether a page of this server sent the request: browsers state the origin of
+// True if a page of this server sent the request: browsers state the origin of
 // each POST, and scripts cannot forge it. Where the browser uses https, a page
 // of http is another one, which anybody on the way can fill.
 bool IsSameOrigin(const httplib::Request& request) {

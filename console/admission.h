@@ -52,15 +52,15 @@ class Admission {
   ///   it; DataError if it cannot be read.
   Admission(const std::filesystem::path& secret_file, LogSink log);
 
-  /// Whether a request may go on to its page; otherwise it is answered. A
+  /// True if a request may go on to its page; otherwise it is answered. A
   /// request to change something must come from this page itself.
   bool Admit(const httplib::Request& request, httplib::Response& response);
 
   /// Nothing where no proxy names one.
   std::optional<Visitor> VisitorOf(const httplib::Request& request) const;
-  /// Whether the visitor may perform any action at all.
+  /// True if the visitor may perform any action at all.
   bool MayWrite(const httplib::Request& request) const;
-  /// Whether `who`, as named in the request (may be empty), may perform the
+  /// True if `who`, as named in the request (may be empty), may perform the
   /// action; if not, an error response is sent. @param who is set to the
   /// visitor's name.
   bool Authorize(const httplib::Request& request, httplib::Response& response,
@@ -71,7 +71,7 @@ class Admission {
   /// The address of the client, behind the proxy if there is one.
   std::string AddressOf(const httplib::Request& request) const;
 
-  /// Whether anybody can act at all.
+  /// True if anybody can act at all.
   bool writable() const { return !secret_.empty(); }
   AdmissionCounts counts() const;
 

@@ -22,7 +22,7 @@ void AddTo(ValveAlarm& valve, const Alarm& alarm,
   const storage::Episode& e = alarm.episode;
   valve.unacked |= alarm.state == AlarmState::kUnacked ||
                    alarm.state == AlarmState::kReturnedUnacked;
-  // What is open takes the place of what its data left unconfirmed.
+  // An open episode replaces one whose data ended before it did.
   valve.active |=
       alarm.state == AlarmState::kUnacked || alarm.state == AlarmState::kAcked;
   if (!e.ended_ns || (e.unconfirmed_ns && valve.episode.empty())) {
@@ -168,7 +168,7 @@ std::vector<Json> AlarmBook::Read(storage::History& history,
   return changed;
 }
 
-// What the history has and what was heard. Call with the mutex locked.
+// Merges what the history has and what was heard. Call with the mutex locked.
 void AlarmBook::Combine() {
   auto by_valve = std::make_shared<ByValveMap>(stored_);
   for (const auto& [id, alarm] : unstored_) {

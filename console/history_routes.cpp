@@ -271,7 +271,7 @@ Json LookJson(const std::optional<EpisodeLook>& look,
   return {{"misfit", Rounded(look->misfit, 2)}, {"faults", std::move(faults)}};
 }
 
-// How each fault of the name develops.
+// Growth of each fault of the name.
 Json GrowthJson(const std::vector<Growth>& growths) {
   Json list = Json::array();
   for (const Growth& growth : growths) {

@@ -65,7 +65,7 @@ Json RefusedJson(const ValveState& valve) {
                                      : std::string_view()}};
 }
 
-// That of its alarm; of a name that its alarm does not have yet, by itself.
+// Certainty of the alarm; a name that the alarm lacks has its own.
 Json CertaintyJson(const ValveState& valve, const std::string& fault,
                    const ValveAlarm& alarm) {
   if (valve.state == State::kNormal && !alarm.unconfirmed_ns &&
@@ -104,7 +104,7 @@ void AppendTo(Json& columns, const std::vector<double>& row, int decimals) {
   }
 }
 
-// Of a stamp that is 0 where there is none.
+// A stamp of 0 means that there is none.
 Json MsOrNull(std::int64_t stamp_ns) {
   return stamp_ns == 0 ? Json() : Ms(stamp_ns);
 }

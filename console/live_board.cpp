@@ -74,7 +74,7 @@ monitor::Trace EmptyTrace() {
 
 }  // namespace
 
-// What the board holds of one valve.
+// State of one valve on the board.
 //
 // The trend is a sequence of packed traces: a Trace holds instants of one
 // source with the same signals, so a new source, or a signal that is added,
@@ -130,7 +130,7 @@ struct LiveBoard::Slot {
     }
   }
 
-  // Of the valve nothing is known but when it was heard last.
+  // Only the time of the last sample is known of an absent valve.
   void ShowAbsent() REQUIRES(mutex) {
     models = nullptr;
     ValveState absent;
@@ -409,7 +409,7 @@ void LiveBoard::AddMark(const FaultEvent& event) {
                         : IsolatedFaults(event)},
       kMarks);
   if (event.transition.kind == TransitionKind::kClosed) {
-    // Of a silent valve no sample follows that would say so.
+    // A silent valve sends no sample that would reset this.
     slot->now.state = State::kNormal;
     slot->now.isolated = 0;
   }

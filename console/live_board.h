@@ -27,7 +27,7 @@ struct ValveState {
   monitor::Silence silence{monitor::Silence::kNone};
   CoverageReasons reasons{0};
   SignalMask missing{0};  ///< That the model set needs and the sample lacks.
-  Intake intake{Intake::kAccepted};     ///< Of the newest sample.
+  Intake intake{Intake::kAccepted};     ///< The newest sample's.
   SignalMask refused{0};                ///< Because of these signals.
   std::vector<std::string> unjudged{};  ///< Channels that abstain now.
   bool contested{false};                ///< See monitor::ValveOutcome.
@@ -57,7 +57,7 @@ struct LiveTrend {
   ValveState now;
   std::vector<TracePoint> points;  ///< Oldest first.
   std::vector<Mark> marks;
-  std::vector<DataGap> gaps;  ///< Of this valve, in its stream.
+  std::vector<DataGap> gaps;  ///< This valve's, in its stream.
   std::uint64_t next{0};      ///< For LiveBoard::Since().
 };
 
@@ -107,7 +107,7 @@ class LiveBoard : public monitor::ValveListener {
   /// Nothing if the valve was never seen.
   std::optional<LiveTrend> Trend(std::string_view valve_id,
                                  std::size_t instants = kTrendInstants) const;
-  /// What came since `next` of Trend() or of the last call, as far as it is
+  /// Points since `next` of Trend() or of the last call, as far as they are
   /// still there; only points and next are filled.
   std::optional<LiveTrend> Since(std::string_view valve_id,
                                  std::uint64_t next) const;

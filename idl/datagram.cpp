@@ -99,7 +99,7 @@ struct Body {
   }
 };
 
-// Whether the parameter list of a data submessage, which begins at `at`, lies
+// True if the parameter list of a data submessage, which begins at `at`, lies
 // inside it. Calls see(id) for each parameter.
 template <typename See>
 bool ReadParameters(const Body& body, std::size_t at, See see) {
@@ -127,7 +127,7 @@ bool DataIsSound(const Body& body, std::uint8_t flags, std::size_t fixed) {
           ReadParameters(body, at, [](std::uint16_t) {}));
 }
 
-// Whether valid data is a dispose with nothing but a serialized key.
+// True if valid data is a dispose with nothing but a serialized key.
 bool IsBareKey(const Body& body, std::uint8_t flags) {
   constexpr std::uint8_t kEndOfInstance = kKeyFlag | kInlineQosFlag;
   if ((flags & (kEndOfInstance | kDataFlag)) != kEndOfInstance ||
@@ -187,7 +187,7 @@ class Speaker {
 // Numbers that the submessages of one datagram leave out, by writer.
 using Gaps = std::vector<std::pair<WriterGuid, std::int64_t>>;
 
-// Whether a valid submessage contains only numbers that its writer can have
+// True if a valid submessage contains only numbers that its writer can have
 // reached. `gaps` takes those that it leaves out.
 bool HasPlausibleNumbers(std::uint8_t kind, const Body& body, Speaker& speaker,
                          WriterPace& pace, WriterPace::Clock::time_point now,

@@ -13,7 +13,7 @@
 
 namespace fdi::idl {
 
-/// Whether a datagram is passed to the DDS library, and if not, why.
+/// Says if a datagram is passed to the DDS library, and if not, why.
 enum class DatagramVerdict : std::uint8_t {
   kSound,
   kHeader,   ///< Not RTPS 2: magic, version, or too short.

@@ -77,7 +77,7 @@ std::optional<Refusal> RefusalIn(const Log::Entry& entry) {
                  text.substr(reason + 2, end - reason - 2)};
 }
 
-// Whether it is the first refusal of that GUID, which counts: the library
+// True if it is the first refusal of that GUID, which counts: the library
 // repeats it for each of our participants and endpoints.
 bool CountOnce(const Refusal& refusal) {
   Registry& registry = GlobalRegistry();

@@ -130,7 +130,7 @@ class Participant::Impl : private dds::DomainParticipantListener {
   void ReportIncompatible(const std::string& topic, bool remote_is_writer,
                           dds::QosPolicyId_t id, const PolicyTexts& ours);
 
-  /// Whether our key permits `topic`, one of version 2. The first time that it
+  /// True if our key permits `topic`, one of version 2. The first time that it
   /// does not, because it was made before, is logged and counted in
   /// RefusedPermissions().
   bool PermitsPv(const char* topic);

@@ -217,7 +217,7 @@ struct TopicWriter : dds::DataWriterListener {
     }
   }
 
-  // How many messages ago the oldest one that the history may have was written.
+  // Number of messages since the oldest one that the history may have.
   std::uint64_t SpanOfHistory() const REQUIRES(mutex) {
     std::uint64_t oldest = writes;
     for (const auto& [key, each] : instances) {

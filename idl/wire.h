@@ -44,9 +44,9 @@ struct ValveSampleMessage {
   Sample sample;
 };
 
-/// Topic fdi/v1/DecisionVector, key valve_id. Of the arrays in `verdict` only
-/// the first channel_count, fault_count and observer_count entries are sent;
-/// transitions are not: they are FaultEvents.
+/// Topic fdi/v1/DecisionVector, key valve_id. Each array in `verdict` is sent
+/// up to its count (channel_count, fault_count, observer_count); transitions
+/// are not: they are FaultEvents.
 struct DecisionMessage {
   std::string valve_id;
   std::uint64_t model_hash{0};  ///< ModelSet::content_hash; 0 if unassigned.

@@ -32,7 +32,7 @@ class WriterPace {
  public:
   using Clock = std::chrono::steady_clock;
 
-  /// Whether `writer` can have reached `number` at `now` while skipping
+  /// True if `writer` can have reached `number` at `now` while skipping
   /// `left_out` numbers, which cost more. If so, its position is updated.
   bool Admit(const WriterGuid& writer, std::int64_t number,
              std::int64_t left_out, Clock::time_point now);

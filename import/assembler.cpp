@@ -494,7 +494,7 @@ std::int64_t Assembler::InstantFrom(std::int64_t stamp_ns) const {
   return rest > 0 ? stamp_ns + options_.period_ns - rest : stamp_ns - rest;
 }
 
-// How long after its last word a source is taken to live.
+// A source is taken to live for this long after its last word.
 std::int64_t Assembler::Silence(const Source& source) const {
   const std::int64_t least =
       std::max(options_.lateness_ns, 2 * options_.period_ns);

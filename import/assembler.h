@@ -53,7 +53,7 @@ struct ArrivalTime {
 
 struct AssemblerOptions {
   std::int64_t period_ns{1'000'000'000};
-  /// How long an instant waits for sources that have not spoken of it.
+  /// Time that an instant waits for sources that have not spoken of it.
   std::int64_t lateness_ns{2'000'000'000};
 };
 
@@ -77,7 +77,7 @@ struct AssemblyNote {
   };
   Kind kind{};
   std::string name;       ///< Name of the source or tag.
-  std::int64_t by_ns{0};  ///< How long it was silent; how far the clock moved.
+  std::int64_t by_ns{0};  ///< Length of its silence, or of the clock's leap.
 };
 
 /// Counts of a tag's readings since the start.

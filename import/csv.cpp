@@ -235,7 +235,7 @@ void CsvReader::EndPage(const CsvRow& row) {
   header_again_ = false;
 }
 
-// Whether `line` ends a row of readings. Header and markers are taken here.
+// True if `line` ends a row of readings. Header and markers are taken here.
 bool CsvReader::EndsRow(std::string_view line) {
   if (line_ <= options_.map.skip && names_.empty()) {
     return false;

@@ -102,7 +102,7 @@ struct LongTable {
   std::string quality;  ///< Name of the column; empty: the one that is found.
 };
 
-/// How a signal is resampled to a fixed period.
+/// Resampling of a signal to a fixed period.
 struct Resampling {
   double period_s{1.0};
   bool linear{false};    ///< Otherwise the last reading is held.
@@ -252,7 +252,7 @@ class CsvReader {
   const std::vector<std::string>& names() const { return names_; }
   const std::vector<std::string>& cells() const { return record_.cells(); }
   const TimeUnit& time_unit() const { return time_unit_; }
-  /// Whether the header is over.
+  /// True if the header is over.
   bool in_rows() const { return !names_.empty() && header_left_ == 0; }
   std::size_t markers() const { return markers_; }
   /// Cells beyond ColumnMapping::lowest and highest.

@@ -259,7 +259,7 @@ void TableReader::NoteForm() {
   }
 }
 
-// Whether the row of a long table went into an earlier one of that instant; the
+// True if the row of a long table went into an earlier one of that instant; the
 // table may be sorted by tag.
 bool TableReader::Joined(const CsvRow& row) {
   const Sample& part = row.labelled.sample;
@@ -357,7 +357,7 @@ void TableReader::FindPeriod() {
   period_s_ = UsualPeriod(period_s_);
 }
 
-// Whether every step is one period, or a gap where gaps are allowed.
+// True if every step is one period, or a gap where gaps are allowed.
 bool TableReader::IsSteady() const {
   for (std::size_t k = 1; k < rows_.size(); ++k) {
     const double off = rows_[k].t_s - rows_[k - 1].t_s - period_s_;

@@ -152,7 +152,7 @@ struct Signs {
   std::map<char, SignCell> grouped;  ///< "1.234,5" by ','.
 };
 
-/// How an order of day, month and year fits the dates of a table.
+/// Fit of an order of day, month and year to the dates of a table.
 struct OrderFit {
   std::size_t read{0};
   std::time_t last{0};
@@ -319,7 +319,7 @@ void LayoutFinder::FindSeparatorSign() {
   }
 }
 
-// Whether a row has names that the map or the contract knows.
+// True if a row has names that the map or the contract knows.
 bool LayoutFinder::IsNamed(const Cells& cells) const {
   const ColumnMap& map = layout_.map;
   const auto has = [&](std::string_view name) {
@@ -868,7 +868,7 @@ void LayoutFinder::FindQualities() {
   }
 }
 
-// Whether a column of quality has a word that is known.
+// True if a column of quality has a word that is known.
 bool LayoutFinder::HoldsWords(const std::string& name) const {
   const auto c = At(name);
   return c && std::ranges::any_of(columns_[*c].words, [](const auto& word) {

@@ -14,8 +14,8 @@
 
 // Both forms of the table, TOML and CSV, are first read into a RawTable: cells
 // of text by key, the defaults apart from the rows. RowReader makes the rows
-// from it, so that a key means the same in both forms. What is wrong with one
-// row stays with that row; what is wrong with the file or its defaults is
+// from it, so that a key means the same in both forms. An error in
+// one row stays with that row; one in the file or its defaults is
 // thrown.
 namespace fdi::importer {
 namespace {
@@ -28,7 +28,7 @@ constexpr std::string_view kOtherKeys[] = {
     "name",  "sense", "service",     "type",     "grade",    "group",   "file",
     "from",  "to",    "auto",        "manual",   "report",   "max_age", "topic",
     "value", "time",  "description", "location", "document", "costs"};
-// How rows without a model set are told apart from a forgotten type.
+// Tells rows without a model set from those with a forgotten type.
 constexpr std::string_view kDataOnly = "data only";
 
 // All keys of a row. A tag has a unit and a range, but the mode, which is
@@ -69,7 +69,7 @@ std::vector<std::string> Words(const std::string& text) {
   return words;
 }
 
-// What one row says, with the defaults behind it.
+// Reads one row, with the defaults behind it.
 class RowReader {
  public:
   RowReader(const NamedCells& own, std::span<const NamedCells* const> defaults)
@@ -232,7 +232,7 @@ class RowReader {
     }
   }
 
-  // How the tags come while the plant runs.
+  // Reads how the tags come while the plant runs.
   void ReadLive() {
     row_.report = Lower(Cell("report"));
     if (!row_.report.empty() && row_.report != "exception" &&
@@ -270,7 +270,7 @@ struct RawTable {
 
 // A cell is that of the row, else of its group, else of the defaults of all.
 // The group itself may be a default of all, so it is found out before the rest.
-// Of rows with one name, all but the first are refused.
+// If rows share a name, all but the first are refused.
 std::vector<PlantRow> RowsOf(const RawTable& raw) {
   static const NamedCells kNone;
   std::vector<PlantRow> rows;
@@ -635,9 +635,9 @@ void Bound(const std::optional<std::pair<double, double>>& range,
   }
 }
 
-// The reading in the unit of the signal; see ReadUnit() of tag_map.cpp. Of op
-// and x the range of the row is spread over 0..100 %, whatever the unit, and is
-// 4..20 for mA. Of the others the range only bounds what counts as a reading.
+// The reading in the unit of the signal; see ReadUnit() of tag_map.cpp. The
+// range of op and x is spread over 0..100 %, whatever the unit, and is 4..20
+// for mA. For the others the range only bounds what counts as a reading.
 ColumnMapping MappingOf(const PlantRow& row, LoopTag tag, Signal signal,
                         const std::string& column, ColumnMap& map) {
   const TagCell& cell = row[tag];

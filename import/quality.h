@@ -40,17 +40,17 @@ std::optional<SignalQuality> QualityOf(std::string_view cell,
 QualityCode QualityCodeOf(std::string_view column,
                           const std::map<std::string, std::size_t>& cells);
 
-/// Whether a column holds qualities: known words, or few numbers under a name
+/// True if a column holds qualities: known words, or few numbers under a name
 /// such as "Status".
 bool IsQualityColumn(std::string_view column,
                      const std::map<std::string, std::size_t>& cells);
 
-/// Whether a cell means "no reading": empty, NaN, Bad, #N/A, "<No Data>", only
+/// True if a cell means "no reading": empty, NaN, Bad, #N/A, "<No Data>", only
 /// signs, ..., or one of `more`.
 bool IsNoReading(std::string_view cell,
                  const std::vector<std::string>& more = {});
 
-/// Whether `text` contains one of `words`, which are separated by bars.
+/// True if `text` contains one of `words`, which are separated by bars.
 bool HasWord(std::string_view text, std::string_view words);
 /// True if `text` is one of `words`, each with a bar before and after it.
 bool IsListedWord(std::string_view text, std::string_view words);

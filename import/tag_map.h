@@ -44,12 +44,12 @@ std::optional<UnitConversion> FindUnit(Signal signal, std::string_view name);
 std::string UnitNames(Signal signal);
 /// The number and the unit of "11.1 t/h", "-3 °C"; the unit may be empty.
 std::pair<std::string_view, std::string_view> SplitUnit(std::string_view cell);
-/// Whether `name` is a unit of some signal.
+/// True if `name` is a unit of some signal.
 bool IsUnit(std::string_view name);
-/// Whether `name` is a flow of gas at standard conditions: Nm3/h, scfm, ...
+/// True if `name` is a flow of gas at standard conditions: Nm3/h, scfm, ...
 bool IsGasUnit(std::string_view name);
 
-/// Whether a map that states F as a gas at standard conditions suits the medium
+/// True if a map that states F as a gas at standard conditions suits the medium
 /// of the valve.
 /// @param molar_mass_kg_kmol of the medium; 0: a liquid.
 /// @throws ConfigError naming the likeliest cause.

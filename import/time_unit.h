@@ -6,7 +6,7 @@
 
 namespace fdi::importer {
 
-/// How the cells of a time column are read.
+/// Form of the cells of a time column.
 enum class TimeForm {
   kFindOut,
   kElapsed,  ///< A number from CsvOptions::start_ns.

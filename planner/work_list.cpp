@@ -22,7 +22,7 @@ using findings::Finding;
 using findings::RankFacts;
 using report::Json;
 
-constexpr std::size_t kDayLength = 10;  // Of "2026-11-20 14:00:00Z".
+constexpr std::size_t kDayLength = 10;  // The day in "2026-11-20 14:00:00Z".
 
 Json OrNull(const std::optional<std::string>& text) {
   return text && !text->empty() ? Json(*text) : Json();

@@ -42,7 +42,7 @@ struct Repair {
 /// and the time for which each valve was judged; the rest is known to the
 /// caller.
 struct WorkQuery {
-  std::string valve_glob{"*"};  ///< Of the rows.
+  std::string valve_glob{"*"};  ///< Selects rows.
   std::int64_t now_ns{0};       ///< The list is as of then; must be set.
   std::int64_t since_ns{0};     ///< Episodes from then on, and open ones.
   std::vector<HealthLimit> limits{};
@@ -55,7 +55,7 @@ struct WorkQuery {
   /// Valves that a model set judges at this moment: the history has the time
   /// judged only up to the last minute.
   std::vector<std::string> judged_now{};
-  LoopAudits audits{};                 ///< Of stored runs.
+  LoopAudits audits{};                 ///< From stored runs.
   std::optional<report::Json> last{};  ///< The document of the last list.
   std::string last_file{};             ///< Where it is from.
 };

@@ -50,7 +50,7 @@ class PlantRows {
   std::unique_ptr<pg_result, void (*)(pg_result*)> result_;
 };
 
-/// How long to wait for a server that nobody here controls. A call beyond its
+/// Limits on waiting for a server that nobody here controls. A call beyond its
 /// limit, or stopped, throws PlantError, after which the connection is closed.
 struct PlantLimits {
   /// For each host of the URL, unless its connect_timeout is shorter.

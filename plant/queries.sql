@@ -182,14 +182,14 @@ INSERT INTO fdi.monitor (history_id, host, monitor) VALUES ($1, $2, $3)
 ON CONFLICT (history_id) DO UPDATE
 SET host = EXCLUDED.host, monitor = EXCLUDED.monitor
 RETURNING monitor_id
--- What the schema accepts, by table, for the rows on their way.
+-- Conditions of the schema, by table, for the rows on their way.
 -- name: checks
 SELECT c.relname, string_agg(
   '(' || pg_get_expr(k.conbin, k.conrelid) || ')', ' AND ')
 FROM pg_constraint k JOIN pg_class c ON c.oid = k.conrelid
 WHERE k.contype = 'c' AND k.connamespace = 'fdi'::regnamespace
 GROUP BY c.relname
--- What is open or not acknowledged in a plant, of which a restored history may know nothing.
+-- Lists the open or unacknowledged episodes, which a restored history may not know.
 -- name: open_episodes
 SELECT episode_id FROM fdi.episode
 WHERE monitor_id = $1 AND (end_reason IS NULL OR acked_by IS NULL)
@@ -233,8 +233,8 @@ WHERE ended_ns IS NULL OR acked_by IS NULL OR label IS NOT NULL
   OR unconfirmed_ns IS NOT NULL
 -- name: newest_in_plant
 SELECT coalesce(max(alive_ns), 0) FROM fdi.monitor_session
--- What arrived later than $1 is not old, whatever its publisher's clock said;
--- what is stamped two days after it arrived is as old as its arrival.
+-- Rows that arrived later than $1 are not old, whatever the publisher's clock
+-- said; rows stamped two days after they arrived are as old as their arrival.
 -- name: old_in_plant
 SELECT count(*), min(detected_ns), max(detected_ns) FROM fdi.episode e
 WHERE ended_ns IS NOT NULL AND acked_by IS NOT NULL AND label IS NULL
@@ -348,7 +348,7 @@ WHERE {valve} AND NOT {sound} AND $2::bigint IS NOT NULL
 SELECT DISTINCT episode_id FROM episode
 WHERE $1 <> '' AND episode_id >= lower($1) AND episode_id < lower($1) || 'g'
   AND ($2 = '' OR monitor = $2) LIMIT 2
--- Of one episode: $1 is its id, $2 the monitor.
+-- Selects one episode: $1 is its id, $2 the monitor.
 -- name: of_episode
 episode_id = $1 AND monitor_id = (
   SELECT monitor_id FROM episode

@@ -141,7 +141,7 @@ struct Shipper::Batch {
   }
 };
 
-// How far the plant is. copied_ns is there as long as it gets copies.
+// The plant's progress. copied_ns is there as long as it gets copies.
 struct Shipper::Cursor {
   std::int64_t number{0};
   std::int64_t shipped_ns{0};

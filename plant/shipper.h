@@ -58,7 +58,7 @@ class Shipper {
   ///   on behind it.
   Shipped Ship();
 
-  /// Whether history.db is still the file that was opened.
+  /// True if history.db is still the file that was opened.
   bool InPlace() const { return history_.InPlace(); }
   const PlantDatabase& plant() const { return plant_; }
 

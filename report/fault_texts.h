@@ -40,7 +40,7 @@ std::string_view StatusName(std::optional<NamurClass> status);
 /// Texts about a fault for operators and planners.
 struct FaultText {
   std::string name;   ///< "Flow transmitter wrong"
-  std::string check;  ///< How to tell it from similar faults in the field.
+  std::string check;  ///< Tells it from similar faults in the field.
   Discipline discipline{Discipline::kInstrument};
   NamurClass namur{NamurClass::kCheckFunction};
   SeverityBands bands;

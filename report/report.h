@@ -13,7 +13,7 @@
 
 namespace fdi::report {
 
-/// How a value is shown in text. JSON and CSV have the raw value.
+/// Form of a value in text. JSON and CSV have the raw value.
 enum class Format {
   kPlain,     ///< Text unchanged, numbers with Column::decimals.
   kTime,      ///< A `*_utc` text as a time in the user's zone.
@@ -52,13 +52,13 @@ struct Column {
   bool wraps{false};
 };
 
-/// How a page is laid out.
+/// Layout of a page.
 struct PageStyle {
   bool utc{false};        ///< Times in UTC instead of the local zone.
   bool landscape{false};  ///< On A4 paper; upright otherwise.
 };
 
-/// How a Report is rendered.
+/// Style of a rendered Report.
 struct ReportStyle {
   TextStyle text;   ///< Colour and width.
   bool utc{false};  ///< Times in UTC instead of the local zone.

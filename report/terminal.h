@@ -4,7 +4,7 @@
 
 namespace fdi::report {
 
-/// How to render text for its destination.
+/// Style of text for its destination.
 struct TextStyle {
   bool colour{false};
   std::size_t width{0};  ///< Available columns; 0: unlimited.

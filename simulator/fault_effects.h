@@ -32,7 +32,7 @@ struct FaultEffects {
   double supply_factor{1.0};        ///< On the supply's gauge pressure.
   double inlet_factor{1.0};         ///< On P1.
   double outlet_factor{1.0};        ///< On P2.
-  double bypass_opening{0.0};       ///< Of V3, 0..1.
+  double bypass_opening{0.0};       ///< V3's, 0..1.
   double flow_reading_factor{1.0};  ///< On the flow reading.
   /// Steps in the readings of T1, P1 and P2, as shares of their span.
   double temperature_reading_step{0.0};
@@ -165,12 +165,12 @@ inline constexpr double kMaxTemperatureC = 300.0;
 ///   `strength` is outside [0, 1] ([-1, 1] for signed faults).
 void ApplyFault(int fault, double strength, FaultEffects& effects);
 
-/// What the transmitter of F shows at `flow`, before noise and range.
+/// Reading of the transmitter of F at `flow`, before noise and range.
 constexpr double FlowReadingWith(const FaultEffects& effects, double flow) {
   return flow * effects.flow_reading_factor;
 }
 
-/// What the medium has where `temperature_c` flows in without the fault.
+/// Temperature of the medium that has `temperature_c` without the fault.
 double TemperatureWith(const FaultEffects& effects, double temperature_c);
 
 /// True if `fault` acts only downstream of the rod, on the flow or on readings:

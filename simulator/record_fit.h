@@ -9,7 +9,7 @@
 
 namespace fdi::simulator {
 
-/// How the inputs of a record act between its rows.
+/// Course of the inputs between the rows of a record.
 struct RecordDrive {
   double period_s{1.0};  ///< Between rows, > 0.
   /// The command is interpolated between rows instead of held.

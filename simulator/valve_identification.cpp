@@ -507,7 +507,7 @@ struct Hypothesis {
   std::optional<double> error{};  // Error of Best(), once it is fitted there.
 };
 
-// How far a fit goes, and how much it may cost.
+// Bounds of a fit, and of its cost.
 struct FitEffort {
   int iterations;
   double tolerance_scale;

@@ -13,8 +13,8 @@ struct HealthyRecord {
   std::vector<RecordRow> rows;
 };
 
-/// How many times the flow of `valve` the records show, the median of the ratio
-/// at the measured X, P1, P2 and T1; 1 if less than 30 rows have a flow.
+/// Ratio of the flow in the records to that of `valve`, the median at the
+/// measured X, P1, P2 and T1; 1 if less than 30 rows have a flow.
 double SizeOf(const std::vector<HealthyRecord>& records,
               const ValveParameters& valve);
 

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# What the sources log and the documents explain must be the same: every log id
-# and every event that warns stands in docs/troubleshooting.md, and no id there
-# is one that nothing logs. Links between documents lead somewhere, each page is
+# The sources and the documents must agree: every log id and every event that warns
+# stands in docs/troubleshooting.md, and no id there is one that nothing logs.
+# Links between documents lead somewhere, each page is
 # in one part of docs/README.md, README.md and docs/results.md keep their
 # lengths, README.md's results are lines of docs/results/table.md, docs/method.md
 # has a row for every rule of the decision, docs/openapi.yaml has the routes of the

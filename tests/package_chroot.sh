@@ -76,7 +76,7 @@ quietly within sh -ec 'cd /empty
   fdi-trainer onboard --valve OWN --file own.csv --map tags.toml'
 taken "$begin" "own file to its models"
 
-# What the administrator changed stays; so do data.
+# The administrator's changes stay; so do data.
 echo 'FDI_MONITOR_OPTIONS=--record' >"$root/etc/default/fdi-monitor"
 install -d "$root/var/lib/fdi"
 quietly within apt-get install -y -q --reinstall /fdi.deb

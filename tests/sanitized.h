@@ -2,7 +2,7 @@
 
 namespace fdi {
 
-/// Whether the address or the thread sanitizer watches: without memory it ends
+/// True if the address or the thread sanitizer watches: without memory it ends
 /// the process itself, without descriptors it takes sound objects for broken.
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 inline constexpr bool kSanitized = true;

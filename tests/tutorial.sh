@@ -34,8 +34,8 @@ fail() {
   exit 1
 }
 
-# What differs from a new user's machine: where the campaigns are, ports that
-# others may have, the domain, a plant whose seconds are shorter than the
+# Adapts a new user's commands to this machine: where the campaigns are, ports
+# that others may have, the domain, a plant whose seconds are shorter than the
 # client's interval.
 adapt() {
   sed -e "s#/usr/share/fdi/campaigns#$out/campaigns#g" \

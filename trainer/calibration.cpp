@@ -114,7 +114,7 @@ constexpr double kCommandMargin = 0.5;         // of the range
 constexpr double kMinCommandMargin = 2.0;      // %
 constexpr double kMinActivityVariance = 1e-6;  // to tell a slope from
 
-// What the windows of all series have seen, one entry per full window.
+// Values that the windows of all series have seen, one entry per full window.
 struct WindowHistory {
   std::vector<double> mean;
   std::vector<double> energy;    // log-deviation of the residual
@@ -146,7 +146,7 @@ WindowHistory SlideWindow(const ResidualSeries& residuals,
   return history;
 }
 
-// Of the line of y over x, in [0, 1]: a residual grows with what causes it.
+// Slope of the line of y over x, in [0, 1]: a residual grows with its cause.
 double Slope(std::span<const double> x, std::span<const double> y) {
   const double mean_x = Mean(x);
   const double mean_y = Mean(y);
@@ -279,7 +279,7 @@ double Level(const std::vector<double>& values, double share, int length,
 // range beyond, 2 % at least.
 //
 // @param commanded The model reads CV: what it errs by hangs on how the loop
-//   moves. Of a short record its mean is given 0.75 deviations. σ and τ are
+//   moves. The mean of a short record is given 0.75 deviations. σ and τ are
 //   those of its fast part, without the means of blocks: the slow part is
 //   allowed for by itself (SlowAllowance()), and would count twice.
 // @param commands CV at the samples of the residuals; empty: no slope.
@@ -336,7 +336,7 @@ constexpr double kMaxSlowShare = 0.05;
 constexpr double kCoreQuantile = 0.05;
 constexpr double kSupportMargin = 1.0;  // standard deviations
 
-// What a detection needs to be beyond: the least of n_d values in a row.
+// A detection needs more than this: the least of n_d values in a row.
 std::vector<double> SustainedOf(const std::vector<double>& series, double sign,
                                 int samples) {
   Sustained last(samples);

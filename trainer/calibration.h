@@ -77,8 +77,8 @@ using ResidualSeries = std::vector<std::vector<double>>;
 /// All series one after another.
 std::vector<double> Joined(const ResidualSeries& series);
 
-/// What the slow part of a residual may add on another day, beyond what its
-/// hours show: the bound that a new day's mean exceeds with probability
+/// Amount that the slow part of a residual may add on another day, beyond what
+/// its hours show: the bound that a new day's mean exceeds with probability
 /// `share`,
 ///
 ///     t_ν(1 − share) s √(1 + 1/n),   s² = (ν₀ (κσ)² + Σ (m_i − m̄)²)/ν,

@@ -232,7 +232,7 @@ namespace {
 
 constexpr std::size_t kPieceToForget = 300;
 
-// Whether runs over the piece from both limits of the predictions meet.
+// True if runs over the piece from both limits of the predictions meet.
 bool RunsMeet(const TsModel& model, const Stretch& piece) {
   constexpr double kTolerance = 0.01;
   const double apart = kTolerance * (model.output_max - model.output_min);
@@ -256,7 +256,7 @@ Stretch Moved(Stretch piece, double mean, SignalRange range) {
   return piece;
 }
 
-// Whether the runs meet wherever in `range` the commands of the piece are.
+// True if the runs meet wherever in `range` the commands of the piece are.
 bool RunsMeetAnywhere(const TsModel& model, const Stretch& piece,
                       SignalRange range) {
   constexpr int kPlaces = 8;

@@ -321,7 +321,7 @@ class Iteration {
   double smallest_eigenvalue_{kMinPositive};
 };
 
-// Whether `a` is the better of two results.
+// True if `a` is the better of two results.
 bool Better(const FuzzyPartition& a, const FuzzyPartition& b) {
   if (a.separated != b.separated) {
     return a.separated;

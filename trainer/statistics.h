@@ -44,7 +44,7 @@ double PValue(const SignTest& test);
 /// Hours of a year, 365.25 days.
 inline constexpr double kHoursPerYear = 8766.0;
 
-/// How often something happened, and how often it may.
+/// Observed rate of an event, and its bound.
 struct EventRate {
   double per_year{0.0};
   double upper{0.0};  ///< 95 % bound [1/year], exact for a Poisson process.

@@ -74,7 +74,7 @@ struct RegressionData {
 
 class KnownClusters;
 
-/// How the rules are told apart.
+/// Way to tell the rules apart.
 enum class AntecedentKind {
   kProjected,    ///< Sets on each regressor: readable; the default.
   kProductSpace  ///< The distance to the cluster: keeps oblique ones oblique.

@@ -28,7 +28,7 @@ struct Window {
   std::vector<double> x;   ///< Position [% of travel]; empty: not measured.
   /// Sign of the process gain; 0: taken from what the controller does.
   int gain_sign{0};
-  /// Whether PV is a level or another integral of the flow, if that is known.
+  /// True if PV is a level or another integral of the flow; empty: not known.
   std::optional<bool> integrating;
   /// PV follows OP late, as a temperature does.
   bool lags{false};
@@ -75,7 +75,7 @@ struct Evidence {
   bool helpless{false};
   std::optional<Oscillation> oscillation;  ///< In OP; period in samples.
   std::optional<PlayFit> fit;              ///< PV, or X, over OP.
-  Standing standing;            ///< How X stands, for samples of 2 s or less.
+  Standing standing;            ///< Stops of X, for samples of 2 s or less.
   bool unrelated{false};        ///< X is noise, whatever OP does.
   double prediction_gain{0.0};  ///< LLR, the second witness.
   double increments{0.0};       ///< r² of PV as the integral of OP.
@@ -108,7 +108,7 @@ char ServiceOf(std::string_view name);
 /// Sets what the service of a loop (ServiceOf()) says of its PV.
 void SetService(char service, Window& window);
 
-/// Whether `op` can be % of its span: within -10 to 110.
+/// True if `op` can be % of its span: within -10 to 110.
 bool IsPercent(std::span<const double> op);
 
 /// Judges a window:

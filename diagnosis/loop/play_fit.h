@@ -5,7 +5,7 @@
 
 namespace fdi::loop {
 
-/// How much better PV follows OP through a play than without one.
+/// Compares how well PV follows OP through a play and without one.
 struct PlayFit {
   double linear{0.0};     ///< r² of the best fit without a play.
   double play{0.0};       ///< r² of the best fit with one.

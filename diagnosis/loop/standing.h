@@ -5,9 +5,9 @@
 
 namespace fdi::loop {
 
-/// How often X stays within 0.5 % for three samples and more, away from its
-/// ends and not always at one place, while OP behind the lag of X moves by 4 %
-/// and more: a rod that sticks and slips.
+/// Counts how often X stays within 0.5 % for three samples and more, away from
+/// its ends and not always at one place, while OP behind the lag of X moves by
+/// 4 % and more: a rod that sticks and slips.
 struct Standing {
   std::size_t times{0};
   double share{0.0};  ///< Share of the samples.

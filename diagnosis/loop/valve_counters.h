@@ -61,7 +61,7 @@ inline constexpr std::array<std::int64_t ValveCounts::*, 23> kValveCounts{
     &ValveCounts::single_t1,      &ValveCounts::single_x,
     &ValveCounts::single_f};
 
-/// How many single readings of a signal `counts` have.
+/// Number of single readings of a signal in `counts`.
 struct SingleReadings {
   Signal signal{Signal::kF};
   std::int64_t number{0};

@@ -20,7 +20,7 @@ enum class ActsOn : std::uint8_t {
   kInputs,       ///< P1, P2 or T1, or the readings of them.
 };
 
-/// How the effect grows with the strength.
+/// Growth of the effect with the strength.
 enum class Onset : std::uint8_t {
   kGradual,
   kStop,       ///< None until the rod meets a stop.
@@ -239,7 +239,7 @@ constexpr bool IsFinding(int number) {
   return number >= kFirstFinding && number <= kLastFinding;
 }
 
-/// Whether `number` is a finding of a loop audit.
+/// True if `number` is a finding of a loop audit.
 constexpr bool IsLoopFinding(int number) {
   return number >= kFirstLoopFinding && number <= kLastLoopFinding;
 }
@@ -255,7 +255,7 @@ inline constexpr auto kFaultsAndFindings = [] {
   return numbers;
 }();
 
-/// Whether `fault` is one of `faults`.
+/// True if `fault` is one of `faults`.
 bool Contains(const std::vector<int>& faults, int fault);
 
 /// The names of all faults, for messages and help: "f1..f19, t1, p1, p2".

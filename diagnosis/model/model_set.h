@@ -124,8 +124,8 @@ struct DecisionParameters {
   double early_error{0.0};
 };
 
-/// How often in a row a transmitter may repeat one reading; 0: not watched. See
-/// StuckReadings.
+/// Number of times in a row that a transmitter may repeat one reading; 0: not
+/// watched. See StuckReadings.
 struct StuckLimits {
   int t1{0};
   int p1{0};
@@ -221,7 +221,7 @@ constexpr bool Has(FaultSet faults, std::size_t bit) {
   return (faults >> bit & 1U) != 0;
 }
 
-/// How many findings its floor has; 0 without a floor.
+/// Number of findings of its floor; 0 without a floor.
 int FindingCount(const ModelSet& models);
 
 /// Appends the findings of the floor, if there is one, to the faults.

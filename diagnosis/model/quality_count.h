@@ -31,7 +31,7 @@ class QualityCount {
   std::array<std::uint64_t, kQualityCount> samples_{};
 };
 
-/// Whether `verdict` counts as time: repeated, late and superseded samples do
+/// True if `verdict` counts as time: repeated, late and superseded samples do
 /// not.
 inline bool CountsAsTime(const Verdict& verdict) {
   return !OutOfOrder(verdict.intake);

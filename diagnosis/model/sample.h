@@ -122,7 +122,7 @@ struct Sample {
   }
 };
 
-/// Whether the reading of `signal`, which is present, is physically possible:
+/// True if the reading of `signal`, which is present, is physically possible:
 /// in PlausibleRange() or, for an SP beside a PV, in that of the PV.
 bool IsPlausible(const Sample& sample, Signal signal);
 

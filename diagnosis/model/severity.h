@@ -10,7 +10,7 @@
 
 namespace fdi {
 
-/// How bad a fault is. The priority of its alarm follows from it.
+/// Severity of a fault. The priority of its alarm follows from it.
 enum class Severity : std::uint8_t { kLow, kMedium, kHigh, kCritical };
 inline constexpr int kSeverityCount = 4;
 

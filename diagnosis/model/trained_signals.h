@@ -22,7 +22,7 @@ inline Sample PositionAsCommand(Sample sample) {
   return sample;
 }
 
-/// How the models of a set read the samples of a valve: as if it measured no
+/// Makes the models of a set read the samples of a valve as if it measured no
 /// other signals than those that the set was trained with. They are those that
 /// its channels or its floor read, and P1, P2 and T1 where it knows their usual
 /// values or what a fault makes of them. A valve may measure more (onboarding

@@ -11,9 +11,9 @@ namespace fdi {
 /// Costs of waiting and of work at a valve. A missing figure is not known.
 struct ValveCosts {
   std::string currency{};              ///< "EUR"; of all figures.
-  std::optional<double> medium{};      ///< Of one t or m3 of what flows.
+  std::optional<double> medium{};      ///< For one t or m3 of what flows.
   FlowUnit flow{FlowUnit::kTPerHour};  ///< The unit of F that it fits.
-  std::optional<double> downtime{};    ///< Of an hour.
+  std::optional<double> downtime{};    ///< For an hour.
   std::optional<double> visit{};
 };
 

@@ -37,7 +37,7 @@ constexpr bool OutOfOrder(Intake intake) {
          intake == Intake::kSuperseded;
 }
 
-/// Whether the diagnosis can be relied upon, independent of the state.
+/// Tells how far the diagnosis can be relied upon, independent of the state.
 enum class Quality : std::uint8_t {
   kLive,
   kStale,  ///< No sample for 3 periods; set by the monitor's clock.
@@ -70,7 +70,7 @@ constexpr CoverageReasons BitOf(CoverageReason reason) {
   return static_cast<CoverageReasons>(1U << static_cast<unsigned>(reason));
 }
 
-/// What is known about an episode without an isolated fault.
+/// State of knowledge about an episode without an isolated fault.
 enum class Unknown : std::uint8_t {
   kNone,          ///< No episode, or a fault is isolated.
   kTooEarly,      ///< Known faults may still explain it.
@@ -86,7 +86,7 @@ enum class TransitionKind : std::uint8_t {
   kCleared,
   kClosed,
   kChanged,  ///< The priority rose. On the bus: kReisolated, the same faults.
-  kSecond,   ///< What is on top of the name has changed. On the bus likewise.
+  kSecond,   ///< The fault on top of the name has changed. On the bus likewise.
 };
 
 /// Gives an episode a name.
@@ -105,31 +105,31 @@ enum class EndReason : std::uint8_t {
   kUnknown,
 };
 
-/// What named the fault of an episode.
+/// The source of an episode's name.
 enum class Layer : std::uint8_t {
   kObservers,  ///< The engine: observers and limits.
   kPhysics,    ///< A simulation of the valve (second look).
   kAudit,      ///< The audit of the loop, without a model.
 };
 
-/// What comes on top of the fault that an episode is named after
+/// A fault on top of the one that an episode is named after
 /// (SecondFaultWatch).
 struct SecondFault {
   bool open{false};      ///< There is something.
   bool doubt{false};     ///< There may be: the name is to stay meanwhile.
-  FaultSet standing{0};  ///< What it is on top of.
+  FaultSet standing{0};  ///< The faults below it.
   std::size_t standing_bit{0};    ///< The likeliest of that,
   double standing_strength{0.0};  ///< and its strength, signed.
   std::int64_t detection_stamp_ns{0};
   FaultSet faults{0};    ///< Its name; empty: what it is cannot be told.
-  double strength{0.0};  ///< Of the likeliest of them.
+  double strength{0.0};  ///< The likeliest one's.
   double factor{0.0};    ///< The largest of theirs.
 };
 
 /// A slow drift of X (DriftWatch): the line through its mean residuals.
 struct SlowDrift {
   double now{0.0};    ///< At the end, signed [%]; 0: there is none.
-  double slope{0.0};  ///< Of the same sign [%/h].
+  double slope{0.0};  ///< With the same sign [%/h].
   double hours{0.0};  ///< For how long; less where the line was at zero.
 };
 
@@ -157,10 +157,10 @@ struct Transition {
   double lowest{0.0};    ///< Ends of its 95 % interval, equal if not known.
   double highest{0.0};   ///<
   std::optional<Severity> severity{};  ///< Nothing: heard on the bus.
-  EndReason reason{EndReason::kNone};  ///< Of kClosed.
+  EndReason reason{EndReason::kNone};  ///< For kClosed.
   Unknown unknown{Unknown::kNone};     ///< As in the verdict at that time.
-  Layer layer{Layer::kObservers};      ///< What named `faults`.
-  SecondFault second{};                ///< What came on top of them.
+  Layer layer{Layer::kObservers};      ///< The source of `faults`.
+  SecondFault second{};                ///< The fault on top of them.
   SlowDrift drift{};                   ///< Where `faults` is a drift.
 };
 

@@ -10,15 +10,15 @@
 
 namespace fdi {
 
-/// What is left of the residual of normal operation where its extrapolation and
-/// `margin` are taken away.
+/// The residual of normal operation that remains after its extrapolation and
+/// `margin` are subtracted.
 double CertainResidual(const ObserverBank& bank, int channel,
                        double margin = 0.0);
 
 /// Detects a fault: equation (1) on the residuals of the normal observer, and
 /// alike on their windows. Each test counts for itself, as its limits were
 /// fitted: noise that passes one limit now and another one next is no
-/// detection. What extrapolation put into a residual is taken away first.
+/// detection. The share due to extrapolation is subtracted first.
 ///
 /// Limits stay where training put them: a change over days is the growth of a
 /// fault, or that of a transmitter, and counts like any other.

@@ -16,7 +16,7 @@ inline constexpr double kMaxFitVariance = 10.0;
 /// The set says how faults that act fit (FitBounds).
 bool JudgesFit(const ModelSet& models);
 
-/// How an explanation fits, over the last t_k samples: the mean m and the mean
+/// Fit of an explanation over the last t_k samples: the mean m and the mean
 /// square q of z = r/√S by channel, |z| bounded at 5. A reading of which
 /// nothing is known, or that is beyond a limit of its transmitter as predicted,
 /// has no z; a channel with a z in less than half of the samples says nothing.
@@ -36,8 +36,8 @@ class FitWindow {
 
   bool full() const { return filled_ == length_; }
 
-  /// How far beyond its limits m or q of a channel is: 1 at a limit, 0 where
-  /// nothing is known. With fewer than t_k samples the limits are wider.
+  /// Ratio of m or q of a channel to its limits: 1 at a limit, 0 where nothing
+  /// is known. With fewer than t_k samples the limits are wider.
   double Excess(std::size_t channel, const FitBounds& limits) const;
 
   /// m; NaN where the channel says nothing.
@@ -68,7 +68,7 @@ class FitWindow {
   std::vector<Sums> sums_;
 };
 
-/// How much of what normal operation does not explain in a channel another
+/// Share of what normal operation does not explain in a channel that another
 /// explanation accounts for. With r_0 and r their residuals in deviations of
 /// the normal one, both scaled down where one of them is beyond 5,
 ///

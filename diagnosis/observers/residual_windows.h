@@ -43,12 +43,12 @@ class ResidualWindow {
 /// at four times that of training.
 double UpperLogRms(const WindowLimits& limits, const ResidualWindow& command);
 
-/// Whether the limits apply to a window: it is full, and its mean of CV is in
+/// True if the limits apply to a window: it is full, and its mean of CV is in
 /// the range that they were fitted to. Without CV they always apply.
 bool Applies(const WindowLimits& limits, const ResidualWindow& window,
              const ResidualWindow& command);
 
-/// Whether limits that apply are exceeded.
+/// True if limits that apply are exceeded.
 bool IsBeyond(const WindowLimits& limits, const ResidualWindow& window,
               const ResidualWindow& command);
 

@@ -11,7 +11,7 @@
 /// governance.p7s, cert.pem, key.pem and permissions.p7s (DDS Security 1.1).
 namespace fdi::idl {
 
-/// How long before its expiry a program warns about its key.
+/// A program warns about its key this long before the key expires.
 inline constexpr int kDaysOfWarning = 30;
 
 struct KeyInfo {

@@ -20,7 +20,7 @@
 namespace fdi::monitor {
 namespace {
 
-/// What a monitor with console and records has open, and as much for clients.
+/// Half for a monitor with console and records, half for its clients.
 constexpr int kDescriptors = 96;
 
 struct RunArguments {

@@ -212,7 +212,7 @@ std::string NoteText(const HistoryEntry& event) {
       return SecondText(event.value);
     }
     if (!event.value.empty()) {
-      return event.value;  // How a position drifts.
+      return event.value;  // The drift of a position.
     }
     return ByPhysics(event.layer) ? kByPhysics : event.reason;
   }

@@ -148,7 +148,7 @@ std::optional<std::string> RecorderElsewhere(const DataDirectory& data) {
          "replaced while it was open?";
 }
 
-// What the files of the data directory do not show by themselves.
+// Adds findings that the files of the data directory do not show.
 void AddElsewhere(const DataDirectory& data, Json& databases) {
   for (Json& finding : databases) {
     try {
@@ -268,7 +268,7 @@ std::int64_t NewestNs(const char* name, const std::filesystem::path& path) {
 }
 
 struct PruneOptions {
-  std::string url;  ///< Of the plant's history, or empty.
+  std::string url;  ///< The plant history's, or empty.
   AgeAndSize runs;
   AgeAndSize history;
   AgeAndSize health;

@@ -50,7 +50,7 @@ Json EntryJson(const ValveEntry& entry) {
           {"model_set", SetJson(entry.model_set)}};
 }
 
-// What the table of the plant says about a valve, and what watches it.
+// The row of a valve in the plant's table, and what watches it.
 Json LoopJson(const PlantLoop& loop) {
   return {{"loop", loop.name},
           {"about", findings::AboutJson(loop)},
@@ -213,7 +213,7 @@ void AddEntry(ModelStore& store, const ValveEntry& entry,
   AddComparison(baselines, report);
 }
 
-// What applies to one valve: the entry that matches it and its model set.
+// Shows the entry that matches one valve, and its model set.
 Report ShowValve(const std::string& valve_id, const Context& context) {
   ModelStore store(DataOf(context).models());
   const auto entry = store.FindValve(valve_id);

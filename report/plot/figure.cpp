@@ -207,7 +207,7 @@ class ScriptWriter {
     }
     return height;
   }
-  // Whether the time axis ends below this panel, because an axis of its own
+  // True if the time axis ends below this panel, because an axis of its own
   // follows.
   bool IsLastOnAxis(std::size_t p) const {
     return p + 1 == figure_.panels.size() || figure_.panels[p + 1].own_axis;

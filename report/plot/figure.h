@@ -34,7 +34,7 @@ inline constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
 
 enum class Dash { kSolid = 1, kDashed = 2, kDashDot = 4 };
 
-/// How the points of a series are drawn.
+/// Way to draw the points of a series.
 enum class Shape {
   kLine,
   kSteps,   ///< Each value holds until the next abscissa.

@@ -424,7 +424,7 @@ double Looker::Readings() const {
   return independent(physics_.x, positions) + independent(physics_.flow, flows);
 }
 
-// How unusual the inputs are, behind the detection, if the fault is there.
+// Cost of unusual inputs after the detection, if the fault is there.
 double Looker::InputCost(int fault, double strength, Course course,
                          const Trajectory& answers) const {
   const Instrumentation& i = valve_.instruments;
@@ -496,7 +496,7 @@ double Looker::InputCost(int fault, double strength, Course course,
 
 // A flow transmitter that goes wrong moves no command, unless the loop reads
 // it: one that moved with the fault tells against it. A line that loses its
-// flow does. How far it moved, in squared deviations.
+// flow does. Returns how far the command moved, in squared deviations.
 std::optional<double> Looker::CommandAway() const {
   // The gap is that of LoopObserver (valve_physics.cpp), which measures how far
   // this difference usually is from 0.
@@ -772,7 +772,7 @@ std::vector<Hypothesis> Looker::FitHypotheses(const std::stop_token& stop) {
       }
     }
   }
-  // How many of the best get another simulation in each round; the number of
+  // Number of the best that get another simulation in each round; the number of
   // simulations decides what a look costs.
   constexpr std::array<std::size_t, 8> kKept{12, 10, 7, 5, 5, 5, 5, 5};
   for (std::size_t round = 0; round < kKept.size(); ++round) {

@@ -24,7 +24,7 @@ struct InputBand {
   double sd{1.0};     ///< > 0.
 };
 
-/// How the loop moves the command while the valve is healthy.
+/// Movement of the command by the loop while the valve is healthy.
 struct LoopHabit {
   /// Deviation of how far the mean command of a minute is from that of the two
   /// minutes before [%]; 0: not known.

@@ -85,7 +85,7 @@ std::filesystem::path WalPath(std::filesystem::path database) {
   return database += "-wal";
 }
 
-// Whether a reader must do without SQLite's shared memory, and can: the file is
+// True if a reader must do without SQLite's shared memory, and can: the file is
 // open nowhere, because whoever has it open has a WAL beside it.
 bool IsImmutable(const std::filesystem::path& path, Access access) {
   const auto folder = path.has_parent_path() ? path.parent_path() : ".";

@@ -61,7 +61,7 @@ class SqliteError : public std::runtime_error {
   int code_;
 };
 
-/// How a connection uses its file. SQLite before 3.51.3 may corrupt a WAL
+/// Use of a file by a connection. SQLite before 3.51.3 may corrupt a WAL
 /// database if two connections write or checkpoint at the same moment. So every
 /// write transaction holds a lock on `<file>.gate`, and only a kWriter
 /// checkpoints, while holding it. (The last connection to close checkpoints,

@@ -30,7 +30,7 @@ class ExclusiveLock {
   int file_{-1};
 };
 
-/// How long a connection waits for other writers.
+/// Time that a connection waits for other writers.
 inline constexpr std::chrono::milliseconds kWritePatience{5000};
 
 /// Lets one connection at a time write or checkpoint a database, across

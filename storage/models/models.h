@@ -85,7 +85,7 @@ struct Lineage {
   std::vector<TrainingEpisode> episodes;  ///< Including those of the parent.
 };
 
-/// Whether the models of a valve match its current epoch.
+/// Tells if the models of a valve match its current epoch.
 enum class BaselineState : std::uint8_t {
   kNone,         ///< Not onboarded: the user is responsible.
   kProvisional,  ///< Onboarded in an earlier epoch: not isolated.
@@ -169,7 +169,7 @@ struct ValveEntry {
   }
 };
 
-/// Whether a stored version becomes the active one of its name.
+/// Tells if a stored version becomes the active one of its name.
 enum class Activation {
   kIfFirst,  ///< Only if no version of that name is active.
   kAlways,

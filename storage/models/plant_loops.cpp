@@ -60,7 +60,7 @@ std::optional<ModelSet> ModelStore::Store(const ValveResult& result) {
     }
   }
   if (!valve.empty()) {
-    // What a person entered stays, but for what the record shows better.
+    // A person's entries stay, except where the record knows better.
     ValveEntry entry = IsEntry(valve) ? RequireEntry(valve) : result.entry;
     if (saved) {
       entry.flow_unit = result.entry.flow_unit;

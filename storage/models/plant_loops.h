@@ -11,7 +11,7 @@
 
 namespace fdi::storage {
 
-/// How a loop of the plant is watched.
+/// Way to watch a loop of the plant.
 enum class LoopWatch : std::uint8_t {
   kNothing,
   kAudit,   ///< The audit of loops: no model set is needed.
@@ -19,7 +19,7 @@ enum class LoopWatch : std::uint8_t {
 };
 std::string_view LoopWatchName(LoopWatch watch);  ///< "nothing", ...
 
-/// How far a row of the plant's table has come.
+/// Progress of a row of the plant's table.
 enum class LoopState : std::uint8_t {
   kExpected,   ///< Listed; its record was not read yet.
   kOnboarded,  ///< Has a model set.

@@ -106,7 +106,7 @@ std::uint64_t CorrectionBits(const ValuePredictor& predictor,
   return bits;
 }
 
-/// Whether `hint` is as good as the result of a search: fewer decimals would
+/// True if `hint` is as good as the result of a search: fewer decimals would
 /// not do; a grid is met within a bit per value.
 bool StillFits(const ValuePredictor& hint, std::span<const double> values) {
   if (hint.kind == ValuePredictor::kGrid) {

@@ -53,7 +53,7 @@ VALUES (?, ?, ?, ?, ?, ?, ?, ?)
 -- name: tail_of_run
 SELECT count, codec, crc, bytes, first FROM tail WHERE run_id = ?
 ORDER BY first
--- Of the tables chunk and tail, whose name and this condition follow.
+-- Serves the tables chunk and tail, whose name and this condition follow.
 -- name: bundles
 SELECT count, codec, crc, bytes, first FROM
 -- name: bundles_between

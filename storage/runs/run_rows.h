@@ -27,7 +27,7 @@ class RecorderLiveness {
 
   /// Makes this object represent recorder `id` until it is destroyed.
   void Claim(std::int64_t id);
-  /// Whether another object, in this or another process, has claimed `id`.
+  /// True if another object, in this or another process, has claimed `id`.
   bool IsAlive(std::int64_t id) const;
 
   /// Like IsAlive(), for callers without write permission on the file.

@@ -66,8 +66,8 @@ class SampleCursor : public sqlite3_vtab_cursor {
   std::string schema_;
   Window window_;
   Rows runs_;
-  std::array<Rows, 2> bundles_;  // Of the chunks and of the tail.
-  std::size_t table_{0};         // Of these; 2: the run is done.
+  std::array<Rows, 2> bundles_;  // The chunks' and the tail's.
+  std::size_t table_{0};         // Index into these; 2: the run is done.
   std::int64_t run_{0};
   std::string run_id_;
   std::string valve_id_;

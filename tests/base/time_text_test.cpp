@@ -107,7 +107,7 @@ TEST_F(TimeTextTest, ANameOfAZoneKeepsItsSummerTime) {
 struct Shown {
   const char* text;
   const char* utc;    // "none": the clock never showed it.
-  const char* after;  // Of an hour that is shown twice: the row before.
+  const char* after;  // For an hour shown twice: the row before.
 };
 
 std::string UtcOf(const LocalClock& clock, const Shown& shown) {

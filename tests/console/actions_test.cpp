@@ -1,4 +1,4 @@
-// What people do to alarms over HTTP.
+// Actions of people on alarms over HTTP.
 #include <gmock/gmock.h>
 
 #include "tests/console/http_fixture.h"

@@ -7,7 +7,7 @@ const require = createRequire(process.env.FDI_NODE_MODULES + '/');
 const {chromium} = require('playwright-core');
 const axe = require('axe-core');
 
-// What nginx asks for (nginx.sh). Nobody vouches for its key.
+// The login that nginx asks for (nginx.sh). Nobody vouches for its key.
 const kEngineer = userOptions('engineer');
 
 /** Options of open() for another user. */
@@ -63,7 +63,7 @@ async function show(context, address, hash) {
   page.faults = [];
   page.hosts = new Set();
   page.on('pageerror', (error) => page.faults.push(error.stack));
-  // What the policy of the page forbids never becomes a request.
+  // The browser never sends a request that the policy of the page forbids.
   page.on('console', (message) => {
     if (message.text().includes('Content Security Policy')) {
       page.faults.push(message.text());
@@ -83,8 +83,8 @@ export async function setScheme(page, scheme) {
 }
 
 /**
- * What axe has against the page: "rule: elements". With `coloursOnly` what may
- * differ between light and dark alone.
+ * Complaints of axe about the page: "rule: elements". With `coloursOnly` what
+ * may differ between light and dark alone.
  */
 export async function accessibilityFaults(page, coloursOnly = false) {
   if (!await page.evaluate(() => 'axe' in window)) {

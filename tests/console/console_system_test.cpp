@@ -174,7 +174,7 @@ class ConsoleTest : public MonitorFixture {
   }
 
   std::optional<NginxFront> nginx_;
-  int port_{0};  // Of nginx.
+  int port_{0};  // The port of nginx.
 };
 
 TEST_F(ConsoleTest, AFaultIsOnTheStreamWithinTwoSecondsOfItsEvent) {
@@ -388,7 +388,7 @@ TEST_F(ConsoleTest, OnlyUsersComeThroughAndOnlyByTheRightName) {
     EXPECT_EQ(https.Get(path)->status, 401) << path;
   }
   https.set_basic_auth("engineer", kPassword);
-  // What a client says of itself does not count.
+  // A client's word about itself does not count.
   const auto status = https.Get("/api/v1/status", {{"X-FDI-User", "eve"},
                                                    {"X-FDI-Role", "view"},
                                                    {"X-FDI-Secret", "guess"}});

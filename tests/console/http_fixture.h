@@ -123,7 +123,7 @@ class ConsoleRoutesTest : public storage::HistoryFixture {
   std::string Origin() const {
     return "http://127.0.0.1:" + std::to_string(port_);
   }
-  /// What was logged since this was called last.
+  /// The log since this was called last.
   std::string TakeLog() {
     const std::lock_guard lock(log_mutex_);
     return std::exchange(log_, {});

@@ -29,7 +29,7 @@ inline int FreePort() {
   return ntohs(address.sin_port);
 }
 
-/// Whether something listens there.
+/// True if something listens there.
 inline bool Listens(int port) {
   const int file = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
   sockaddr_in address{};

@@ -1,4 +1,4 @@
-// What the console tells over HTTP, and to whom.
+// Answers of the console over HTTP, and who gets them.
 #include <algorithm>
 #include <array>
 #include <cmath>

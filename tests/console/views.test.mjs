@@ -1001,7 +1001,7 @@ test('every kind of tile can be read, at any size, light and dark',
           for (const cell of await page.locator('td.check').all()) {
             assert.ok((await cell.boundingBox()).width > 250, hash);
           }
-          // What is there to act must not have to be scrolled to.
+          // Buttons must be in sight without scrolling.
           const hidden = await page.locator('.row-actions button')
               .evaluateAll((nodes) => nodes.filter((node) =>
                 node.getBoundingClientRect().right > innerWidth)

@@ -276,7 +276,7 @@ TEST(CoverageTest, OpenEpisodeWaitsOutside) {
   EXPECT_EQ(back.transitions.back().reason, EndReason::kCleared);
 }
 
-// What was off when the episode was judged need not be in order first.
+// A signal that was off when the episode was judged need not recover first.
 TEST(CoverageTest, SignalAtFaultDoesNotKeepItsEpisodeFromBeingJudged) {
   ValveEngine engine = Engine();
   Follow(engine, 0, 100, Constantly({}));

@@ -58,7 +58,7 @@ double Stepped(int k) {
   return k < 300 ? 0.0 : 1.2;
 }
 
-// Whether what `residual` makes of X until sample `end` is a drift there.
+// The drift, if there is one, in the residuals of X until sample `end`.
 std::optional<SlowDrift> Begun(const ModelSet& models,
                                const std::function<double(int)>& residual,
                                int end = 301, std::uint32_t beyond = kOfX) {

@@ -105,7 +105,7 @@ TEST_F(EpisodeTest, AnotherSetHasToHoldWithoutTheValveLookingNormal) {
   EXPECT_EQ(other->faults, kF3);
 }
 
-// Of a set that allows for interpolation: an episode is long after 80 samples,
+// A set that allows for interpolation: an episode is long after 80 samples,
 // which are a day.
 ModelSet SlowPlant() {
   ModelSet models = LinearPlant();
@@ -204,7 +204,7 @@ TEST_F(EpisodeTest, ANameThatIsGivenUpSaysWhy) {
   EXPECT_EQ(verdict_.unknown, Unknown::kTooEarly);
 }
 
-// What the floor found is the name of what goes on, not of what came before it.
+// A finding of the floor names what goes on, not what came before it.
 TEST_F(EpisodeTest, AFindingThatIsOverIsNotTheNameOfWhatGoesOn) {
   ModelSet models = LinearPlant();
   models.floor.emplace();
@@ -223,7 +223,7 @@ TEST_F(EpisodeTest, AFindingThatIsOverIsNotTheNameOfWhatGoesOn) {
   // A valve that looks healthy by now keeps the name of what it had.
   EXPECT_FALSE(Found(0, 1.0, 2 * last));
   EXPECT_EQ(verdict_.isolated, second);
-  // What comes and goes is not over.
+  // A finding that comes and goes is not over.
   for (int i = 0; i < 4; ++i) {
     EXPECT_FALSE(Found(0, 0.0, last - 1));
     EXPECT_FALSE(Found(second, 0.0, 1));

@@ -91,7 +91,7 @@ TEST(AccountedShareTest, TellsAnExplanationFromOneThatOnlyTolerates) {
   }
   EXPECT_FALSE(healthy.tells(20));
   EXPECT_FALSE(few.tells(20));
-  // What was long ago counts no more.
+  // Old samples count no more.
   for (int k = 0; k < 400; ++k) {
     few.Fade(0.99);
     few.Push(9.0, 0.0);

@@ -105,7 +105,7 @@ int Of(int finding, const std::vector<int>& first) {
 
 const std::vector<int> kNothing(Floor::kTests, -1);
 
-// What passes a rod at x [%], up to the end of the meter; little where it
+// The flow past a rod at x [%], up to the end of the meter; little where it
 // shuts.
 double Passes(double x) {
   return x > 95.0 ? 5.0 : std::min(100.0 * std::exp(-0.02 * x), 60.0);

@@ -138,7 +138,7 @@ TEST(GrowthTest, OnlyPointsOfTheFaultAndOfItsLastLayerCount) {
   EXPECT_FALSE(GrowthOf(points, 7));
 }
 
-// Of points seven minutes apart, which share readings, the latest count.
+// If points seven minutes apart share readings, the latest counts.
 TEST(GrowthTest, PointsThatShareReadingsCountOnce) {
   auto points = Hourly({0.1, 0.2, 0.3, 0.4, 0.5});
   points.insert(points.begin() + 4, Point(4.0 - 6.9 / 60, 9.0));

@@ -68,7 +68,7 @@ class PlantRun {
     }
   }
 
-  // What a look calls the episode at sample k.
+  // Sets the name that a look gives the episode at sample k.
   void Name(std::function<NameBeside(int)> name) { name_ = std::move(name); }
 
   const Verdict& last() const { return last_; }

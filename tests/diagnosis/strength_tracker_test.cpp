@@ -23,7 +23,7 @@ using tests::PlantSample;
 constexpr std::size_t kF3First = 3;  // observers of LinearPlant()
 constexpr std::size_t kF6First = 5;
 
-// What FaultBank does for one fault.
+// Acts as FaultBank does for one fault.
 class Explanation {
  public:
   Explanation(const ModelSet& models, const std::vector<std::size_t>& observers)

@@ -382,8 +382,8 @@ TEST(ValveEngineTest, AFaultThatOnlyToleratesWhatIsSeenIsNeverSure) {
   }
 }
 
-// f3 and f6 are told apart by the command: at 50 % they are the same. What is
-// not told apart is a set, and a set is narrowed once one of it is refuted.
+// f3 and f6 are told apart by the command: at 50 % they are the same. Such
+// faults are a set, and a set is narrowed once one of it is refuted.
 TEST(ValveEngineTest, WhatIsNotRefutedIsNamedOnceAllOthersAre) {
   for (const double swing : {20.0, 0.0}) {
     for (const double error : {1e-3, 0.0}) {

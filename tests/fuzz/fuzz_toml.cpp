@@ -13,7 +13,7 @@
 
 namespace {
 
-// What was taken, and written as text, is taken again.
+// A text that was taken is taken again after it was written as text.
 void ReadScenario(const std::string& text) {
   fdi::simulator::Scenario scenario;
   fdi::TomlReader file(text, "fuzz.toml");

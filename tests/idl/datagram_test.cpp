@@ -19,7 +19,7 @@ namespace {
 
 using Bytes = std::vector<std::uint8_t>;
 
-// Of eProsima: the library looks for statistics in theirs only.
+// eProsima's header: the library looks for statistics in theirs only.
 Bytes Header() {
   constexpr std::uint8_t kStart[] = {'R', 'T', 'P', 'S', 2, 2, 1, 15};
   Bytes bytes(20, 7);
@@ -79,7 +79,7 @@ Bytes StatisticsInFront() {
   return With(With(Header(), 0x80, Zeros(56)), 0x01, Zeros(4));
 }
 
-// What Cyclone DDS sends when an instance ends: no data, and no hash of the
+// Cyclone DDS sends this when an instance ends: no data, and no hash of the
 // key.
 TEST(DatagramTest, ABareKeyIsDeclaredAsData) {
   constexpr std::uint8_t kEnd = 0x0b;    // Little endian, parameters, key.
@@ -207,7 +207,7 @@ TEST(DatagramTest, SequenceNumbersAreThoseOfWriters) {
 TEST(DatagramTest, NoWriterLeapsAhead) {
   WriterPace pace;
   Bytes source = Zeros(20);
-  source.back() = 1;  // Of the prefix.
+  source.back() = 1;  // A byte of the prefix.
   const Bytes other = With(Header(), 0x0c, source);
   const Bytes first = Zeros(8) + Sequence(4, 1) + Sequence(4, 9) + Zeros(4);
   const Bytes ahead = Zeros(8) + Sequence(0, 1) + Sequence(0, 1) + Zeros(4);
@@ -262,7 +262,7 @@ TEST(WriterPaceTest, AWriterIsAheadByWhatItCanHaveWritten) {
   now += hours(24);
   EXPECT_FALSE(pace.Admit(writer, number + 10'000 * kMillion, 0, now));
   EXPECT_TRUE(pace.Admit(writer, number += 8'000 * kMillion, 0, now));
-  // What it did not use of a day is no start for a leap.
+  // The unused part of a day is no start for a leap.
   EXPECT_TRUE(pace.Admit(writer, number + 1, 0, now += hours(24)));
   EXPECT_FALSE(pace.Admit(writer, number + 2 * kMillion, 0, now));
 }

@@ -267,7 +267,7 @@ TEST_F(DeliveryTest, SamplesWithAndWithoutPvComeInOrderFromOnePublisher) {
   OrderCheck check;
   std::map<std::string, std::uint64_t> pvs;
   std::map<std::string, std::uint64_t> last_writer;
-  std::map<std::string, int> changes;  // Of the writer, the first included.
+  std::map<std::string, int> changes;  // By the writer, the first included.
   std::set<std::string> ended;
   Handlers<ValveSampleMessage> handlers = check.AsHandlers();
   handlers.on_message = [&, each = handlers.on_message](

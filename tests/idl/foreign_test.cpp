@@ -1,4 +1,4 @@
-// What publishers that are not ours may send.
+// Messages that publishers of other vendors may send.
 #include <fastdds/dds/publisher/DataWriter.hpp>
 #include <fastdds/dds/publisher/Publisher.hpp>
 #include <gtest/gtest.h>

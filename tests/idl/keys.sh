@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# The script fdi-keys: what it makes is what openssl accepts, and what it is not to
-# do it refuses. Whether a participant with such a key is served: security_test.
+# Tests the script fdi-keys: openssl accepts what it makes, and it refuses what it
+# must not do. The test security_test covers service to such a key.
 # Usage: keys.sh FOLDER-OF-PROGRAMS
 set -euo pipefail
 keys=$(realpath "$1")/fdi-keys
@@ -37,7 +37,7 @@ grep -q '^monitor-1  *monitor  *-  *20' out || fail "add said: $(cat out)"
 "$keys" add keys gateway-1 --role=gateway --partition=hall-1,hall-2 >out
 "$keys" add keys late --role reader --days 1000 >out
 
-# What is made holds.
+# The files that it makes are sound.
 [ "$(mode keys/ca.key) $(mode keys/late/key.pem)" = '600 600' ] ||
   fail 'a private key is open to others'
 [ "$(mode keys/ca.pem) $(mode keys/late/cert.pem)" = '644 644' ] ||

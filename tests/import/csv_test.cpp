@@ -454,7 +454,7 @@ TEST(CsvTest, WhatIsSkippedTellsNothingAboutTheDecimalSign) {
   EXPECT_DOUBLE_EQ(table.runs.at(0).samples.at(0).sample[Signal::kX], 2.25);
 }
 
-// Of a long table in UTF-16, with an hour that clocks show twice.
+// A long table in UTF-16, with an hour that clocks show twice.
 TEST(CsvTest, TagsOfALongTableAreResampledAndWhatIsFilledIsMarked) {
   CsvOptions options;
   options.map.long_table = LongTable{"Tag", "Wert", "Q"};

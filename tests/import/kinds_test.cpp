@@ -628,7 +628,7 @@ TEST(KindsTest, AColumnNamedUtcNeedsNoZone) {
   EXPECT_EQ(zone("UTC Time", given), "Europe/Warsaw");
 }
 
-// Of a day that nothing in the file says: --start does.
+// Nothing in the file says the day: --start does.
 TEST(KindsTest, TimesWithoutADateCountFromTheStart) {
   // "23:59:07" of "23:mm:ss", minutes and seconds.
   const auto part = [](std::string form, std::size_t minute,

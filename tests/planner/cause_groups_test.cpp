@@ -145,7 +145,7 @@ TEST_F(CauseGroupsTest, CauseIsToldOnceItIsStoredAndOverARestart) {
   EXPECT_TRUE(failures_.empty());
 }
 
-// What cannot be stored of a cause costs no event.
+// A cause that cannot be stored costs no event.
 TEST_F(CauseGroupsTest, ACauseThatCannotBeStoredIsAFailureOfItsOwn) {
   Open();
   {

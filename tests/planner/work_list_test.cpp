@@ -195,7 +195,7 @@ TEST_F(WorkListTest, WhereOnlyTheDataEndedTheFaultStands) {
       HasSubstr("stands for 1 min, not confirmed for less than a minute"));
 }
 
-// What is only detected is not "unlike any known fault", nor of strength 0.
+// A mere detection is not "unlike any known fault", nor of strength 0.
 TEST_F(WorkListTest, WhatHasNoNameYetIsSaidSo) {
   writer_.Record(
       Event(TransitionKind::kDetected, 0, 0, 0.3, EndReason::kNone, "V4"),
@@ -563,7 +563,7 @@ TEST_F(WorkListTest, WhatIsNotJudgedIsListedWithItsReason) {
   EXPECT_EQ(unjudged[3]["reason"], "PV is constant");
 }
 
-// Of the whole period, a week without data would hardly show.
+// In the whole period, a week without data would hardly show.
 TEST_F(WorkListTest, JudgedIsSaidOfTheLastWeek) {
   Judge("A", 20);
   query_.now_ns = kDetected + 30 * kDay;

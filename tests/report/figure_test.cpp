@@ -1,4 +1,4 @@
-// What a picture shows, and the script that draws it.
+// The content of a picture, and the script that draws it.
 #include <chrono>
 #include <cmath>
 #include <cstdlib>
@@ -315,7 +315,7 @@ TEST_F(EpisodeFigureTest, FaultsHaveFactorsFromTheDetectionOn) {
   EXPECT_FALSE(std::isnan(normal[29]));
 }
 
-// Of F(CV) the residual is small, and only its mean over 30 samples passes a
+// The residual of F(CV) is small, and only its mean over 30 samples passes a
 // limit when the episode begins.
 TEST_F(EpisodeFigureTest, TheWindowThatMadeTheDetectionIsDrawnWithItsLimits) {
   EpisodeEvidence evidence = Evidence();

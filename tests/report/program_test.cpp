@@ -463,7 +463,7 @@ TEST(ProgramTest, ExamplesStandBelowTheHelpOfTheirVerb) {
   EXPECT_THROW(program.AddExamples({{"gret", {}}}), std::logic_error);
 }
 
-// What --check-examples reports.
+// The report of --check-examples.
 std::string FindingsOf(const std::vector<Example>& examples) {
   Program program("prog", "A program");
   CLI::App& greet =

@@ -93,7 +93,7 @@ TEST(StopSignalsTest, HangUpThatNohupIgnoresStaysIgnored) {
   std::signal(SIGHUP, previous);
 }
 
-// What a program in a terminal of its own gets once `hang_up` was called.
+// The event that a program in a terminal of its own gets after `hang_up`.
 Event EventInTerminal(sighandler_t before,
                       const std::function<void(int&, pid_t)>& hang_up) {
   int terminal = -1;

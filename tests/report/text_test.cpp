@@ -170,7 +170,7 @@ class StalledStderr {
   StalledStderr(const StalledStderr&) = delete;
   StalledStderr& operator=(const StalledStderr&) = delete;
 
-  // What is in the pipe by now.
+  // Reads what is in the pipe by now.
   std::string Read() const {
     std::string text;
     std::array<char, 4096> part{};

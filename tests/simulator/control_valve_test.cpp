@@ -156,7 +156,7 @@ TEST(ControlValveTest, FrictionHoldsTheRodInsideItsBand) {
   EXPECT_LT(held, 5900);
 }
 
-// Of so little friction 2 % are below the error of the integration: the rod
+// With so little friction, 2 % are below the error of the integration: the rod
 // would start and stop for ever.
 TEST(ControlValveTest, HardlyAnyFrictionIsLikeNone) {
   for (const double scale : {1.0, 10.0}) {

@@ -1,5 +1,5 @@
-// What each of the nineteen faults must do to X and F of the Lublin valve under
-// the benchmark's sine, noise off, against the healthy run.
+// Each of the nineteen faults must change X and F of the Lublin valve in its
+// way under the benchmark's sine, noise off, against the healthy run.
 #include <cmath>
 #include <set>
 #include <vector>

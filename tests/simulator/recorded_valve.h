@@ -14,7 +14,7 @@ namespace fdi::simulator {
 
 inline constexpr std::size_t kLeadIn = 120;
 
-/// What the transmitters of a valve read while its command is set anew every
+/// Readings of the transmitters of a valve while its command is set anew every
 /// 10 s; `faults` act from row kLeadIn on, as does the loop, which then moves
 /// the command by `moved`.
 inline std::vector<RecordRow> Recording(
@@ -46,7 +46,7 @@ inline std::vector<RecordRow> Recording(
   return rows;
 }
 
-/// Of that valve, as onboarding finds it.
+/// Physics of that valve, as onboarding finds it.
 inline const ValvePhysics& Physics() {
   static const ValvePhysics physics = DescribeValve(
       ParameterSet("lublin-actuator-3"), {}, {Recording(1200, 1, {})});

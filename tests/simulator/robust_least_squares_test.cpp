@@ -114,7 +114,7 @@ TEST(ValveUnknownsTest, TheTrimFollowsFromPositionAndFlowAlone) {
   const Trim trim = RegressTrim({record}, ParameterSet("lublin-actuator-3"));
   EXPECT_NEAR(trim.kv_m3_h, 80.0, 0.01);
   EXPECT_NEAR(trim.exponent, 4.2, 1e-4);
-  // What is filled in does not count, of X or of F.
+  // Filled-in readings of X or F do not count.
   for (int k = 0; k < 40; ++k) {
     record.rows.push_back(record.rows[static_cast<std::size_t>(k)]);
     RecordRow& row = record.rows.back();

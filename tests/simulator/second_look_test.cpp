@@ -78,7 +78,7 @@ INSTANTIATE_TEST_SUITE_P(
     ::testing::Values(std::pair{Explanation{13, 0.2}, Explanation{1, 0.5}},
                       std::pair{Explanation{1, 0.4}, Explanation{19, -0.3}}));
 
-// Of rod, readings and an input that is read wrong.
+// Faults of the rod, of readings, and of an input that is read wrong.
 TEST(SecondLookTest, AStandingFaultByItselfIsWhatIsExpected) {
   for (const Explanation& standing :
        {Explanation{1, 0.4}, Explanation{13, 0.2}, Explanation{19, -0.3},
@@ -318,7 +318,7 @@ TEST(SecondLookTest, ManagesWithoutAPosition) {
   EXPECT_NEAR(f19->strength, 0.4, 0.05);
 }
 
-// What a flow wanders by in slow data lasts for longer than a look: all of its
+// A flow that wanders in slow data does so for longer than a look: all of its
 // rows are one reading, not a part of one.
 TEST(SecondLookTest, AWindowWithinTheCorrelationIsOneReading) {
   ValvePhysics physics = Physics();
@@ -478,7 +478,7 @@ TEST(ValvePhysicsTest, FilledInReadingsDoNotCountInTheScatter) {
               0.5 * Physics().x.correlation_time);
 }
 
-// Of a controller that reads F, its noise moves the command in the next row.
+// If a controller reads F, its noise moves the command in the next row.
 // The record has every `hold`-th reading of F.
 LoopHabit HabitOf(double gain, int hold = 1) {
   NormalSource noise(5, 1);
@@ -515,17 +515,17 @@ TEST(ValvePhysicsTest, SeesAControllerThatReadsTheFlow) {
   EXPECT_TRUE(HabitOf(1.0).reads_flow);
   EXPECT_TRUE(HabitOf(0.2).reads_flow);
   EXPECT_GT(HabitOf(0.0).command_sd, 1.0);
-  EXPECT_TRUE(Physics().loop.reads_flow);  // Of so few rows not known.
+  EXPECT_TRUE(Physics().loop.reads_flow);  // Too few rows to know better.
 }
 
-// Of too few readings it is not known, however many rows are filled in.
+// Too few readings do not tell, however many rows are filled in.
 TEST(ValvePhysicsTest, DoesNotMissItBetweenFilledInReadingsOfTheFlow) {
   EXPECT_TRUE(HabitOf(1.0, 5).reads_flow);
 }
 
 TEST(SecondLookTest, ACommandThatMovedTellsAgainstTheFlowTransmitter) {
   const LookWindow window = Window({Abrupt(2, 0.5)}, 2, -12.0);
-  // How far f19 is behind f2.
+  // Distance of f19 behind f2.
   const auto behind = [&window](const LoopHabit& loop) {
     ValvePhysics physics = Physics();
     physics.loop = loop;
@@ -587,8 +587,8 @@ TEST(LookAnswerTest, KeepsPerforationBesideASupplyDropWhereSupplyDecides) {
   EXPECT_EQ(NamesOf(AnswerOf(look), true), std::vector{16});
 }
 
-// What neither a fault nor health explains is not for observers that were made
-// by the same simulation.
+// If neither a fault nor health explains the data, observers made by the same
+// simulation cannot either.
 TEST(LookAnswerTest, IsUnknownWhereNotEvenNoFaultFits) {
   const auto outcome = [](double misfit) {
     return AnswerOf(Looked({{12, 0.0}, {0, 10.0}}, misfit)).outcome;
@@ -858,8 +858,8 @@ TEST(EpisodeLooksTest, SlowDataAreLookedAtLaterAndNotMoreOften) {
                      {220, true}, {240, false}, {350, false}, {500, false}}));
 }
 
-// Of an episode that goes on behind a gap, the valve is looked at again as soon
-// as after a detection: it may be another one.
+// If an episode goes on after a gap, the valve is looked at again as soon as
+// after a detection: it may be another one.
 TEST(EpisodeLooksTest, BehindAGapALookDoesNotWait) {
   EpisodeLooks looks(Looker());
   std::vector<int> due;

@@ -33,7 +33,7 @@ struct Case {
   std::string name;
   Signal signal;
   double span;
-  double digit;  // Of the converter.
+  double digit;  // The converter's.
 };
 const std::vector<Case> kCases{{"t1", Signal::kT1, 200.0, 200.0 / 65535.0},
                                {"p1", Signal::kP1, 4000.0, 4000.0 / 65535.0},

@@ -37,7 +37,7 @@ std::vector<InputRow> BusyInputs(std::size_t count, std::uint64_t seed,
   return rows;
 }
 
-// What the transmitters of such a valve record, noise on.
+// Records the readings of such a valve's transmitters, noise on.
 HealthyRecord Recording(const ValveParameters& parameters, std::size_t count,
                         std::uint64_t seed, bool interpolated = false,
                         double jitter_pct = 0.8) {

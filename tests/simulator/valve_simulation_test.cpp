@@ -48,7 +48,7 @@ struct Shift {
   double f;
 };
 
-// What a fault from t = 0 adds to the means of X and F at the operating point,
+// Change of the means of X and F at the operating point by a fault from t = 0,
 // noise off and the same disturbances.
 Shift ShiftBy(int fault, double strength) {
   ValveSimulationConfig config = PaperConfig(400.0);

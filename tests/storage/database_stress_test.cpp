@@ -1,4 +1,4 @@
-// What may happen to a file while a service uses it.
+// Events that a file may meet while a service uses it.
 
 #include <chrono>
 #include <fstream>
@@ -152,7 +152,7 @@ TEST_F(DatabaseStressTest, AFolderThatCannotBeWrittenIsRefusedByName) {
   EXPECT_FALSE(std::filesystem::exists(data_.runs()));
 }
 
-// What SQLite needs beside the file goes with the last who has it open.
+// SQLite's files beside the database go when the last user closes it.
 TEST_F(DatabaseStressTest, AReaderWhoMayNotWriteIsToldWhatToDo) {
   { const HistoryWriter writer(data_.history()); }
   // As a kill leaves it: with what no reader may fold in.

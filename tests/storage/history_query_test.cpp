@@ -59,8 +59,8 @@ TEST_F(HistoryQueryTest, EveryFilterWalksAnIndex) {
   }
 }
 
-// What a publisher stamps 1970 or 2049 and comes now is among what happened
-// now.
+// An event that comes now counts as of now, though its publisher stamps it 1970
+// or 2049.
 TEST_F(HistoryQueryTest, WhatArrivedInTheTimeIsListedWhereThatIsAskedFor) {
   constexpr std::int64_t kYears = 20LL * 365 * 86400 * kSecond;
   for (const std::int64_t off_ns : {-kYears, kYears, 60 * kSecond}) {

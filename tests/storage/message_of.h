@@ -4,7 +4,7 @@
 
 namespace fdi::storage {
 
-/// What the Error says that `call` throws.
+/// Message of the Error that `call` throws.
 template <typename Error, typename Call>
 std::string MessageOf(Call&& call) {
   try {

@@ -166,8 +166,8 @@ class RunRetentionTest : public testing::Test {
   const std::filesystem::path file_{directory_.path() / "runs.db"};
 };
 
-// What a publisher stamps 1970 or 2049 is as old as its arrival, which is the
-// time at which this test runs.
+// A run that a publisher stamps 1970 or 2049 is as old as its arrival, which is
+// the time at which this test runs.
 TEST_F(RunRetentionTest, AgeIsThatOfTheArrivalWhereAClockWasWrong) {
   RunRecorder recorder(file_);
   const auto now_day = static_cast<int>((NowNs() - kStart) / kDay);
@@ -189,7 +189,7 @@ TEST_F(RunRetentionTest, AgeIsThatOfTheArrivalWhereAClockWasWrong) {
   EXPECT_EQ(deleted(NowNs() + kDay), 2);
 }
 
-// Of four recorded days one bears a label, and one is being recorded.
+// One of four recorded days bears a label, and one is being recorded.
 TEST_F(RunRetentionTest, TheOldestRecordedRunsGoUntilTheSizeFits) {
   RunRecorder recorder(file_);
   std::vector<RunRecorder::Key> keys;

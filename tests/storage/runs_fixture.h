@@ -38,7 +38,7 @@ inline StoredSample SampleAt(std::int64_t k, int valve = 0) {
 /// A runs.db of its own.
 class RunsFixture : public ::testing::Test {
  protected:
-  /// What a run holds, as its samples' positions.
+  /// Content of a run, as its samples' positions.
   std::vector<std::int64_t> Positions(const std::string& selector) {
     RunStore store(file_);
     std::vector<std::int64_t> positions;

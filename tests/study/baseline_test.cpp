@@ -13,7 +13,7 @@ namespace {
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-// What the sensors of a linear plant read.
+// Readings of the sensors of a linear plant.
 struct Sensors {
   double flow_factor{1.0};
   double position_offset{0.0};

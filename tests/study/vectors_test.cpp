@@ -20,7 +20,7 @@ namespace {
 
 class StudyVectorsTest : public WithStudy<TrainedRuns> {};
 
-// What the live engine said, as `--vectors` writes it, from its own loop.
+// Writes a verdict of the live engine, as `--vectors` does, from its own loop.
 std::string LineOf(const std::string& run, const Verdict& v) {
   char text[600];
   std::snprintf(

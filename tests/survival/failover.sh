@@ -229,7 +229,7 @@ all_open() { [ "$(episodes "$out/1/fdi/data" | wc -l)" -ge $((valves * $1)) ]; }
 await 180 all_open 1 || fail "the faults are not found"
 copied() { [ "$(episodes "$out/2/fdi/copy" | wc -l)" -ge $valves ]; }
 await 120 copied || fail "no copy has them"
-# What happens after the last copy is not in it.
+# The last copy lacks what happens after it.
 publish B $valves 5
 await 180 all_open 2 || fail "the later faults are not found"
 episodes "$out/1/fdi/data" >"$out/known"

@@ -144,7 +144,7 @@ class KilledMonitor : public testing::Test {
   std::vector<milliseconds> losses_;  // The age of the oldest sample lost.
 };
 
-// What was published as persisted is in the history once, and nothing is
+// Every event published as persisted is in the history once, and nothing is
 // there twice.
 void KilledMonitor::ExpectPersistedOnce() const {
   storage::HistoryReader history(directory_.path() / "history.db");
@@ -188,7 +188,7 @@ void KilledMonitor::ExpectRecorded(std::uint64_t from,
   losses_.push_back(std::chrono::duration_cast<milliseconds>(longest));
 }
 
-// What is in the runs that began at instant `from` or later, one of each valve.
+// Content of the runs that began at instant `from` or later, one of each valve.
 std::map<std::string, std::set<std::uint64_t>> KilledMonitor::RecordedSince(
     std::uint64_t from) {
   storage::RunStore runs(directory_.path() / "runs.db");

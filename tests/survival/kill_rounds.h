@@ -40,7 +40,7 @@ Finished RunProgram(const std::vector<std::string>& command);
 bool RunAndKill(const std::vector<std::string>& command,
                 std::chrono::milliseconds life);
 
-/// What `fdi-store doctor` has against the databases (quick_check,
+/// Complaints of `fdi-store doctor` about the databases (quick_check,
 /// foreign_key_check), once a file that was only begun is there; empty if
 /// nothing, or if there is no directory yet.
 std::string Doctor(const std::filesystem::path& data);

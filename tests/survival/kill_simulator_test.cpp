@@ -54,7 +54,7 @@ class KilledSimulator : public testing::Test {
   }
   std::string Domain() const { return std::to_string(domain_.id()); }
 
-  // Of the newest recorder; the runs of those before are interrupted.
+  // The newest recorder's; the runs of those before are interrupted.
   static SamplesByValve NewestRuns(const std::filesystem::path& data,
                                    std::set<std::string>& known) {
     SamplesByValve all;

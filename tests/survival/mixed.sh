@@ -12,7 +12,7 @@ bin=$1
 seconds=${FDI_MIXED_SECONDS:-60}
 seed=${FDI_MIXED_SEED:-1}
 streams=5 valves=60
-share=('' 'S[1-3]*' 'S[45]*')  # Of the streams S1 to S5, by monitor.
+share=('' 'S[1-3]*' 'S[45]*')  # Streams S1 to S5, by monitor.
 tag=$$
 out=$(mktemp -d)
 hub=fdi-h-$tag

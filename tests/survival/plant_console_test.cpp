@@ -70,7 +70,7 @@ class PlantConsoleTest : public PlantFixture {
     }
     return json::parse(answer->body);
   }
-  /// What the tiles say: id -> value of `key`.
+  /// Content of the tiles: id -> value of `key`.
   std::map<std::string, json> Tiles(const char* key) {
     std::map<std::string, json> values;
     const json answer = Get("valves");

@@ -73,7 +73,7 @@ class RescoringTest : public MonitorFixture {
     return sample;
   }
 
-  // What valve `v` sends at instant k: rejected samples and gaps included.
+  // Publishes sample k of valve `v`: rejected samples and gaps included.
   void PublishInstant(int v, std::uint64_t k) {
     const std::string valve = "V" + std::to_string(v);
     const Sample sample = Reading(v, k);

@@ -34,7 +34,7 @@ using nlohmann::json;
 using Clock = std::chrono::steady_clock;
 using storage::PrivatePostgres;
 
-// What all of them have to agree on, of an alarm.
+// All of them have to agree on these keys of an alarm.
 constexpr std::array kAgreed = {
     "valve_id", "fault",       "fault_name",  "strength", "worst",
     "severity", "priority",    "alarm_state", "shelved",  "unconfirmed",
@@ -80,7 +80,7 @@ std::string Differences(const std::string& where, const Alarms& list,
 
 struct Valve {
   std::string id;
-  double offset{0.0};    // Of X, of the fault at full strength.
+  double offset{0.0};    // Change of X by the fault at full strength.
   double strength{0.0};  // Now.
   double rate{0.0};      // A second.
   bool silent{false};
@@ -218,7 +218,7 @@ class ShiftTest : public MonitorFixture {
     }
     return alarms;
   }
-  // Of active alarms alone.
+  // Reads active alarms alone.
   Alarms FromTiles() const {
     Alarms alarms;
     const json page = Get("/api/v1/valves");
@@ -287,8 +287,8 @@ class ShiftTest : public MonitorFixture {
     }
     return alarms;
   }
-  // What the dashboard of docs/examples shows of the alarms of `list`, which is
-  // shipped; each is of another valve.
+  // Reads from the shipped dashboard of docs/examples what it shows of the
+  // alarms of `list`; each is of another valve.
   Alarms FromGrafana(const Alarms& list) const {
     storage::PlantDatabase plant(server_->Url("plant"));
     const std::string sql =
@@ -350,14 +350,14 @@ class ShiftTest : public MonitorFixture {
     std::ranges::sort(ids, {}, key);
     return ids;
   }
-  // Of what is shelved nothing may be there.
+  // Shelved alarms may not appear there.
   std::string WorkListDifferences(Alarms list, Alarms page) const {
     Alarms told;
     std::vector<std::string> order;
     const json work = json::parse(Store("worklist --json"));
     for (const json& row : work["rows"]) {
       const json& id = row["episode_id"];
-      // Of what ended and was acknowledged, it still tells for a time.
+      // Ended and acknowledged alarms are still listed for a time.
       if (id.is_string() && list.contains(id.get<std::string>())) {
         order.push_back(id);
         told[id] = {{"valve_id", row["valve_id"]},
@@ -386,7 +386,7 @@ class ShiftTest : public MonitorFixture {
     });
     return ranked + Differences("work list", list, told);
   }
-  // What somebody knows who has heard nothing but the events, of active alarms.
+  // Active alarms, as known to somebody who has heard nothing but the events.
   Alarms FromHook() const {
     Alarms alarms;
     std::ifstream told(directory_.path() / "told");
@@ -498,7 +498,7 @@ class ShiftTest : public MonitorFixture {
         announced[id]["strength"] = AnnouncedStrength(show);
       }
     }
-    // What ended with its data and is over by now, it was not told.
+    // The hook is not told of the end of an alarm that ended with its data.
     Alarms hook = FromHook();
     std::erase_if(hook, [&active](const auto& item) {
       return item.second["unconfirmed"] == true && !active.contains(item.first);

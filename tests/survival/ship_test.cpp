@@ -278,7 +278,7 @@ TEST_F(ShipTest, ChangesAreLoggedForPlantsAlone) {
   ExpectEqual("a");
 }
 
-// Of two histories into one plant, of which one is written meanwhile, with
+// Ships two histories into one plant, of which one is written meanwhile, with
 // kill -9 of the server and of the programs at random moments; again, and
 // nothing is new.
 TEST_F(ShipTest, NothingIsLostOrTwiceWhoeverIsKilled) {
@@ -518,7 +518,7 @@ TEST_F(ShipTest, RetentionOfBothSides) {
   ASSERT_EQ(Store("ship --forget --data " + Folder("a").string()).code, 0);
   limits.dry_run = false;
   EXPECT_EQ(deleted(), 1);
-  ASSERT_EQ(Ship("a").code, 0);  // What went here stays there.
+  ASSERT_EQ(Ship("a").code, 0);  // The plant keeps rows deleted here.
 
   PlantDatabase plant(Url());
   const auto there = [&](std::int64_t before_ns, bool dry_run = false) {
@@ -1019,7 +1019,7 @@ TEST_F(ShipTest, ASchemaOfBeforeTheBaselineIsRefused) {
   }
 }
 
-// Of a history.db that somebody has written into: its other rows go on.
+// Somebody has written into this history.db: its other rows go on.
 TEST_F(ShipTest, ARowThatThePlantRefusesStopsNothing) {
   Init();
   const auto path = Folder("a") / "history.db";
@@ -1068,7 +1068,7 @@ TEST_F(ShipTest, ARestoredHistoryOverwritesNothing) {
   EXPECT_EQ(PlantRowsOf("SELECT software FROM fdi.monitor_session "
                         "WHERE software <> 'test' ORDER BY 1"),
             both);
-  // What is lost here does not hold there for ever.
+  // A row lost here does not hold there for ever.
   EXPECT_EQ(PlantRowsOf("SELECT who, ended_origin FROM fdi.shelf "
                         "WHERE ended_ns IS NOT NULL"),
             std::vector<std::string>{"|first|history.db was restored"});

@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
-# What surrounds a monitor on real hosts, in a network namespace: two monitors
-# in containers, peers without multicast, keys before the clock is set, a clock
-# that is set back, prune with the clock years ahead. Needs root; what needs faketime
-# is left out where that is missing.
+# Simulates the surroundings of a monitor on real hosts, in a network namespace: two
+# monitors in containers, peers without multicast, keys before the clock is set, a
+# clock that is set back, prune with the clock years ahead. Needs root; what needs
+# faketime is left out where that is missing.
 # Usage: world.sh BIN_DIRECTORY      77 where namespaces are not permitted.
 set -euo pipefail
 if [ "${FDI_IN_NAMESPACE:-}" = "" ]; then

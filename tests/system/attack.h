@@ -13,7 +13,7 @@ namespace fdi::monitor {
 
 inline constexpr double kMaxMemory = 300.0;  // [MB]
 
-/// Of each attack: FDI_ATTACK_SECONDS, or 3 s.
+/// Duration of each attack: FDI_ATTACK_SECONDS, or 3 s.
 inline std::chrono::seconds AttackTime() {
   const char* asked = std::getenv("FDI_ATTACK_SECONDS");
   return std::chrono::seconds(asked == nullptr ? 3 : std::atoi(asked));
@@ -26,7 +26,7 @@ inline void ExpectPunctual(const HonestValve::Delays& delays) {
   }
 }
 
-/// What the kernel says of the most memory that the process ever had [MB].
+/// The most memory that the process ever had, according to the kernel [MB].
 inline double PeakMemory(pid_t pid) {
   std::ifstream status("/proc/" + std::to_string(pid) + "/status");
   for (std::string word; status >> word;) {

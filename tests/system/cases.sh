@@ -49,7 +49,7 @@ b13_flow_95_t_h|UTC|usable|1501|0|0
 END
 }
 
-# What verb $1 said, in $code and verb.out, is right: an error that matches $2,
+# Checks the answer of verb $1, in $code and verb.out: an error that matches $2,
 # or success with what the rest of the words finds.
 judge() {
   local answer="wrong: $(tail -1 verb.out)"
@@ -82,7 +82,7 @@ is_whole() {
 is_as_imported() { cmp -s <(readings "$FDI_DATA") <(readings imported); }
 
 wrong=()
-if [ -n "$all" ]; then  # Of the valve whose supply is lost later.
+if [ -n "$all" ]; then  # Needs the valve whose supply is lost later.
   "$bin/fdi-simulator" run --no-publish --seed 4101 -o healthy.csv \
     --scenario "$tests/../../campaigns/operation/normal.toml" >simulator.log 2>&1
   "$bin/fdi-trainer" onboard --valve b10_supply_lost --file healthy.csv \

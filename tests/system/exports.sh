@@ -18,7 +18,7 @@ shift
   set -- record spreadsheet long 5s 10s swinging-door
 zone=Europe/Warsaw
 healthy=1500  # Seconds that are learnt from.
-begin=2000    # Of the faults.
+begin=2000    # The faults begin here.
 faults=(f18:abrupt@$begin:strength=0.25 f19:abrupt@$begin:strength=0.25
   t1:abrupt@$begin:strength=0.1)
 [ $# -gt 0 ] || {
@@ -52,7 +52,7 @@ for form in "$@"; do
   if [ "$form" != record ]; then
     "$bin/fdi-store" runs sniff export.csv --zone $zone -o tags.toml \
       >sniff.log 2>&1 || fail "sniff refuses $form"
-    # What no size tells: a tag without unit may be gauge or absolute.
+    # Sizes do not tell it: a tag without unit may be gauge or absolute.
     sed -i 's/^unit = "bar"$/unit = "bar g"/' tags.toml
     map=(--map tags.toml)
   fi

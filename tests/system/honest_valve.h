@@ -61,7 +61,7 @@ class HonestValve {
                       : Delays{delays_ms_[count / 2],
                                delays_ms_[count * 99 / 100], delays_ms_.back()};
   }
-  /// What it has published in all.
+  /// Number of samples published in all.
   std::uint64_t sent() const { return next_; }
 
   static constexpr const char* kId = "honest";

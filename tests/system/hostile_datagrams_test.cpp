@@ -110,7 +110,7 @@ class Wire {
       SendTo("127.0.0.1", port, datagram, refused);
     }
   }
-  /// How many went to `socket` that its owner has to refuse.
+  /// Number of datagrams to `socket` that its owner has to refuse.
   std::uint64_t unsound(const Socket& socket) const {
     const auto found = unsound_.find(socket.port);
     return found == unsound_.end() || socket.multicast != (socket.port == base_)
@@ -228,8 +228,8 @@ TEST_F(HostileDatagramsTest, MutationsHarmNoHonestValve) {
   std::cout << "datagrams: " << sent << " sent; " << delays << "; memory "
             << PeakMemory(monitor->pid()) << " MB\n";
 
-  // What peers send is sound, so that all the refused ones are ours. What the
-  // pace of a writer forbids depends on when it was heard: a few may differ.
+  // Peers send sound datagrams, so that all the refused ones are ours. The pace
+  // of a writer forbids a few more or less, depending on when it was heard.
   std::uint64_t unsound = 0;
   std::uint64_t dropped = 0;
   for (const Socket& socket : UdpSockets(monitor->pid())) {

@@ -151,7 +151,7 @@ TEST_F(HostilePublishersTest, GapsOfAnyLengthSettleAndLongOnesAreKept) {
   monitor->Signal(SIGTERM);
   ASSERT_EQ(monitor->AwaitExit(), 0);
 
-  EXPECT_EQ(counters_["gaps"], 2U);  // Of more than three periods.
+  EXPECT_EQ(counters_["gaps"], 2U);  // Longer than three periods.
   EXPECT_EQ(counters_["initialisations"], 4U);
   EXPECT_EQ(counters_["episodes"], 0U);
   for (std::size_t i = 0; i < starts.size(); ++i) {
@@ -250,7 +250,7 @@ TEST_F(HostilePublishersTest, AFullLogHoldsUpNeitherTheStartNorTheEnd) {
 TEST_F(HostilePublishersTest, ASubscriberThatDoesNotReadDoesNotDelayTheEnd) {
   const auto monitor = StartMonitor();
   const auto deadline = std::chrono::steady_clock::now() + kMonitorPatience;
-  // How many vectors share a message depends on how fast both sides are.
+  // The speed of both sides decides how many vectors share a message.
   for (std::uint64_t k = 0; counters_["dds_decision_retries"] == 0 &&
                             std::chrono::steady_clock::now() < deadline;
        k += 1000) {

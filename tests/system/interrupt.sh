@@ -11,7 +11,7 @@ awk 'BEGIN {print "t_s,CV_pct,P1_kPa,P2_kPa,T1_degC,X_pct,F_t_h"
   for (i = 0; i < 600000; ++i) print i ",40.5,3500,2600,100,41.25,22.125"}' >long.csv
 
 interrupt() {  # PROGRAM WORDS
-  # What a script starts in the background would ignore the signal.
+  # Children that a script starts in the background ignore the signal.
   env --default-signal=INT "$bin/$1" "${@:2}" >"$2.log" 2>&1 &
   local child=$! code=0
   sleep 0.2

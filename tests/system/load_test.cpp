@@ -150,7 +150,7 @@ TEST_F(LoadTest, ATermUnderFullLoadDrainsAndEnds) {
   }
 }
 
-// What the history cannot store in time goes out as not persisted.
+// Events that the history cannot store in time go out as not persisted.
 TEST_F(LoadTest, AStormOfAThousandValvesIsStoredAndPublished) {
   constexpr std::uint64_t kStorm = 1'000;
   constexpr std::uint64_t kSamples = 90;
@@ -183,7 +183,7 @@ TEST_F(LoadTest, AStormOfAThousandValvesIsStoredAndPublished) {
       std::ranges::count(faults_, false, &FaultEvent::persisted));
   std::cout << "storm: " << faults_.size() << " events, " << unpersisted
             << " before they were stored\n";
-  // How many hangs on the disk: it has 200 ms.
+  // The number depends on the disk: it has 200 ms.
   EXPECT_LT(unpersisted, faults_.size());
   const auto episodes = storage::HistoryReader(data_ / "history.db").List();
   EXPECT_EQ(episodes.size(), kStorm);

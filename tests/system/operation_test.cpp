@@ -1,4 +1,4 @@
-// What an operator does to a valve, by the scenarios of campaigns/operation,
+// Actions of an operator on a valve, by the scenarios of campaigns/operation,
 // judged by models of normal work.
 #include <filesystem>
 #include <functional>

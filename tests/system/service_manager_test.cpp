@@ -1,5 +1,5 @@
-// What the built fdi-monitor tells a service manager, here a datagram socket
-// of the test in the place of systemd's.
+// Messages of the built fdi-monitor to a service manager, here a datagram
+// socket of the test in the place of systemd's.
 
 #include <array>
 #include <csignal>

@@ -37,7 +37,7 @@ class SharesTest : public MonitorFixture {
             static_cast<int>(history.Accumulators().size())};
   }
 
-  // What each monitor says of itself, once it said so.
+  // Waits until the monitor's own status contains `part`.
   std::string AwaitText(const ChildProcess& monitor, const std::string& part) {
     const std::string speaker = ":" + std::to_string(monitor.pid());
     std::string text;
@@ -102,7 +102,7 @@ TEST_F(SharesTest, APartitionIsAShareOfItsOwn) {
   }
 }
 
-// What one monitor was at with a valve, the other one goes on with.
+// One monitor goes on with a valve where the other one stopped.
 TEST_F(SharesTest, AMovedValveTakesItsEpisodeAndAccumulatorsAlong) {
   const auto from = directory_.path() / "from";
   auto monitor = StartAnother("from", {"--valve", "V*"});

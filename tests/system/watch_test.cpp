@@ -232,7 +232,7 @@ TEST_F(WatchSystemTest, AWatchWhoseReaderHasStoppedReadingEnds) {
   EXPECT_EQ(watch.AwaitExit(std::chrono::seconds(10)), 1);
 }
 
-// What earlier versions had answers with what to do instead.
+// Verbs and options of earlier versions answer with what to do instead.
 TEST(RemovedWordsTest, NameWhatReplacesThem) {
   const std::vector<std::pair<std::vector<std::string>, std::string>> removed{
       {{"top", "--once"}, "top is gone: fdi-monitor watch --table"},

@@ -135,7 +135,7 @@ TEST(SlowAllowanceTest, NarrowsWithHours) {
   EXPECT_LT(last, 0.2);
 }
 
-// What the thresholds of a channel X with a window allow for another day.
+// Allowance for another day in the thresholds of a channel X with a window.
 double Slow(const ResidualSeries& residuals) {
   return SlowAllowance(residuals, 600, 0.2, 24.0 * 1e-3 / 5.0);
 }

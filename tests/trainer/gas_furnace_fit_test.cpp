@@ -56,7 +56,7 @@ TEST_F(ReferenceDataFitTest, GasFurnaceIsFittedNoWorseThanByALinearArx) {
   }
 }
 
-// What one Takagi-Sugeno model of the gas furnace is made of.
+// Ingredients of one Takagi-Sugeno model of the gas furnace.
 struct Settings {
   TakagiSugenoOptions fit;
   std::vector<int> lags;  // y(k−1..4), then u(k−1..6)

@@ -114,7 +114,7 @@ TEST(AdaptModelTest, ConditionOfFewSamplesIsNamed) {
   }
 }
 
-// What is prepared once gives the same bits as a problem of its own.
+// One preparation for all gives the same bits as a problem of its own.
 TEST(AdaptationTest, ServesConditionsThatDifferInTheirOutputsAlone) {
   const Adaptation prepared(Normal(), Fault(0.0, 0.5, 0.5));
   const Condition fault = Fault(0.6, 0.5, 0.5);

@@ -288,7 +288,7 @@ TEST(RecordChecksTest, WrongUnitsAndSensesAreToldApart) {
 }
 
 // The files of the reference data, as `onboard --file` reads them with the map
-// that sniff writes. What the readings are is tested with the reader.
+// that sniff writes. The test of the reader covers the readings.
 TEST(RecordChecksTest, TheReferenceFilesAreOnboardedOrRefusedForTheirReason) {
   const char* folder = std::getenv("FDI_REFERENCE_DATA");
   if (folder == nullptr) {
@@ -365,9 +365,9 @@ TEST(RecordChecksTest, SimulationHasToBeBetterThanNone) {
 struct SlowRecord {
   double period_s{10.0};
   std::size_t samples{720};
-  double of_command{0.3};  // What X has of CV.
+  double of_command{0.3};  // Share of CV in X.
   double of_position{4.0};
-  double swing{0.0};    // Of CV, slow; X comes a quarter of a period later.
+  double swing{0.0};    // CV's, slow; X comes a quarter of a period later.
   double of_flow{0.5};  // F has of X.
 };
 
@@ -442,8 +442,8 @@ struct Few {
   }
 };
 
-// What a table says of a fault that is as plain as half the flow, and of one
-// that has no effect on X.
+// The table on a fault that is as plain as half the flow, and on one that has
+// no effect on X.
 TEST(CoverageTest, SaysFromWhichStrengthOnAFaultIsSeen) {
   const Few& few = Few::Trained();
   const CoverageTable table = AssessCoverage(
@@ -505,10 +505,10 @@ TEST(CoverageTest, WhatIsLeftOutIsInNothingThatIsLeft) {
   EXPECT_EQ(parts[1].stretch, 1U);
   EXPECT_EQ(parts[1].from, 700U);
 
-  // Of 900 samples in a row, halves.
+  // A row of 900 samples is halved.
   EXPECT_EQ(PartsOf({Counted("a", 900, 0)})[1].from, 450U);
   EXPECT_EQ(PartsOf({Counted("a", 900, 0)})[1].count, 450U);
-  // Of two stretches one each.
+  // Two stretches give one part each.
   EXPECT_EQ(
       PartsOf({stretches[0], Counted("a", 600, 600), Counted("b", 700, 0)})[1]
           .stretch,
@@ -522,7 +522,7 @@ TEST(CoverageTest, WhatIsLeftOutIsInNothingThatIsLeft) {
   EXPECT_EQ(rest.healthy[2].samples.size(), 400U);
   EXPECT_EQ(rest.faulty[0][2].samples.front().stamp_ns, 1'900'000'000'000);
 
-  // Of a long record four blocks, spread over what is left.
+  // A long record gives four blocks, spread over what is left.
   const std::vector<Stretch> hour{Counted("a", 3600, 0)};
   const FaultyStretches few = Without({hour, {hour}}, {0, 0, 600});
   ASSERT_EQ(few.healthy.size(), 4U);

@@ -54,9 +54,9 @@ TEST(SelectRulesTest, BothKindsOfAntecedentsAreTriedWithBothMethods) {
   EXPECT_FALSE(selection.rules.front().center.empty());
 }
 
-// Rules that are told apart by the first column alone. Of the second nothing
-// depends but the consequents, so that its clusters serve again; other targets
-// have others.
+// Rules that are told apart by the first column alone. Only the consequents
+// depend on the second, so that its clusters serve again; other targets have
+// others.
 TEST(SelectRulesTest, KnownClustersServeWhereTheyAreTheSame) {
   RuleSelectionOptions options;
   options.counts = {3};

@@ -81,7 +81,7 @@ TEST(TakagiSugenoFitTest, TwoRulesFindTheSlopesOnBothSidesOfAKink) {
   EXPECT_LT(MeanSquaredError(rules, data), 2e-3 * variance);
 }
 
-// What holds for either kind of antecedents.
+// Tests that hold for either kind of antecedents.
 class AntecedentKindTest : public testing::TestWithParam<AntecedentKind> {
  protected:
   static TakagiSugenoOptions Rules(int count) {

@@ -94,7 +94,7 @@ TEST(TaughtObserversTest, WhatWasOneOfSeveralIsNamedAloneTheNextTime) {
 TEST(TaughtObserversTest, OtherNamesStay) {
   const ModelSet taught = TaughtF6();
   EXPECT_THAT(Named(taught, Samples(kBefore, 4, 0.0)), IsEmpty());
-  // Of another strength than was labelled.
+  // Episodes of other strengths than the labelled one.
   EXPECT_THAT(Named(taught, Samples(400, 5, 19.0)), ElementsAre(6, 18));
   EXPECT_THAT(Named(taught, Samples(400, 6, 16.0, 0.02)), ElementsAre(3));
 }

@@ -16,7 +16,7 @@ struct RowText {
 };
 std::vector<RowText> TextsOf(const PlantJob& job, PlantFiles& files);
 
-/// Whether the row asks for named faults and has what they take: a type and x.
+/// True if the row asks for named faults and has what they take: a type and x.
 bool WantsModels(const PlantJob& job);
 
 /// Fingerprint of a row's input: what the row says about reading and judging

@@ -51,9 +51,9 @@ class Reader {
         bank_(std::make_shared<const ObserverPlan>(*models)),
         coverage_(*models) {}
 
-  // The verdict of the engine tells whether it took `sample`. Whether the
-  // valve would have been judged is decided here, as without an alarm: during
-  // one, the engine judges a valve wherever it is.
+  // The verdict of the engine tells whether it took `sample`. This decides if
+  // the valve would have been judged without an alarm: during one, the engine
+  // judges a valve wherever it is.
   void Take(const Sample& sample, const Verdict& verdict) {
     if (OutOfOrder(verdict.intake)) {
       return;

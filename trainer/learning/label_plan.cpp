@@ -225,7 +225,7 @@ bool AsksForModels(const LabelledEpisode& episode, const LabelPlan& plan) {
              });
 }
 
-// Whether the parent has not learnt the same from the same samples.
+// True if the parent has not learnt the same from the same samples.
 bool IsNew(const LabelledEpisode& episode, const storage::Lineage& lineage) {
   const TrainingEpisode& now = episode.meaning;
   return std::none_of(lineage.episodes.begin(), lineage.episodes.end(),

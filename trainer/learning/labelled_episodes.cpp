@@ -43,7 +43,7 @@ struct LabelReader::EpisodeSamples {
 
 namespace {
 
-// How far a false alarm may reach back before its detection. The engine needs
+// A false alarm may reach back this far before its detection. The engine needs
 // a part of it to settle.
 constexpr std::int64_t kLeadInNs = 1'800'000'000'000;
 constexpr double kSecondsPerNs = 1e-9;

@@ -41,7 +41,7 @@ void VisitLimits(Models& models, Visitor visit) {
   }
 }
 
-// How much of each limit residuals use up, sample by sample.
+// Counts how much of each limit residuals use up, sample by sample.
 class LimitUse {
  public:
   explicit LimitUse(const ModelSet& models)

@@ -34,7 +34,7 @@ std::vector<Limit> LimitsOf(const ModelSet& models);
 /// "upper mean over 200 samples"
 std::string LimitText(const Limit& limit);
 
-/// How near some data come to a limit.
+/// The nearest that some data come to a limit.
 struct Peak {
   double share{0.0};  ///< Share of it for n_d samples; above 1: an alarm.
   std::string run{};  ///< Where that was.
@@ -69,8 +69,8 @@ struct NewLimits {
 /// @throws DataError if a channel has fewer than kMinResiduals.
 NewLimits SetLimits(const ModelSet& parent, const HealthyResiduals& data);
 
-/// How far beyond the limits of onboarding data may reach that no person called
-/// healthy: twice the limit, which then becomes three times as wide.
+/// Data that no person called healthy may pass the limits of onboarding this
+/// far: twice the limit, which then becomes three times as wide.
 inline constexpr double kMaxReachRatio = 2.0;
 
 /// @param first The set of onboarding, whose observers `parent` has.

@@ -20,9 +20,9 @@ struct TaughtObserver {
   Observer observer;         ///< Its name ends with kTaughtMark.
   std::string adapted_from;  ///< Name of an observer; empty: none.
   std::int64_t samples{0};
-  /// How much better it explains the samples than normal operation, and than
-  /// what it was adapted from: differences of log-likelihood, all on folds of
-  /// the samples that were left out.
+  /// Gains over normal operation, and over what it was adapted from, in
+  /// explaining the samples: differences of log-likelihood, all on folds of the
+  /// samples that were left out.
   double gain_over_normal{0.0};
   double gain_over_former{0.0};
 };

@@ -49,7 +49,7 @@ TrainingRun RunWith(const FaultCondition& fault,
   return run;
 }
 
-// How the models judge a part without a fault.
+// Judgement of the models on a part without a fault.
 struct HealthyScore {
   std::optional<double> alarm_s;  // From when a fault would begin.
   double judged{1.0};             // Share of the samples after the first LIVE.
@@ -131,7 +131,7 @@ FaultCoverage Summarise(std::vector<FaultScore> scores) {
   return coverage;
 }
 
-// How many parts of `count` samples the stretch has room for.
+// Number of parts of `count` samples that fit into the stretch.
 std::size_t Room(const Stretch& stretch, std::size_t count) {
   return stretch.samples.size() / count;
 }

@@ -12,7 +12,7 @@
 
 namespace fdi::trainer {
 
-/// How model sets detect and isolate one fault in one direction.
+/// Detection and isolation of one fault in one direction by model sets.
 struct FaultCoverage {
   int fault{0};
   bool negative{false};

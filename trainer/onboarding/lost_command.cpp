@@ -73,7 +73,7 @@ double Product(const std::vector<double>& a, const std::vector<double>& b) {
   return sum;
 }
 
-// Whether the squares of `errors` are larger than those of `others`, for
+// True if the squares of `errors` are larger than those of `others`, for
 // certain. Samples in a row are alike, and parts of the record hardly.
 bool Larger(const std::vector<double>& errors,
             const std::vector<double>& others) {

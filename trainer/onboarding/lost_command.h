@@ -6,9 +6,9 @@
 
 namespace fdi::trainer {
 
-/// Whether the records are too slow for their command, while the flow follows
-/// the position: what the command was between two samples is not there, so
-/// that the rod cannot be judged by it, and the flow can at the position. In
+/// True if the records are too slow for their command, while the flow follows
+/// the position: the command between two samples is missing, so that the rod
+/// cannot be judged by it, and the flow can at the position. In
 /// order of
 ///
 ///     E (c_k - c_{k-1})^2 > E c_k^2           the command is undersampled,

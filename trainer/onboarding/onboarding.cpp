@@ -417,7 +417,7 @@ std::vector<double> FlowShape(const simulator::Trim& trim) {
   return shape;
 }
 
-// How the healthy valve is simulated, for the second look.
+// Parameters by which the second look simulates the healthy valve.
 std::vector<PhysicalValue> Physics(const ValveType& type,
                                    const std::vector<TrainingRun>& runs) {
   std::vector<std::vector<RecordRow>> records;

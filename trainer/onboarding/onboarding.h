@@ -50,8 +50,8 @@ struct OnboardingOptions {
   std::int64_t created_ns{0};
 };
 
-/// How the normal observer does on data it was not fitted to, and how a naive
-/// model does: X is the command, everything else its mean.
+/// Errors of the normal observer on data it was not fitted to, and of a naive
+/// model: X is the command, everything else its mean.
 struct ChannelFit {
   std::string name;
   Signal output{Signal::kX};

@@ -23,7 +23,7 @@ struct RunSelection {
 
   /// The options --runs, --file and of tables.
   void AddTo(CLI::App& verb);
-  /// How files are read. @param required signals that a file must have.
+  /// Options for reading files. @param required signals that a file must have.
   /// @throws ConfigError if tables are described and no file is named; as
   ///   importer::ReadTagMap().
   importer::CsvOptions ForFiles(SignalMask required,

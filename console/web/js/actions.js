@@ -1,5 +1,5 @@
-// What an operator does to alarms: acknowledge, shelve, label. Each is a dialog
-// that asks why; who it was is known from the proxy.
+// Actions of an operator on alarms: acknowledge, shelve, label. Each is a
+// dialog that asks why; who it was is known from the proxy.
 
 import {path, post} from './api.js';
 import {button, field, h, replace, select, showDialog} from './dom.js';
@@ -53,7 +53,7 @@ function describe(rows) {
 }
 
 export function acknowledge(rows) {
-  const done = new Set();  // Of an attempt that failed on the way.
+  const done = new Set();  // Rows that an attempt finished before it failed.
   return ask({
     title: 'Acknowledge', verb: 'Acknowledge', subject: describe(rows),
     fields: [],

@@ -1,4 +1,4 @@
-// What the user has chosen; kept in the browser. Emits 'change'.
+// The user's choices; kept in the browser. Emits 'change'.
 
 const kDefaults = {
   theme: 'auto', utc: false, density: 'comfortable', shortcuts: true,

@@ -1,5 +1,5 @@
-// What stands above every view: where one is, how many alarms, whether the data
-// are fresh, the clock.
+// The bar above every view: where one is, how many alarms, whether the data are
+// fresh, the clock.
 
 import {notes} from './api.js';
 import {button, h, replace, setText} from './dom.js';
@@ -65,7 +65,7 @@ function historyText() {
       'episodes come back by themselves.' : '';
 }
 
-// Of a plant how many monitors there are; of a monitor how it is.
+// A plant tells how many monitors it has; a monitor tells how it is.
 function healthText({plant, health, write}) {
   const silent = plant?.monitors.filter((m) => m.silent).length;
   return (!plant ? (health === 'OK' ? 'Monitor OK' : 'Monitor degraded') :

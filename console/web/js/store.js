@@ -1,4 +1,4 @@
-// What the page knows of the plant, kept up to date by the stream. Emits
+// The page's knowledge of the plant, kept up to date by the stream. Emits
 // 'tiles' (detail: ids or null for all), 'alarms' (detail: the row or null),
 // 'samples', 'gap', 'resync' (the connection is back; `gapFromMs`, and whether
 // the monitor was restarted), 'connection', 'status' and, on the page of a
@@ -16,7 +16,7 @@ class Store extends EventTarget {
   tiles = new Map();
   alarms = new Map();
   faults = new Map();
-  groups = [];  // Of the file of groups: {name, has(id)}.
+  groups = [];  // From the file of groups: {name, has(id)}.
   status = null;
   hasWorklist = false;
   offsetMs = 0;  // Clock of the monitor minus ours.

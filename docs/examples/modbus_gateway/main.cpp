@@ -24,7 +24,7 @@ struct Tag {
   std::string type{};   // u16, i16, u32, f32
   double special{NAN};  // A reading that is none.
   double scale{1.0};
-  double last{NAN};  // What was printed last; NaN: that there is none.
+  double last{NAN};  // The last printed value; NaN: there is none.
   bool said{false};
 
   bool wide() const { return type == "u32" || type == "f32"; }

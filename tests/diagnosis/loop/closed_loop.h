@@ -17,9 +17,9 @@ struct ClosedLoop {
   LoopState state{LoopState::kHealthy};
   bool level{false};
   bool slow{false};    ///< A temperature, under a load that swings slowly.
-  double band{0.0};    ///< Of the play [% of OP], if kSticky.
+  double band{0.0};    ///< The play's [% of OP], if kSticky.
   double noise{0.05};  ///< Standard deviation of PV's reading [%].
-  bool steps{false};   ///< Of the set point, every 20 to 40 min.
+  bool steps{false};   ///< The set point steps every 20 to 40 min.
   double period_s{10.0};
   int samples{750};
 };
@@ -34,7 +34,7 @@ inline Window Simulate(const ClosedLoop& loop, std::uint64_t seed) {
   const double gain = uniform(0.5, 2.0);
   const double lag_s = uniform(5.0, 40.0) * (loop.slow ? 30.0 : 1.0);
   const int delay_s = static_cast<int>(uniform(1.0, 15.0));
-  const double fill_s = uniform(200.0, 1500.0);  // Of a level, at 1 % of OP.
+  const double fill_s = uniform(200.0, 1500.0);  // A level's, at 1 % of OP.
   // PI by lambda: λ of 1 to 3 lags in sound loops.
   const double slow = loop.state == LoopState::kSluggish ? uniform(6.0, 20.0)
                       : loop.state == LoopState::kTight  ? uniform(0.15, 0.4)

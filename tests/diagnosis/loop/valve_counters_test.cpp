@@ -93,7 +93,7 @@ TEST_F(ValveCountersTest, ARodThatSticksAndLetsGoJumps) {
   EXPECT_NEAR(Of(Figure::kSlipJump), 1.2, 1e-3);
 }
 
-// Of many samples some stand by chance, and the next one is elsewhere.
+// Among many samples some stand by chance, and the next one is elsewhere.
 TEST_F(ValveCountersTest, NoiseOfXIsNoSlip) {
   std::mt19937 random(1);
   std::normal_distribution<double> noise(0.0, 0.7);

@@ -1,4 +1,4 @@
-// What `fdi-monitor watch --table` makes of the messages, and how it looks.
+// The messages as `fdi-monitor watch --table` shows them, and its look.
 #include "monitor/bus/watch_table.h"
 
 #include <sstream>

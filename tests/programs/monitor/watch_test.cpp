@@ -1,4 +1,4 @@
-// What `fdi-monitor watch` makes of the messages.
+// The messages as `fdi-monitor watch` shows them.
 #include <gmock/gmock.h>
 
 #include "monitor/bus/watch_records.h"

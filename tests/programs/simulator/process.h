@@ -20,7 +20,7 @@
 
 namespace fdi::simulator {
 
-/// How a process ended.
+/// End of a process.
 struct Ended {
   int code{-1};  ///< Exit code; 128 + signal if it was killed.
   std::string out;

@@ -21,7 +21,7 @@ namespace fdi::simulator {
 using std::chrono::milliseconds;
 using std::chrono::steady_clock;
 
-/// What a reader got.
+/// Keeps the messages that a reader got.
 class Reader {
  public:
   explicit Reader(const idl::TestDomain& domain)

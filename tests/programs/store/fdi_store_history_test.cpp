@@ -27,7 +27,7 @@ class FdiStoreHistoryTest : public FdiStoreTest {
     writer.EndSession(kDetected, true);
   }
 
-  // What a terminal with these variables shows of `history list`.
+  // Output of `history list` on a terminal with these variables.
   std::string ListOnTerminal(const std::string& environment) const {
     const std::string out = (directory_.path() / "terminal.txt").string();
     const std::string command =
@@ -236,7 +236,7 @@ TEST_F(FdiStoreHistoryTest, TheListFitsATerminalOfAHundredColumns) {
   EXPECT_THAT(piped, testing::Not(HasSubstr("too narrow")));
 }
 
-// How bad it is now, and what it is, before what only experts read.
+// The severity now and the fault come before what only experts read.
 TEST_F(FdiStoreHistoryTest, AHundredColumnsSayHowBadItIsInPlainWords) {
   const std::string list = ListOnTerminal("COLUMNS=100 NO_COLOR=1");
   const std::string left_out =
@@ -457,7 +457,7 @@ TEST_F(FdiStoreHistoryTest, AnIdThatLooksLikeAPatternIsAnId) {
   EXPECT_THAT(left(), testing::UnorderedElementsAre("LV-1", "V2"));
 }
 
-// What a monitor holds that goes on without being in the file.
+// A running monitor holds data that is not in the file.
 TEST_F(FdiStoreHistoryTest, DoctorSaysWhatIsRecordedElsewhere) {
   EXPECT_EQ(Store("doctor").code, 0);
   {

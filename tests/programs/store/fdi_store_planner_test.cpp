@@ -1,4 +1,4 @@
-// What a planner asks fdi-store.
+// Questions of a planner to fdi-store.
 #include <algorithm>
 #include <cmath>
 

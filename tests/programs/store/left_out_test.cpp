@@ -1,4 +1,4 @@
-// What fdi-store says of a component that its build was made without.
+// Answers of fdi-store about a component that its build was made without.
 #include <gmock/gmock.h>
 
 #include "tests/programs/store/store_program_fixture.h"

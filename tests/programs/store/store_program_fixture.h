@@ -16,7 +16,7 @@ namespace fdi::storage {
 
 using nlohmann::json;
 
-/// What a program left behind.
+/// Exit code and output of a program.
 struct Outcome {
   int code{-1};
   std::string out;

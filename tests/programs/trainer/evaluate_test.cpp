@@ -117,7 +117,7 @@ TEST_F(AppEvaluateTest, BadInputIsNamedWithItsExitCode) {
               HasSubstr("flow_converted run=" + tonnes + " from=t/h to=m3/h"));
 }
 
-// What earlier versions had answers with what to do instead.
+// Verbs and options of earlier versions answer with what to do instead.
 TEST_F(AppEvaluateTest, RemovedVerbsAndOptionsNameWhatReplacesThem) {
   const std::vector<std::pair<std::string, std::string>> removed{
       {"evaluate --model-set quick --history plant --work-orders o.csv",

@@ -1,5 +1,5 @@
-// What `relearn --models` makes the models of a valve from, and what it
-// refuses; the training itself is that of onboard.
+// Data from which `relearn --models` makes the models of a valve, and its
+// refusals; the training itself is that of onboard.
 #include <filesystem>
 #include <memory>
 #include <string>

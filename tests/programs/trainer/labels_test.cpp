@@ -27,7 +27,7 @@ using testing::Not;
 using testing::SizeIs;
 using testing::UnorderedElementsAre;
 
-// The set knows f19 at 0.5 alone. What is scored begins normal; the fault acts
+// The set knows f19 at 0.5 alone. The scored runs begin normal; the fault acts
 // from 600 s on.
 class AppLabelsTest : public TrainerProgram {
  protected:
@@ -277,7 +277,7 @@ TEST_F(AppLabelsTest, RelabelledEpisodeReplacesWhatItTaught) {
               Not(Contains(second["lineage"]["episodes"][0]["run"])));
 }
 
-// What a label taught goes with it, though nothing takes its place.
+// If a label goes, what it taught goes too, though nothing takes its place.
 TEST_F(AppLabelsTest, RelabelledEpisodeThatIsRefusedForgetsWhatItTaught) {
   const std::string id = Episode(RunWith("f1"), "f1");
   const json second = RunJson("relearn '*' --strength " + id + "=0.5");

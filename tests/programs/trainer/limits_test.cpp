@@ -166,7 +166,7 @@ TEST_F(AppLimitsTest, ADayMakesLimitsCloserAndLeavesTheObservers) {
         << limit;
     closer += ratio < 0.97 ? 1.0 : 0.0;
   }
-  EXPECT_GE(closer, 8.0) << set["limits"];  // Of 16; some are at their least.
+  EXPECT_GE(closer, 8.0) << set["limits"];  // Out of 16, some at their least.
   ModelSet child = Load("LV1@2");
   EXPECT_NE(storage::EncodeModelSet(child), storage::EncodeModelSet(*parent_));
   child.channels = parent_->channels;
@@ -219,7 +219,7 @@ TEST_F(AppLimitsTest, WhatALabelTaughtOfAFaultStays) {
   EXPECT_EQ(Load("LV1@3").observers.back().name, "f6 0.06 taught");
   const json shown = RunJson("show LV1@3");
   EXPECT_EQ(shown["lineage"]["episodes"][0]["fault"], "f6");
-  // Of another label, the set learns that instead.
+  // With another label, the set learns that instead.
   storage::HistoryEditor(History()).Label(id, "f3",
                                           {"kim", "", "test", kMadeNs + 1});
   const json again = RunJson(relearn);
@@ -250,7 +250,7 @@ TEST_F(AppLimitsTest, AlarmLabelledFalseDoesNotComeAgain) {
   const ModelSet child = Load("LV1@2");
   EXPECT_FALSE(Alarms(child, run));
   EXPECT_GT(child.channels[1].windows[1].upper_mean, kBias);
-  // What the alarm did not pass stays as it was.
+  // Limits that the alarm did not pass stay as they were.
   EXPECT_EQ(child.channels[0].windows[1].upper_mean,
             parent_->channels[0].windows[1].upper_mean);
   EXPECT_EQ(child.channels[1].windows[1].lower_mean,

@@ -1,5 +1,5 @@
-// onboard --plant: rows that cannot be used, and that the others go on. What it
-// makes of valves with a type is measured by bench/plant_table.sh.
+// onboard --plant: rows that cannot be used, and that the others go on. The
+// script bench/plant_table.sh measures what it makes of valves with a type.
 #include <cmath>
 #include <cstdio>
 #include <map>

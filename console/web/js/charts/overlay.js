@@ -1,5 +1,5 @@
-// What is drawn below and above the lines of a panel: gaps, bands of
-// thresholds, the state of the valve, marks of an episode.
+// Draws below and above the lines of a panel: gaps, bands of thresholds, the
+// state of the valve, marks of an episode.
 
 import {cssColor} from '../dom.js';
 import {markWord} from '../faults.js';

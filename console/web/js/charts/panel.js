@@ -180,7 +180,7 @@ class Panel {
     this.showValues(this.u.cursor.idx);
   }
 
-  // What explains the data now stands out.
+  // Makes the lines of present explanations stand out.
   #emphasise() {
     const {threshold} = this.panel;
     this.panel.lines.forEach(({column}, i) => {

@@ -23,8 +23,8 @@ export class Timeline {
   #buttons = h('div', {
     'class': 'chart-tools', 'role': 'group', 'aria-label': 'Time shown'});
   #summary = h('p', {class: 'hint trend-summary'});
-  #spanMs;  // Of the window that follows; null: all.
-  #window = null;  // What the user looks at; null: follow.
+  #spanMs;  // Length of the window that follows; null: all.
+  #window = null;  // Chosen by the user; null: follow.
   #setting = false;
   #syncKey = `trend${++count}`;
   #hidden = new Set(['process']);

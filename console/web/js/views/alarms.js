@@ -36,7 +36,7 @@ class Alarms extends View {
   #head = h('thead', {role: 'rowgroup'});
   #chips = new Map();
   #causes = h('div', {role: 'status'});
-  #shownCauses = '[]';  // What is made anew is read out anew.
+  #shownCauses = '[]';  // Only changed rows are read out again.
   #asOf = h('p', {class: 'number'});
   #nothing = h('p', {class: 'nothing', hidden: true});
   #table = dataTable('Alarms, worst first', kColumns, [],

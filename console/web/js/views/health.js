@@ -52,7 +52,7 @@ function tableOf(health) {
 const withUnit = (value, {unit}) => value === null ? '–' :
   `${numberText(value)} ${unitText(unit)}`;
 
-// What was counted: column of the answer, words, unit.
+// Counters: column of the answer, words, unit.
 const kCounts = [
   ['travel_strokes', 'Travel', 'strokes'], ['reversals', 'Reversals', ''],
   ['auto_h', 'In AUTO', 'h'], ['shut_h', 'Shut', 'h'], ['open_h', 'Open', 'h'],

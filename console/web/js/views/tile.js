@@ -12,7 +12,7 @@ import {labelText} from './table.js';
 
 const kIdTail = [6, 12];
 const kTag = /[a-z]*[-_. ]?\d+[a-z]*$/i;  // "LIC-101A" at the end of an id.
-const kDeviation = 0.3;  // Of 1 - d_0.
+const kDeviation = 0.3;  // As a share of 1 - d_0.
 const kLasting = 3;  // Points beyond it in a row; healthy valves have single ones.
 
 /** Letters at the ends of `ids` with the tag, that tell them apart, to a limit. */
@@ -68,7 +68,7 @@ export class Tile {
   #what = h('span', {class: 'tile-what'});
   #certainty = h('span', {class: 'tile-certainty'});
   #how = h('span', {class: 'tile-how'});
-  #spoken = h('span', {class: 'sr-only'});  // What shape and colour say.
+  #spoken = h('span', {class: 'sr-only'});  // Says what shape and colour show.
   #quality = h('span', {class: 'tile-quality'});
   #canvas = h('canvas', {'class': 'spark', 'aria-hidden': 'true',
     'title': 'Deviation from normal in the last minute'});

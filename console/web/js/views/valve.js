@@ -17,7 +17,7 @@ import {HealthSection} from './health.js';
 import {aboutNodes, dataTable, labelText} from './table.js';
 import {View} from './view.js';
 
-const kTrendSeconds = 900;  // What the monitor keeps.
+const kTrendSeconds = 900;  // As long as the monitor keeps.
 const kWordsPeriodMs = 2000;
 
 function stateLine(tile) {
@@ -95,7 +95,7 @@ const kFitColumns = [
     h('span', {title: d === null ? null : factorTitle(d)}, fits)},
 ];
 
-// What this valve is judged by, and what that cannot see.
+// Says which models judge this valve, and what they cannot see.
 function scopeText({model_set: set, missing}, about) {
   const models = set && store.modelSet(set);
   if (!models) return serviceText(about);
@@ -111,7 +111,7 @@ function scopeText({model_set: set, missing}, about) {
 }
 
 /**
- * What explains the data, in words: [{name, fits, d, strong}]. While it is
+ * Explanations of the data, in words: [{name, fits, d, strong}]. While it is
  * normal, no fault is listed: those that change nothing then explain it, too.
  */
 function explanations({faults, T}, state, d0, d, partly) {
@@ -254,7 +254,7 @@ class ValvePage extends View {
           repairText(this.#about));
       if (!this.gone) this.#showState();
     } catch {
-      // What is known without it is shown.
+      // The page shows what is known without it.
     }
   }
 

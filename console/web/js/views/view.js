@@ -1,4 +1,4 @@
-// What all views share: an element, a title, and an end.
+// The parts that all views share: an element, a title, and an end.
 
 import {isPressed} from '../dom.js';
 import {onKey} from '../shortcuts.js';
