@@ -10,7 +10,7 @@ _fdi_listed() {
     sed -n "s/^ *\"$key\": \"\(.*\)\",\{0,1\}\$/\1/p" | sort -u
 }
 
-# Of the catalogue, without what the floor finds.
+# Faults of the catalogue, without the findings of the floor.
 _fdi_faults() {
   _fdi_listed fault faults | grep -vE '_|^unknown$'
 }

@@ -174,7 +174,7 @@ end_server() {
   wait $server || fail "the server ended with $?"
   server=
 }
-trust() {  # What was rejected, at the next start.
+trust() {  # Trusts the rejected certificates, and restarts.
   end_server
   mv "$FDI_DATA"/opcua/rejected/* "$FDI_DATA/opcua/trusted/certs"
   serve --host 0.0.0.0

@@ -72,7 +72,7 @@ console.error(`opcua_server: ready ${startMs / 1000}`);
 for (let at = 1; at < rows.length; ++at) {
   do await wait(10); while (!subscribed(server));
   if (at === down[0]) {
-    await wait(200);  // What was given is also fetched.
+    await wait(200);  // The client fetches the values given so far.
     await server.shutdown(0);
     server = await start();
     at = down[1];

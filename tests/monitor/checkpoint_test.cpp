@@ -1,4 +1,4 @@
-// What the monitor keeps each minute: time by quality, accumulators.
+// Records that the monitor keeps each minute: time by quality, accumulators.
 #include "monitor/checkpoint.h"
 
 #include <optional>

@@ -228,7 +228,7 @@ TEST_F(AuditBesideModelsTest, WhatItFoundOnlyItFindsNormal) {
   EXPECT_GE(outlet_.normal, 1);
 }
 
-// What does not fit is refused, and the loop asks again.
+// Windows beyond the capacity are refused, and the loop asks again.
 TEST(AuditWorkerTest, AFewWindowsMayWait) {
   AuditWorker worker;
   std::vector<std::future<std::optional<loop::Audit>>> answers;

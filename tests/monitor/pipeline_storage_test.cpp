@@ -13,7 +13,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-// What is stored, and what becomes of it while storage fails.
+// Tests of what is stored, and of failures of storage.
 using PipelineStorageTest = PipelineTest;
 
 TEST_F(PipelineStorageTest, AnEventIsStoredBeforeItIsPublished) {
@@ -55,7 +55,7 @@ TEST_F(PipelineStorageTest, AnEventIsMarkedAsSentOnceItIsAcknowledged) {
   EXPECT_EQ(history_.sent, 2);
 }
 
-// Of valves that fail in the same sample none waits for the commits of others.
+// If valves fail in the same sample, none waits for the commits of others.
 TEST_F(PipelineStorageTest, EventsThatWaitTogetherAreStoredInOneCommit) {
   constexpr int kValves = 100;
   history_.commit_time = milliseconds(40);

@@ -191,7 +191,7 @@ TEST_F(PipelineTest, AModelSetThatCannotBeHadLeavesTheValveUnassigned) {
   EXPECT_EQ(counters_[Counter::kModelFailures], 1U);
 }
 
-// What runs before Start() may use the connections of the sinks.
+// Code that runs before Start() may use the connections of the sinks.
 TEST_F(PipelineTest, NoThreadStartsBeforeStart) {
   FakeRuns runs;
   std::thread([] {}).join();  // A sanitizer starts its own with the first.

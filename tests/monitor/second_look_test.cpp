@@ -91,7 +91,7 @@ class SecondLookTest : public testing::Test {
     t.faults = engine_.isolated;
   }
 
-  // Of row k: detected at kAtOnce, f7 five rows later.
+  // Engine at row k: detected at kAtOnce, f7 five rows later.
   void Observe(std::uint64_t k) {
     engine_.stamp_ns = PlantSample(k).stamp_ns;
     engine_.source_id = 1;
@@ -225,7 +225,7 @@ TEST_F(SecondLookTest, ALookForGrowthTellsTheStrengthAndChangesNoName) {
   worker_.Start();
   ASSERT_TRUE(AwaitLooks(1));
   Feed(kFirstLook + 1, kCounts + 20);
-  ASSERT_EQ(outlet_.strengths.size(), 1U);  // Of the look that named it.
+  ASSERT_EQ(outlet_.strengths.size(), 1U);  // The naming look's.
   const StrengthPoint named = outlet_.strengths[0];
   EXPECT_EQ(named.stamp_ns, (outlet_.looks[0].faults[0].begins_ns +
                              PlantSample(kFirstLook).stamp_ns) /
@@ -331,7 +331,7 @@ TEST_F(SecondLookTest, AnEpisodeThatTheEngineEndsKeepsTheName) {
   const Transition named = names_.End(closed);
   EXPECT_EQ(named.faults, kF19);
   EXPECT_EQ(named.unknown, Unknown::kNone);
-  EXPECT_EQ(names_.End(closed).faults, kF7);  // Of an episode after that.
+  EXPECT_EQ(names_.End(closed).faults, kF7);  // The next episode.
 }
 
 TEST_F(SecondLookTest, WhatNoFaultExplainsBecomesUnknown) {

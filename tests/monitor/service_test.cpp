@@ -219,7 +219,7 @@ TEST_F(ServiceTest, EveryReloadThatFailsIsALineOfTheLog) {
   driver.join();
 }
 
-// What was changed is not changed again because it could not be read once.
+// A change is not made twice because the file could not be read once.
 // Meanwhile nobody is told every few seconds of sets that are not in use.
 TEST_F(ServiceTest, AReloadThatFailedIsTriedAgain) {
   const std::filesystem::path models = global_.data_dir / "models.db";

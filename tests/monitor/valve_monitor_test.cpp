@@ -342,7 +342,7 @@ TEST_F(ValveMonitorTest, AResumedEpisodeWithAnotherFaultIsReisolated) {
   EXPECT_EQ(notebook_.events.at(0).candidates.front().fault, 1);
 }
 
-// What leaves the valve says the same everywhere.
+// Every output of the valve says the same.
 TEST_F(ValveMonitorTest, AFaultThatGrowsIsAnnouncedOnceItsPriorityRises) {
   ValveMonitor valve(
       "V1", EngineParts(SharedLinearModels()), {}, nullptr,
