@@ -78,7 +78,7 @@ sub looks {
   return "Only the reading of $signal{$reading} changes."
     if $reading && $signal{$reading};
   return 'Nothing changes in these signals.' if $in{None};
-  return 'Both how X answers CV and F (or another reading) at a given X change.'
+  return 'X answers CV differently, and F (or another reading) at a given X changes.'
     if $in{Both} || ($in{Rod} && $in{Behind});
   return 'X no longer answers CV as it did; F at a given X is as usual.' if $in{Rod};
   return 'X answers CV as usual; F at a given X, or another reading, changes.';
@@ -107,14 +107,14 @@ for my $code (@faults) {
 }
 print <<'TEXT';
 
-CV is the command, X the position, F the flow, P1 and P2 the pressures before and behind the valve, T1 the temperature. CV and X count in % of closing: 100 % is shut.
+CV is the command, X the position, F the flow, P1 and P2 the pressures upstream and downstream, T1 the temperature. CV and X are in % of closing: 100 % is shut.
 
 TEXT
 for my $code (@codes) {
   if ($code eq 'travel_deviation') {
-    print "## Findings\nWhat cannot be, whatever its cause: wide limits that ",
-      "hold at all times, the audit of a loop, a slow drift. Their code is ",
-      "their name.\n\n";
+    print "## Findings\nA finding says that something is wrong, not why: by wide ",
+      "limits, which always hold, by the audit of a loop, or by a slow ",
+      "drift. Its code is its name.\n\n";
   }
   my $e = $entry{$code};
   print '<a id="', $code, '"></a>', "\n";
