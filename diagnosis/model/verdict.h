@@ -86,7 +86,7 @@ enum class TransitionKind : std::uint8_t {
   kCleared,
   kClosed,
   kChanged,  ///< The priority rose. On the bus: kReisolated, the same faults.
-  kSecond,   ///< The fault on top of the name has changed. On the bus likewise.
+  kSecond,   ///< What is on top of the name has changed. On the bus likewise.
 };
 
 /// Gives an episode a name.
