@@ -58,6 +58,9 @@ constexpr auto kRemoved = std::to_array<Removed>({
     {"fdi-simulator", "run", "--valves", "--count N"},
     {"fdi-simulator", "run", "--export", "-o FILE"},
     {"fdi-simulator", "run", "--cold-start", "--set cold_start=true"},
+    {"fdi-simulator", "*", "--end-now",
+     "at any speed the last stamp is the present time, unless --start states "
+     "the first"},
     {"fdi-simulator", "replay", "--csv", "--file FILE"},
     {"fdi-simulator", "replay", "--period",
      "a file tells its period; samples that arrive one by one are readings for "

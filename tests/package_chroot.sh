@@ -57,7 +57,7 @@ quietly within sh -ec 'cd /empty
   echo $! >monitor.pid
   timeout 60 sh -c "until grep -q monitor_ready monitor.log; do sleep 0.1; done"
   fdi-simulator run --valve FV-101 --parameters paper-operating-point \
-    --duration 600 --speed 20 --end-now --set excitation.amplitude_pct=12 \
+    --duration 600 --speed 20 --set excitation.amplitude_pct=12 \
     --set excitation.period_s=60 --fault f19:abrupt@120:strength=0.5 &
   echo $! >simulator.pid
   timeout 60 sh -c "until fdi-store history list --json | grep f19; do sleep 0.2; done"'

@@ -132,7 +132,7 @@ timeout 30 sh -c 'until grep -q monitor_ready monitor.log; do sleep 0.05; done' 
   fail "$(cat monitor.log)"
 "$build/bin/fdi-simulator" --domain "$domain" run --valve LV --count 2 \
   --parameters paper-operating-point --fault f19:abrupt@3000:strength=0.5 \
-  --duration 7500 --end-now --speed max --log-level error >/dev/null
+  --duration 7500 --speed max --log-level error >/dev/null
 kill "$monitor"
 wait "$monitor" || fail "the monitor ended with $?"
 monitor=

@@ -134,11 +134,9 @@ void AddDeliveryOptions(CLI::App& verb, DeliveryOptions& options) {
                   "reader takes the samples, without loss (default: 1)")
       ->type_name("N|max");
   verb.add_option("--start", options.start,
-                  "UTC of the first sample (default: now)")
+                  "UTC of the first sample (default: so early that no stamp is "
+                  "ahead of the clock)")
       ->type_name("UTC");
-  verb.add_flag("--end-now", options.end_now,
-                "End with the present time instead of beginning with it: at "
-                "any speed no stamp is ahead of the clock");
   verb.add_option("--wait-reader", options.wait_reader_s,
                   "Seconds to wait for a reader (default: 30 at --speed max, "
                   "which needs one; otherwise 2, after which the samples are "
@@ -152,15 +150,11 @@ void AddDeliveryOptions(CLI::App& verb, DeliveryOptions& options) {
 std::int64_t StartOf(const DeliveryOptions& options, double duration_s,
                      double speed) {
   constexpr std::int64_t kMillisecond = 1'000'000;
-  if (options.end_now && !options.start.empty()) {
-    throw ConfigError("--end-now and --start exclude each other");
-  }
   if (!options.start.empty()) {
     return ParseTime(options.start, true);
   }
   // Slower than real time no stamp is ahead of the clock.
-  const double ahead_s =
-      options.end_now ? duration_s * std::max(0.0, 1.0 - 1.0 / speed) : 0.0;
+  const double ahead_s = duration_s * std::max(0.0, 1.0 - 1.0 / speed);
   return (NowNs() / kMillisecond - std::llround(1e3 * ahead_s)) * kMillisecond;
 }
 

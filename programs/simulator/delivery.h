@@ -27,15 +27,14 @@ struct DeliveryOptions {
   std::optional<std::string> speed;
   std::optional<double> wait_reader_s;
   bool keep_alive{false};
-  std::string start;    ///< RFC 3339, or empty: now.
-  bool end_now{false};  ///< The last stamp is that of its publication.
+  std::string start;  ///< RFC 3339, or empty: see StartOf.
 };
 
 void AddDeliveryOptions(CLI::App& verb, DeliveryOptions& options);
 
-/// options.start, or now to the millisecond; with end_now so much earlier that
-/// the last of the samples is stamped when it is published: before that each is
-/// older than the clock. @throws ConfigError
+/// options.start, or so long before now, to the millisecond, that the last of
+/// the samples is stamped when it is published and each before it is older than
+/// the clock; at real time that is now. @throws ConfigError
 std::int64_t StartOf(const DeliveryOptions& options, double duration_s,
                      double speed);
 

@@ -119,9 +119,6 @@ void Check(const ReplayOptions& options) {
   if (options.keep_stamps && !options.delivery.start.empty()) {
     throw ConfigError("--keep-stamps and --start exclude each other");
   }
-  if (options.keep_stamps && options.delivery.end_now) {
-    throw ConfigError("--keep-stamps and --end-now exclude each other");
-  }
   if (options.file.empty() && options.table.given()) {
     throw ConfigError("--map, --zone and --resample are of --file");
   }
@@ -212,7 +209,7 @@ void AddReplayVerb(report::Program& program) {
       ->type_name("ID");
   AddDeliveryOptions(verb, options.delivery);
   verb.add_flag("--keep-stamps", options.keep_stamps,
-                "Keep the time stamps instead of beginning now; t_s of a CSV "
+                "Keep the time stamps instead of ending now; t_s of a CSV "
                 "is then Unix time");
   verb.add_flag("--split-gaps", options.split_gaps,
                 "Accept gaps in the times of a CSV, and keep them");

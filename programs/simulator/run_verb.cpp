@@ -272,8 +272,8 @@ void AddRunVerb(report::Program& program) {
                 "Simulate only, as fast as possible");
   verb.add_option("-o,--output", options.export_file, "Write the run as CSV")
       ->type_name("FILE.csv");
-  report::ShowInHelpAll(verb, {"--start", "--end-now", "--wait-reader",
-                               "--keep-alive", "--output"});
+  report::ShowInHelpAll(
+      verb, {"--start", "--wait-reader", "--keep-alive", "--output"});
 }
 
 }  // namespace fdi::simulator

@@ -14,7 +14,7 @@ source "$tests/system/programs.sh" "$1"
 start --model-set quick --console=127.0.0.1:0
 "$bin/fdi-simulator" --domain "$domain" run --valve V1 --speed 100 --duration 400 \
   --seed 7 --parameters paper-operating-point --set excitation.amplitude_pct=8 \
-  --set excitation.period_s=80 --fault f19:abrupt@100:strength=0.5 --end-now \
+  --set excitation.period_s=80 --fault f19:abrupt@100:strength=0.5 \
   >/dev/null 2>feed.log
 address=$(sed -n 's/.*console_listening address=\([0-9.:]*\).*/\1/p' monitor.log)
 timeout 30 bash -c "until [ \"\$(sqlite3 -readonly $FDI_DATA/history.db \

@@ -38,7 +38,7 @@ try {
   const endMs = Date.now() + 1000 * kSeconds / kSpeed;
   let seed = 0;
   const simulate = (id, ...words) => plant.simulate('--valve', id,
-      '--duration', String(kSeconds), '--speed', String(kSpeed), '--end-now',
+      '--duration', String(kSeconds), '--speed', String(kSpeed),
       '--seed', String(seed += 20), ...words);
   simulate('U2-PV-301', '--fault', 'f19:abrupt@400:strength=0.5');
   simulate('U1-LV-204', '--fault', 'f6:abrupt@250:strength=0.6');

@@ -63,7 +63,7 @@ TEST_F(AppPublishTest, StampsThatEndNowAreNeverAheadOfTheClock) {
                                              {"replay", "--file", file}}) {
     Reader reader(domain_);
     std::vector<std::string> words = what;
-    words.insert(words.end(), {"--valve", "E", "--speed", "300", "--end-now"});
+    words.insert(words.end(), {"--valve", "E", "--speed", "300"});
     const std::int64_t began_ns = NowNs();
     Process process(With(words));
     ASSERT_TRUE(reader.TakeUntilEnded());
