@@ -151,8 +151,10 @@ Report ListEpisodes(const HistoryOptions& options, const Context& context) {
       {"worst", "worst_strength", Format::kPercent, 0, 5},
       TextColumn(
           "named after",
-          [](const Json& row) { return After(row, "isolated_utc"); }, 6,
-          Align::kRight),
+          [](const Json& row) {  // A name that was withdrawn is none.
+            return row["fault"] == "unknown" ? "" : After(row, "isolated_utc");
+          },
+          6, Align::kRight),
       TextColumn(
           "lasted", [](const Json& row) { return After(row, "returned_utc"); },
           5, Align::kRight),
@@ -213,6 +215,9 @@ std::string NoteText(const HistoryEntry& event) {
     }
     if (!event.value.empty()) {
       return event.value;  // The drift of a position.
+    }
+    if (event.kind == "REISOLATED" && event.faults.empty()) {
+      return "name withdrawn";
     }
     return ByPhysics(event.layer) ? kByPhysics : event.reason;
   }

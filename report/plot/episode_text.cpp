@@ -121,7 +121,10 @@ std::vector<Column> EpisodeFields(const Alarm& alarm,
                                 std::string(NamurName(words.namur)) + ")"),
           Field("alarm", AlarmLine(alarm, utc)),
           {"detected", "detected_utc", report::Format::kTime},
-          Field("named", when(e.isolated_ns)),
+          Field("named",
+                when(e.isolated_ns) + (e.isolated_ns && !storage::IsNamed(e)
+                                           ? ", withdrawn since"
+                                           : "")),
           Field("cleared", when(e.cleared_ns)),
           Field("ended", ShownTime(e.ended_ns, utc) + " " +
                              e.end_reason.value_or("(open)")),

@@ -128,6 +128,16 @@ after(async () => {
   monitor.stop();
 });
 
+test('a name that was withdrawn is not called a new one', async () => {
+  monitor.reset([tile('A', 'NORMAL')]);
+  const page = await openShared(browser, address, '#/');
+  const words = await page.evaluate(async () => {
+    const {markWord} = await import('/js/faults.js');
+    return ['f3', '', null].map((faults) => markWord('REISOLATED', faults));
+  });
+  assert.deepEqual(words, ['named anew', 'name withdrawn', 'name withdrawn']);
+});
+
 test('a new valve leaves the worst ones first', async () => {
   monitor.reset([tile('A', 'NORMAL'), tile('C', 'NORMAL'),
     tile('Z', 'ISOLATED', ['f19'], {severity: 'high'})]);

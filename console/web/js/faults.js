@@ -192,8 +192,9 @@ const kMarkWords = {
   ISOLATED: 'named', REISOLATED: 'named anew', CHANGED: 'priority rose', SECOND: 'second fault', ACK: 'acknowledged',
   LABEL: 'labelled',
 };
-export const markWord = (kind) =>
-  kMarkWords[String(kind).toUpperCase()] ?? plain(kind);
+/** `text` of a mark, or faults of an event: none if a name was withdrawn. */
+export const markWord = (kind, text) => kind === 'REISOLATED' && !text ?
+  'name withdrawn' : kMarkWords[String(kind).toUpperCase()] ?? plain(kind);
 
 /** What gave a fault its name, where that is not the observers. */
 export const layerText = (layer) =>

@@ -270,6 +270,18 @@ TEST_F(FdiStoreHistoryTest, WhatEndedEarlyIsNotUnlikeAnyKnownFault) {
               HasSubstr("not yet: Fault that ended before it had a name"));
 }
 
+TEST_F(FdiStoreHistoryTest, ANameThatWasWithdrawnIsNone) {
+  EXPECT_THAT(Store("history list").out, HasSubstr("   20 s"));
+  EXPECT_THAT(Store("history show last").out,
+              testing::ContainsRegex("named: +[^\n]*, after 20 s\n"));
+  HistoryWriter(path_).Record(Event(TransitionKind::kReisolated, 60, 0, 0.3),
+                              kDetected);
+  EXPECT_THAT(Store("history list").out, testing::Not(HasSubstr("   20 s")));
+  const std::string shown = Store("history show last").out;
+  EXPECT_THAT(shown, HasSubstr("after 20 s, withdrawn since\n"));
+  EXPECT_THAT(shown, HasSubstr("name withdrawn\n"));
+}
+
 TEST_F(FdiStoreHistoryTest, FiltersReachTheQuery) {
   const auto count = [this](const std::string& arguments) {
     return StoreJson("history list " + arguments)["episodes"].size();

@@ -110,7 +110,7 @@ function drawMarks(u, ctx, {left, top, width, height}, marks, first) {
     drawLine(ctx, [x, top], [x, top + height],
         mark.kind === 'DETECTED' ? [4, 3] : []);
     if (!first) continue;
-    const text = markWord(mark.kind);
+    const text = markWord(mark.kind, mark.text);
     const room = ctx.measureText(text).width + 8 * ratio;
     row = x - lastX < room ? row + 1 : 0;
     lastX = x;

@@ -135,7 +135,7 @@ export class Timeline {
           (gap.to_ms === null ? '' :
             `, ${durationText(gap.to_ms - gap.from_ms)}`)) + '. ') +
       (marks.length === 0 ? '' : 'Marks: ' + list(marks, (mark) =>
-        `${timeText(mark.t_ms)} ${markWord(mark.kind)}`) + '.'));
+        `${timeText(mark.t_ms)} ${markWord(mark.kind, mark.text)}`) + '.'));
   }
 
   // While nothing comes the window goes on, so that the gap is seen to grow.

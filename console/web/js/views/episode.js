@@ -88,7 +88,7 @@ const withRepairs = ({events, repairs}) => [...events, ...(repairs ?? []).map(
 const kEventColumns = [
   {text: 'Time', cell: (event) => timeCell(event.at_ms)},
   {text: 'What', header: true, class: 'word', cell: (event) =>
-    markWord(event.kind)},
+    markWord(event.kind, event.faults)},
   {text: 'Details', class: 'remark', cell: eventText},
   {text: 'Who', cell: (event) => event.who ?? ''},
   {text: 'From where', class: 'wide', cell: (event) => event.origin ?? ''},
