@@ -17,6 +17,7 @@ packages=(
   libeigen3-dev libsundials-dev
   libsqlite3-dev libsqlitecpp-dev sqlite3 zlib1g-dev libssl-dev openssl libpq-dev
   libcpp-httplib-dev libsystemd-dev libmosquitto-dev
+  libprotobuf-dev protobuf-compiler
   libcli11-dev libtomlplusplus-dev libspdlog-dev nlohmann-json3-dev libhowardhinnant-date-dev
   gnuplot-nox
 )

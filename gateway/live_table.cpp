@@ -170,4 +170,17 @@ LiveTable ReadLiveTable(const std::filesystem::path& path, bool by_topics) {
   return table;
 }
 
+std::set<std::string, std::less<>> TagsOf(const LiveTable& table) {
+  std::set<std::string, std::less<>> tags;
+  for (const importer::LiveValve& valve : table.valves) {
+    for (const importer::ColumnMapping& column : valve.map.columns) {
+      tags.insert(column.column);
+    }
+    if (!valve.map.mode_column.empty()) {
+      tags.insert(valve.map.mode_column);
+    }
+  }
+  return tags;
+}
+
 }  // namespace fdi::gateway

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -39,5 +40,8 @@ struct LiveTable {
 ///   otherwise: that a broker is alive says nothing of its devices.
 /// @throws as importer::ReadPlantTable(); ConfigError for `resample`.
 LiveTable ReadLiveTable(const std::filesystem::path& path, bool by_topics);
+
+/// The tags that a client has to subscribe to.
+std::set<std::string, std::less<>> TagsOf(const LiveTable& table);
 
 }  // namespace fdi::gateway

@@ -70,6 +70,15 @@ std::string NewClientId() {
 void MqttOptions::AddTo(CLI::App& verb) {
   verb.add_option("--mqtt", url, "The broker; mqtts is encrypted")
       ->type_name("mqtt[s]://[USER@]HOST[:PORT]");
+  verb.add_option("--sparkplug", sparkplug,
+                  "Speak Sparkplug B in GROUP instead (docs/connect.md)")
+      ->type_name("GROUP")
+      ->needs("--mqtt")
+      ->check([](const std::string& group) -> std::string {
+        return group.empty() || group.find_first_of("/+#") != std::string::npos
+                   ? "a group is a name without /, + and #"
+                   : "";
+      });
   verb.add_option("--password-file", password,
                   "The user's password (default: the variable "
                   "FDI_MQTT_PASSWORD)")
@@ -133,9 +142,12 @@ MqttClient::Address MqttClient::Parse(const std::string& url) {
   return address;
 }
 
-MqttClient::MqttClient(const MqttOptions& options, const Will& will,
-                       LogSink log)
-    : address_(Parse(options.url)), log_(std::move(log)), events_(kQueue) {
+MqttClient::MqttClient(const MqttOptions& options,
+                       std::function<Outgoing()> will, LogSink log)
+    : address_(Parse(options.url)),
+      will_(std::move(will)),
+      log_(std::move(log)),
+      events_(kQueue) {
   RequireFile(options.ca, "--ca");
   RequireFile(options.certificate, "--certificate");
   RequireFile(options.key, "--key");
@@ -145,14 +157,14 @@ MqttClient::MqttClient(const MqttOptions& options, const Will& will,
     throw std::bad_alloc();
   }
   try {
-    SetUp(options, will);
+    SetUp(options);
   } catch (...) {
     mosquitto_destroy(library_);
     throw;
   }
 }
 
-void MqttClient::SetUp(const MqttOptions& options, const Will& will) {
+void MqttClient::SetUp(const MqttOptions& options) {
   const auto check = [](int code, const std::string& what) {
     if (code != MOSQ_ERR_SUCCESS) {
       throw ConfigError(what + ": " + ErrorOf(code));
@@ -174,12 +186,6 @@ void MqttClient::SetUp(const MqttOptions& options, const Will& will) {
           "--ca, --certificate, --key");
   } else if (!options.ca.empty() || !options.certificate.empty()) {
     throw ConfigError("--ca and --certificate are of mqtts://");
-  }
-  if (!will.topic.empty()) {
-    check(mosquitto_will_set(library_, will.topic.c_str(),
-                             static_cast<int>(will.payload.size()),
-                             will.payload.data(), 1, true),
-          "the last will");
   }
   mosquitto_connect_callback_set(
       library_, [](mosquitto*, void* self, int code) {
@@ -216,8 +222,7 @@ void MqttClient::Run(const std::stop_token& stop) {
   std::chrono::seconds pause(1);
   while (!stop.stop_requested()) {
     refused_.clear();
-    int code = mosquitto_connect(library_, address_.host.c_str(), address_.port,
-                                 kKeepAliveS);
+    int code = Connect();
     while (code == MOSQ_ERR_SUCCESS && !stop.stop_requested()) {
       code = mosquitto_loop(library_, kLoopMs, 1);
       pause = connected_ ? std::chrono::seconds(1) : pause;
@@ -240,6 +245,17 @@ void MqttClient::Run(const std::stop_token& stop) {
   mosquitto_disconnect(library_);
   mosquitto_loop(library_, kLoopMs, 1);
   connected_ = false;
+}
+
+int MqttClient::Connect() {
+  if (will_) {
+    const Outgoing will = will_();
+    mosquitto_will_set(library_, will.topic.c_str(),
+                       static_cast<int>(will.payload.size()),
+                       will.payload.data(), will.qos, will.retained);
+  }
+  return mosquitto_connect(library_, address_.host.c_str(), address_.port,
+                           kKeepAliveS);
 }
 
 void MqttClient::SayLost(const std::string& why) {
@@ -301,12 +317,12 @@ void MqttClient::Unsubscribe(const std::vector<std::string>& topics) {
   }
 }
 
-bool MqttClient::Publish(const std::string& topic, const std::string& payload,
-                         bool retained) {
+bool MqttClient::Publish(const Outgoing& message) {
   return connected_ &&
-         mosquitto_publish(library_, nullptr, topic.c_str(),
-                           static_cast<int>(payload.size()), payload.data(), 1,
-                           retained) == MOSQ_ERR_SUCCESS;
+         mosquitto_publish(library_, nullptr, message.topic.c_str(),
+                           static_cast<int>(message.payload.size()),
+                           message.payload.data(), message.qos,
+                           message.retained) == MOSQ_ERR_SUCCESS;
 }
 
 }  // namespace fdi::gateway

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <string>
 #include <thread>
@@ -29,9 +30,18 @@ struct MqttOptions {
   std::filesystem::path certificate;  ///< For this client, with its key.
   std::filesystem::path key;
   std::filesystem::path password;  ///< A file; empty: FDI_MQTT_PASSWORD.
+  std::string sparkplug;           ///< A group; empty: topics of our own.
 
-  /// Adds --mqtt, --ca, --certificate, --key and --password-file.
+  /// Adds --mqtt, --sparkplug, --ca, --certificate, --key and --password-file.
   void AddTo(CLI::App& verb);
+};
+
+/// An outgoing MQTT message.
+struct Outgoing {
+  std::string topic;
+  std::string payload;
+  bool retained{true};
+  int qos{1};
 };
 
 /// An event of the connection, in order of arrival.
@@ -48,16 +58,13 @@ struct MqttEvent {
 /// a bounded queue, and are dropped and counted beyond it.
 class MqttClient {
  public:
-  struct Will {
-    std::string topic;
-    std::string payload;
-  };
-
-  /// @param will published by the broker when this client is gone; empty
-  ///   topic: none.
+  /// @param will makes what the broker publishes when this client is gone. It
+  /// is
+  ///   called before each connection, by the thread of the client; empty: none.
   /// @throws ConfigError for an URL, a file of keys or a password that cannot
   ///   be used; NotFoundError.
-  MqttClient(const MqttOptions& options, const Will& will, LogSink log);
+  MqttClient(const MqttOptions& options, std::function<Outgoing()> will,
+             LogSink log);
   ~MqttClient();
   MqttClient(const MqttClient&) = delete;
   MqttClient& operator=(const MqttClient&) = delete;
@@ -71,10 +78,9 @@ class MqttClient {
   /// Subscribes with QoS 0; call it at each kConnected.
   void Subscribe(const std::vector<std::string>& topics);
   void Unsubscribe(const std::vector<std::string>& topics);
-  /// QoS 1. @returns false if there is no connection, or the message does not
-  ///   fit: it is not kept for later.
-  bool Publish(const std::string& topic, const std::string& payload,
-               bool retained);
+  /// @returns false if there is no connection, or the message does not fit: it
+  ///   is not kept for later.
+  bool Publish(const Outgoing& message);
 
   bool connected() const { return connected_; }
   std::uint64_t dropped() const { return dropped_; }
@@ -87,13 +93,15 @@ class MqttClient {
     int port{0};
   };
   static Address Parse(const std::string& url);
-  void SetUp(const MqttOptions& options, const Will& will);
+  void SetUp(const MqttOptions& options);
+  int Connect();
   void Run(const std::stop_token& stop);
   void OnConnect(int code);
   void OnMessage(const mosquitto_message& message);
   void SayLost(const std::string& why);
 
   Address address_;
+  std::function<Outgoing()> will_;
   LogSink log_;
   mosquitto* library_{nullptr};
   BoundedQueue<MqttEvent> events_;

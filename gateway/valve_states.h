@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "gateway/mqtt_client.h"
 #include "monitor/bus/watch_table.h"
 #include "report/fault_texts.h"
 #include "report/findings/finding.h"
@@ -16,13 +17,6 @@
 #include "storage/history/alarm.h"
 
 namespace fdi::gateway {
-
-/// An outgoing MQTT message.
-struct Outgoing {
-  std::string topic;
-  std::string payload;
-  bool retained{true};
-};
 
 /// "fdi/SITE/": the topics of one plant.
 std::string TopicPrefix(const std::string& site);

@@ -29,8 +29,8 @@ forbid '^(base|diagnosis|idl|import|report|storage|trainer|monitor|console|gatew
   'SUNDIALS belongs to simulator'
 forbid '^((diagnosis|idl|simulator|trainer|monitor)/[^/]+$|(base|plant|storage)/)' '(CLI/|spdlog/|nlohmann/)' \
   'command line, logging and JSON belong to the programs'
-forbid '^(base|diagnosis|idl|import|report|simulator|storage|trainer|monitor|console|planner|plant|programs)/' 'mosquitto' \
-  'MQTT belongs to gateway'
+forbid '^(base|diagnosis|idl|import|report|simulator|storage|trainer|monitor|console|planner|plant|programs)/' '(mosquitto|google/protobuf|.*\.pb\.h)' \
+  'MQTT and Protocol Buffers belong to gateway'
 forbid '^(diagnosis|idl|import|simulator|storage|trainer|monitor|console|gateway|planner|plant|programs)/' 'toml\+\+' \
   'TOML belongs to base and to the options'
 forbid '^(diagnosis|idl|import|report|simulator|storage|trainer|monitor|console|gateway|planner|plant|programs|bench)/' 'date/' \

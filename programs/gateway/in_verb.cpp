@@ -1,6 +1,5 @@
 #include <chrono>
 #include <memory>
-#include <set>
 #include <string>
 
 #include <CLI/CLI.hpp>
@@ -11,6 +10,7 @@
 #include "gateway/intake.h"
 #include "gateway/line_source.h"
 #include "gateway/mqtt_source.h"
+#include "gateway/sparkplug_source.h"
 #include "programs/gateway/verbs.h"
 #include "report/program.h"
 #include "report/stop_signals.h"
@@ -30,23 +30,19 @@ struct InOptions {
 
 std::unique_ptr<ReadingSource> OpenSource(const InOptions& options,
                                           const report::Context& context) {
-  if (options.lines.empty()) {
-    return std::make_unique<MqttSource>(options.mqtt, context.log);
+  if (!options.lines.empty()) {
+    return std::make_unique<LineSource>(options.lines);
   }
-  return std::make_unique<LineSource>(options.lines);
+  if (!options.mqtt.sparkplug.empty()) {
+    return std::make_unique<SparkplugSource>(
+        options.mqtt, std::chrono::nanoseconds(ParseDuration(options.lateness)),
+        context.log);
+  }
+  return std::make_unique<MqttSource>(options.mqtt, context.log);
 }
 
-// The tags that a client has to subscribe to.
 report::Report ListTags(const std::string& plant) {
-  std::set<std::string> tags;
-  for (const importer::LiveValve& valve : ReadLiveTable(plant, false).valves) {
-    for (const importer::ColumnMapping& column : valve.map.columns) {
-      tags.insert(column.column);
-    }
-    if (!valve.map.mode_column.empty()) {
-      tags.insert(valve.map.mode_column);
-    }
-  }
+  const auto tags = TagsOf(ReadLiveTable(plant, false));
   report::Report report;
   report.document["tags"] = tags;
   return report.Line(JoinText(tags, "\n"));
@@ -67,11 +63,12 @@ report::Report RunIn(const InOptions& options, const report::Context& context) {
   // A broker that does not answer, a reader that does not read.
   signals.EndWithin(std::chrono::seconds(5));
   const auto source = OpenSource(options, context);
-  Intake intake({.plant = options.plant,
-                 .by_topics = options.lines.empty(),
-                 .by_group = options.by_group,
-                 .lateness_ns = ParseDuration(options.lateness)},
-                *source, context, signals);
+  Intake intake(
+      {.plant = options.plant,
+       .by_topics = options.lines.empty() && options.mqtt.sparkplug.empty(),
+       .by_group = options.by_group,
+       .lateness_ns = ParseDuration(options.lateness)},
+      *source, context, signals);
   intake.Run(duties);
   report::Report report;
   report.document = intake.Summary();

@@ -20,6 +20,9 @@ std::vector<fdi::report::VerbExamples> Examples() {
        {{"From a broker, by the topics of the table",
          "fdi-gateway in --plant plant.toml --mqtt mqtts://fdi@broker.example "
          "--password-file password"},
+        {"From the Sparkplug B nodes of a group",
+         "fdi-gateway in --plant plant.toml --mqtt mqtt://127.0.0.1 "
+         "--sparkplug PLANT"},
         {"From a named pipe; what came of each tag is at 127.0.0.1:9465/tags",
          "fdi-gateway in --plant plant.toml --lines readings --http 9465"}}},
       {"out",

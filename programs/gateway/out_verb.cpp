@@ -16,6 +16,7 @@
 #include "gateway/duties.h"
 #include "gateway/live_table.h"
 #include "gateway/mqtt_client.h"
+#include "gateway/sparkplug_node.h"
 #include "gateway/valve_states.h"
 #include "import/plant_table.h"
 #include "monitor/bus/bus_view.h"
@@ -122,12 +123,13 @@ class BrokerOutlet : public Outlet {
  public:
   BrokerOutlet(const OutOptions& options, const Outgoing& will,
                const LogSink& log)
-      : client_(options.mqtt, {will.topic, will.payload}, log),
+      : client_(
+            options.mqtt, [will] { return will; }, log),
         former_(TopicPrefix(options.site)) {
     client_.Start();
   }
   bool Publish(const Outgoing& message) override {
-    return client_.Publish(message.topic, message.payload, message.retained);
+    return client_.Publish(message);
   }
   bool Ready(ValveStates& states) override {
     client_.Take(events_, std::chrono::milliseconds(0));
@@ -148,13 +150,61 @@ class BrokerOutlet : public Outlet {
     return Clock::now() - start_ >= kAcquainted;
   }
   void End(const Outgoing& farewell) override {
-    client_.Publish(farewell.topic, farewell.payload, true);
+    client_.Publish(farewell);
     client_.Stop();
   }
 
  private:
   MqttClient client_;
   Former former_;
+  std::vector<MqttEvent> events_;
+  Clock::time_point start_{Clock::now()};
+};
+
+// The same states as an edge node of Sparkplug B.
+class SparkplugOutlet : public Outlet {
+ public:
+  SparkplugOutlet(const OutOptions& options, const LogSink& log)
+      : node_(options.mqtt.sparkplug, options.site),
+        client_(
+            options.mqtt, [this] { return node_.Will(); }, log) {
+    client_.Start();
+  }
+  bool Publish(const Outgoing& message) override {
+    bool sent = false;
+    for (const Outgoing& part : node_.Tell(message)) {
+      sent = client_.Publish(part);
+    }
+    return sent;
+  }
+  bool Ready(ValveStates& states) override {
+    client_.Take(events_, std::chrono::milliseconds(0));
+    bool birth = false;
+    for (const MqttEvent& event : events_) {
+      if (event.kind == MqttEvent::Kind::kConnected) {
+        client_.Subscribe({node_.commands()});
+        birth = true;
+      }
+      birth = birth || (event.kind == MqttEvent::Kind::kMessage &&
+                        SparkplugNode::AsksForBirth(event.payload));
+    }
+    if (birth) {
+      client_.Publish(node_.Birth());
+      states.Forget();
+    }
+    return client_.connected();
+  }
+  bool KnowsAll() const override {
+    return Clock::now() - start_ >= kAcquainted;
+  }
+  void End(const Outgoing& /*farewell*/) override {
+    client_.Publish(node_.Death());
+    client_.Stop();
+  }
+
+ private:
+  SparkplugNode node_;
+  MqttClient client_;
   std::vector<MqttEvent> events_;
   Clock::time_point start_{Clock::now()};
 };
@@ -201,10 +251,13 @@ std::unique_ptr<Outlet> OpenOutlet(const OutOptions& options,
   if (options.lines.empty() == options.mqtt.url.empty()) {
     throw ConfigError("out takes one of --mqtt URL and --lines FILE|-");
   }
-  if (options.lines.empty()) {
-    return std::make_unique<BrokerOutlet>(options, will, log);
+  if (!options.lines.empty()) {
+    return std::make_unique<LineOutlet>(options.lines);
   }
-  return std::make_unique<LineOutlet>(options.lines);
+  if (!options.mqtt.sparkplug.empty()) {
+    return std::make_unique<SparkplugOutlet>(options, log);
+  }
+  return std::make_unique<BrokerOutlet>(options, will, log);
 }
 
 // The valves of the plant's table are told of whether or not a monitor does.
