@@ -1,13 +1,13 @@
 #!/usr/bin/env bash
 # Measures the cost of fdi-gateway in for 300 valves of 6 tags: by lines, each tag
 # once a second, then 10 000 readings a second, and as fast as a pipe gives them;
-# by MQTT, where mosquitto is; and, with NODE_MODULES, by OPC UA, from a server
+# by MQTT, where mosquitto is, by topics and by Sparkplug B; and, with NODE_MODULES, by OPC UA, from a server
 # with 1800 nodes through client.mjs. Beside a monitor that records nothing and
 # has no models; what it received is counted. Then three things that go wrong at one
 # of the 300 valves each: one tag of 1800 falls silent, a source's clock leaps by
 # 90 s, a device takes its tags away; how soon that is said, and which valves lack
 # signals. With a WAY, only that one.
-# Usage: gateway.sh FOLDER-OF-PROGRAMS [SECONDS [NODE_MODULES [lines|mqtt|opcua|wrong]]]
+# Usage: gateway.sh FOLDER-OF-PROGRAMS [SECONDS [NODE_MODULES [lines|mqtt|sparkplug|opcua|wrong]]]
 set -euo pipefail
 PATH=$PATH:/usr/sbin
 seconds=${2:-30}
@@ -32,12 +32,12 @@ trap finish EXIT
 } >plant.toml
 # READINGS a second for SECONDS; 0: as fast as they are taken, stamps a second
 # apart for 1800 readings. With a PORT to the broker there, a message for each
-# valve, else lines.
+# valve, by topics or as the Sparkplug node BENCH of the group PLANT; else lines.
 cat >feed.pl <<'END'
 use strict;
 use IO::Socket::INET;
 use Time::HiRes qw(time sleep);
-my ($rate, $seconds, $valves, $port, $wrong) = @ARGV;
+my ($rate, $seconds, $valves, $port, $wrong, $sparkplug) = @ARGV;
 my $out = \*STDOUT;
 # A packet of MQTT 3.1.1: type, length in groups of 7 bits, body.
 sub packet {
@@ -46,12 +46,38 @@ sub packet {
   do { $length .= chr($n % 128 | ($n > 127 ? 128 : 0)); $n >>= 7 } while $n;
   return chr($type) . $length . $body;
 }
+# Protocol Buffers, as far as gateway/sparkplug.proto takes them here.
+sub varint {
+  my ($n, $text) = (shift, "");
+  do { $text .= chr($n % 128 | ($n > 127 ? 128 : 0)); $n >>= 7 } while $n;
+  return $text;
+}
+my $seq = 0;
+sub metric {  # ALIAS VALUE [NAME]: a Double.
+  my $body = "\x10" . varint($_[0]) . "\x20\x0a\x69" . pack("d<", $_[1]);
+  $body = "\x0a" . varint(length $_[2]) . $_[2] . $body if $_[2];
+  return "\x12" . varint(length $body) . $body;
+}
+sub payload {  # TYPE[/DEVICE] METRICS
+  my ($type, $device) = split "/", $_[0];
+  return packet(0x30, pack("n/a*", "spBv1.0/PLANT/$type/BENCH" . ($device ? "/$device" : "")) .
+    "\x08" . varint(int(time * 1000)) . $_[1] . "\x18" . varint($seq++ % 256));
+}
 if ($port) {
   $out = IO::Socket::INET->new("127.0.0.1:$port") or die "no broker";
   print $out packet(0x10, pack("n/a*CCn n/a*", "MQTT", 4, 2, 0, "feed"));
 }
 $out->autoflush(1);
 my @tags = map { my $v = 100 + $_; map { "FV-$v.$_" } qw(OP ZT FT P1 P2 T1) } 1 .. $valves;
+my @names = qw(OP ZT FT P1 P2 T1);
+sub of_valve {  # VALUE [VALVE]: six metrics; in a birth with their names.
+  my ($v, $valve) = @_;
+  return join "", map { metric($_ + 1, $v, $valve && "$valve.$names[$_]") } 0 .. 5;
+}
+if ($sparkplug) {
+  print $out payload("NBIRTH", "");
+  print $out payload("DBIRTH/FV-$_", of_valve(50, "FV-$_")) for 101 .. 100 + $valves;
+}
 my $begin = time;
 my $start = int($begin) - ($rate ? 0 : 86400);
 my $total = ($rate || 20000) * $seconds;
@@ -63,6 +89,11 @@ for (my $n = 0; $n < $total;) {
     my $t = $rate ? time : $start + int($n / 1800);
     if ($port) {
       my $v = 50 + $n % 37;
+      if ($sparkplug) {
+        $text .= payload("DDATA/FV-" . (101 + $n / 6 % $valves), of_valve($v));
+        $n += 5, $i += 5;
+        next;
+      }
       $text .= packet(0x30, pack("n/a*", "plant/FV-" . (101 + $n / 6 % $valves)) .
         sprintf('{"op":%d,"x":%d,"f":%d,"p1":%d,"p2":%d,"t1":%d,"t":%.3f}', ($v) x 6, $t));
       $n += 5, $i += 5;
@@ -125,19 +156,20 @@ by_lines() {  # READINGS a second
   report "lines, ${1/#0/as many as go} readings/s for $(awk "BEGIN { printf \"%.1f\", $end - $begin }") s"
   rm pipe
 }
-by_mqtt() {  # READINGS a second
+by_mqtt() {  # READINGS a second [OPTIONS]
   printf 'listener %s 127.0.0.1\nallow_anonymous true\nuser %s\nmax_queued_messages 0\n' \
     $port "$(id -un)" >broker.conf
   mosquitto -c broker.conf >mosquitto.log 2>&1 &
   broker=$!
   start
-  begin_gateway --mqtt "mqtt://127.0.0.1:$port"
+  begin_gateway --mqtt "mqtt://127.0.0.1:$port" "${@:2}"
   await broker_connected gateway.log
+  sleep 1
   before=$(ticks $gateway) begin=$(date +%s.%N)
-  perl feed.pl "$1" "$seconds" $valves $port
+  perl feed.pl "$1" "$seconds" $valves $port ${2:+"" "$2"}
   sleep 1
   end=$(date +%s.%N)
-  report "MQTT, $1 readings/s for $seconds s"
+  report "MQTT${2:+ $2}, $1 readings/s for $seconds s"
   kill $broker
   wait $broker || true
   broker=
@@ -205,6 +237,12 @@ way=${4:-}
 case ${way:-lines} in lines) for rate in 1800 10000 0; do by_lines $rate; done ;; esac
 case ${way:-mqtt} in
 mqtt) ! command -v mosquitto >/dev/null || for rate in 1800 10000; do by_mqtt $rate; done ;;
+esac
+case ${way:-sparkplug} in
+sparkplug)
+  ! command -v mosquitto >/dev/null ||
+    for rate in 1800 10000; do by_mqtt $rate --sparkplug PLANT; done
+  ;;
 esac
 [ -z "$modules" ] || case ${way:-opcua} in opcua) by_opcua ;; esac
 case ${way:-wrong} in wrong) wrong ;; esac
