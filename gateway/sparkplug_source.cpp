@@ -154,6 +154,9 @@ void SparkplugHost::Take(const MqttEvent& event, Clock::time_point now,
     handlers.wrong(event.topic, why);
     return;
   }
+  if (nodes_.size() >= kMaxSources) {
+    std::erase_if(nodes_, [](const auto& node) { return !node.second.born; });
+  }
   Node& node = nodes_[message.node];
   bool ask = false;
   if (why = Follow(message, node, handlers); !why.empty()) {
@@ -189,8 +192,7 @@ std::string SparkplugHost::Read(const MqttEvent& event,
       !message.payload.ParseFromString(event.payload)) {
     return "no payload of Sparkplug B of up to 1 MiB";
   }
-  if (std::max(nodes_.size(), sources_.size()) >= kMaxSources &&
-      !sources_.contains(message.source)) {
+  if (sources_.size() >= kMaxSources && !sources_.contains(message.source)) {
     return "there are 10 000 nodes and devices already";
   }
   return {};

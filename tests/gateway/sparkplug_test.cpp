@@ -342,6 +342,30 @@ TEST_F(SparkplugHostTest, WhatIsNoMessageOfANodeChangesNothing) {
   EXPECT_EQ(Only().value, 6.0);
 }
 
+// Whatever a flipped bit makes of a birth, the next one counts.
+TEST_F(SparkplugHostTest, BrokenPayloadsDoNoHarm) {
+  const std::string birth = DeviceBirth(1).SerializeAsString();
+  for (std::size_t bit = 0; bit < 8 * birth.size(); ++bit) {
+    std::string broken = birth;
+    broken[bit / 8] = static_cast<char>(broken[bit / 8] ^ (1 << bit % 8));
+    Take("NBIRTH/N", NodeBirth(3));
+    TakeBytes("DBIRTH/N/D", broken);
+    TakeBytes("DDATA/N/D", broken.substr(0, bit / 8));
+  }
+  Bear();
+  Take("DDATA/N/D", Data(2, 7, 6.0));
+  EXPECT_EQ(Only().value, 6.0);
+}
+
+TEST_F(SparkplugHostTest, NamesThatSomebodyMakesUpEndNoNode) {
+  Bear();
+  for (int i = 0; i < 10'001; ++i) {
+    Take("NDATA/ghost" + std::to_string(i), Sent(0));
+  }
+  Take("DDATA/N/D", Data(2, 7, 6.0));
+  EXPECT_EQ(Only().value, 6.0);
+}
+
 class SparkplugNodeTest : public ::testing::Test {
  protected:
   static Payload Read(const Outgoing& message) {
