@@ -189,7 +189,7 @@ bool AlarmBook::OnEvent(const FaultEvent& event) {
   if (rows_.contains(id)) {
     return false;
   }
-  if (alarm.episode.ended_ns) {
+  if (alarm.episode.ended_ns || alarm.state == AlarmState::kNotice) {
     unstored_.erase(id);
   } else {
     unstored_[id] = alarm;

@@ -102,7 +102,7 @@ struct LiveBoard::Slot {
   }
 
   void Describe(const Verdict& verdict) REQUIRES(mutex) {
-    now.state = verdict.state;
+    now.state = now.notice ? State::kNormal : verdict.state;
     now.quality = verdict.quality;
     now.silence = monitor::Silence::kNone;
     now.reasons = verdict.uncovered;
@@ -116,7 +116,7 @@ struct LiveBoard::Slot {
         now.unjudged.push_back(now.models->channels[c].name);
       }
     }
-    now.isolated = verdict.isolated;
+    now.isolated = now.notice ? 0 : verdict.isolated;
     now.d0 = verdict.normal_factor;
     now.stamp_ns = verdict.stamp_ns;
     now.factor = 0.0;
@@ -311,6 +311,7 @@ void LiveBoard::OnVerdict(const std::string& valve_id, const Sample& sample,
     slot.models = models;
     facts = models != nullptr ? Facts(*models) : nullptr;
   }
+  slot.now.notice = outcome.notice;
   slot.now.missing = outcome.missing;
   const Verdict& verdict = outcome.verdict;
   slot.ShowUnjudged(

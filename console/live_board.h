@@ -33,6 +33,7 @@ struct ValveState {
   bool contested{false};                ///< See monitor::ValveOutcome.
   std::int64_t unjudged_ns{0};  ///< See monitor::ValveOutcome; 0: judged.
   std::string why{};            ///< WhyUnjudged(), if it is not.
+  bool notice{false};           ///< Likewise: shown as if it had no episode.
   bool blind{false};  ///< Every known fault looks normal to the model set.
   FaultSet isolated{0};
   double factor{0.0};    ///< The largest of the isolated set [-].

@@ -32,9 +32,11 @@ bool EndsEpisode(const Transition& transition) {
 }  // namespace
 
 EpisodeTracker::EpisodeTracker(std::string valve_id,
-                               const TraceOptions& options)
+                               const TraceOptions& options,
+                               std::shared_ptr<const AlarmGate> gate)
     : valve_id_(std::move(valve_id)),
       options_(options),
+      gate_(std::move(gate)),
       trace_(options.before_points, Ns(options.before_s)) {}
 
 bool EpisodeTracker::Resumes(std::uint64_t source_id,
@@ -85,6 +87,16 @@ void EpisodeTracker::Step(const Sample& sample, const Verdict& verdict,
   trace_.Push(sample, verdict, channels, faults);
   for (const Transition& transition : verdict.Transitions()) {
     Take(transition, verdict, models, outlet);
+  }
+  if (open_ && !EndsEpisode(open_->last)) {
+    const bool was_notice = open_->notice;
+    Weigh(verdict);
+    if (was_notice && !open_->notice) {
+      Transition raised = open_->last;
+      raised.kind = TransitionKind::kRaised;
+      raised.stamp_ns = verdict.stamp_ns;
+      Emit(raised, models, outlet);
+    }
   }
   FollowUnknown(verdict, *models);
   if (tracing()) {
@@ -201,6 +213,8 @@ FaultEvent EpisodeTracker::EndOf(const OpenEpisode& episode, EndReason reason,
   event.transition.reason = reason;
   event.transition.layer = episode.layer;
   event.transition.severity = episode.severity;
+  event.transition.share = episode.share;
+  event.transition.notice = episode.notice;
   if (!episode.candidates.empty()) {
     event.transition.factor = episode.candidates.front().factor;
     event.transition.strength = episode.candidates.front().strength;
@@ -223,6 +237,12 @@ bool EpisodeTracker::Begin(const Transition& transition, const Verdict& verdict,
     open_->detection_stamp_ns = episode.detection_stamp_ns;
     open_->faults = episode.faults;
     open_->candidates = episode.candidates;
+    open_->share = episode.share;
+    open_->notice = episode.notice;
+    open_->last = transition;
+    open_->last.faults = episode.faults;
+    open_->last.layer = episode.layer;
+    open_->last.severity = episode.severity;
     outlet.OnResumed(episode, verdict.stamp_ns);
     return true;
   }
@@ -244,6 +264,9 @@ void EpisodeTracker::Take(const Transition& transition, const Verdict& verdict,
   if (!open_) {
     return;
   }
+  if (transition.kind == TransitionKind::kDetected) {
+    Weigh(verdict);
+  }
   if (transition.kind == TransitionKind::kIsolated) {
     open_->trace_until_ns =
         transition.stamp_ns + Ns(options_.after_isolation_s);
@@ -260,6 +283,19 @@ void EpisodeTracker::Take(const Transition& transition, const Verdict& verdict,
     }
   }
   Emit(transition, models, outlet);
+}
+
+// An alarm stays one: its evidence does not go away by what follows.
+void EpisodeTracker::Weigh(const Verdict& verdict) {
+  open_->share = std::max(open_->share, verdict.share);
+  const auto budget = gate_ ? gate_->Get() : nullptr;
+  if (!budget) {
+    open_->notice = false;
+    return;
+  }
+  const AlarmBudget::Weight weight = budget->Weigh(valve_id_, open_->share);
+  open_->return_hours = weight.return_hours;
+  open_->notice = open_->notice && weight.notice;
 }
 
 // An episode without a name keeps the faults that could explain it last; none
@@ -286,6 +322,10 @@ void EpisodeTracker::Emit(Transition transition,
   const bool closed = transition.kind == TransitionKind::kClosed;
   const bool superseded = transition.reason == EndReason::kSuperseded;
   transition.detection_stamp_ns = open_->detection_stamp_ns;
+  transition.share = open_->share;
+  transition.return_hours = open_->return_hours;
+  transition.notice = open_->notice;
+  open_->last = transition;
   FaultEvent event;
   event.valve_id = valve_id_;
   event.source_id = open_->source_id;

@@ -12,6 +12,7 @@
 #include "diagnosis/records/fault_event.h"
 #include "diagnosis/records/service_records.h"
 #include "diagnosis/records/strength_point.h"
+#include "monitor/alarm_gate.h"
 #include "monitor/trace.h"
 
 namespace fdi::monitor {
@@ -49,7 +50,9 @@ class EpisodeOutlet {
 /// with `unknown`. What it is called, EpisodeName says.
 class EpisodeTracker {
  public:
-  EpisodeTracker(std::string valve_id, const TraceOptions& options);
+  /// @param gate tells which of its episodes are alarms; null: all.
+  EpisodeTracker(std::string valve_id, const TraceOptions& options,
+                 std::shared_ptr<const AlarmGate> gate = nullptr);
 
   /// An earlier session left `episode` open. Before the first Step().
   void Recover(const OpenEpisode& episode) { recovered_ = episode; }
@@ -97,6 +100,8 @@ class EpisodeTracker {
   const OpenEpisode* Resumable(const Sample& sample,
                                const ModelSet& models) const;
   std::size_t trace_bytes() const { return trace_.bytes(); }
+  /// An episode is open that is within the budget of alarms.
+  bool notice() const { return open_ && open_->notice; }
   /// The instants are evidence of an open episode.
   bool tracing() const { return open_ && open_->tracing; }
 
@@ -109,6 +114,10 @@ class EpisodeTracker {
     bool tracing{true};
     FaultSet faults{0};  // Its name.
     std::vector<FaultCandidate> candidates;
+    double share{0.0};  // The largest so far.
+    std::optional<double> return_hours;
+    bool notice{true};  // Until it is weighed, which is at once.
+    Transition last{};  // The last one that was told.
   };
 
   void RecordGap(const Sample& sample, const Verdict& verdict,
@@ -128,6 +137,7 @@ class EpisodeTracker {
   // @returns whether it resumes an episode.
   bool Begin(const Transition& transition, const Verdict& verdict,
              const ModelSet& models, EpisodeOutlet& outlet);
+  void Weigh(const Verdict& verdict);
   void FollowUnknown(const Verdict& verdict, const ModelSet& models);
   void Emit(Transition transition,
             const std::shared_ptr<const ModelSet>& models,
@@ -136,6 +146,7 @@ class EpisodeTracker {
 
   std::string valve_id_;
   TraceOptions options_;
+  std::shared_ptr<const AlarmGate> gate_;
   Trace trace_;
   std::optional<Open> open_;
   std::optional<OpenEpisode> recovered_;  // Left by an earlier session.

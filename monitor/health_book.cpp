@@ -105,6 +105,10 @@ void HealthBook::Add(const Sample& sample, const Verdict& verdict,
       At(key, sample, models, verdict.intake == Intake::kAccepted);
   const std::int64_t period_ms = std::llround(period_s * 1e3);
   hour.seen_ms += period_ms;
+  if (!verdict.detected && hour.SameKey(key)) {
+    hour.share = std::max(
+        hour.share, Quanta(verdict.share, HealthHour::kShare, kMaxResidual));
+  }
   AddCounts(sample, period_s, hour);
   loop::CountSingle(verdict.single, hour.counts);
   AddStroke(sample, period_ms, hour);

@@ -157,7 +157,8 @@ void Pipeline::Recover(const std::vector<OpenEpisode>& episodes) {
   for (const OpenEpisode& episode : episodes) {
     EpisodeTracker& tracker =
         recovered_
-            .try_emplace(episode.valve_id, episode.valve_id, options_.trace)
+            .try_emplace(episode.valve_id, episode.valve_id, options_.trace,
+                         options_.alarms)
             .first->second;
     OpenEpisode newer = episode;
     if (const OpenEpisode* known = tracker.recovering()) {
@@ -320,7 +321,7 @@ Pipeline::Valve& Pipeline::AddValve(std::string_view valve_id) {
                 (parts ? NameOf(parts->plan->models()) : "none"));
   auto valve = std::make_unique<Valve>(
       Valve{ValveMonitor(id, parts, options_.trace, looks_.get(),
-                         options_.severities, audits_.get()),
+                         options_.severities, audits_.get(), options_.alarms),
             reserved_.erase(id) > 0});
   valve->monitor.HoldIsolation(resolver_->IsolationHeld(id));
   if (auto known = recovered_.extract(id)) {

@@ -43,6 +43,8 @@ struct PipelineOptions {
   bool loop_audit{true};        ///< Of valves without a model set.
   bool audit_all_loops{false};  ///< And of those with one.
   /// By which episodes get their severity; without bands all are medium.
+  /// Tells which episodes are alarms; null: all.
+  std::shared_ptr<const AlarmGate> alarms{};
   std::shared_ptr<const SeverityCatalogue> severities{
       std::make_shared<const SeverityCatalogue>()};
 };

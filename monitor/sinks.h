@@ -163,7 +163,8 @@ struct ValveOutcome {
   /// See ValveMonitor::unjudged_since_ns(); nothing: it is judged.
   std::optional<std::int64_t> unjudged_ns{};
   bool found_normal{
-      false};  ///< With this sample, as EpisodeOutlet::OnNormal().
+      false};          ///< With this sample, as EpisodeOutlet::OnNormal().
+  bool notice{false};  ///< Its open episode is no alarm (AlarmBudget).
 };
 
 /// Why a valve sends nothing.

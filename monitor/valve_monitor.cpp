@@ -37,14 +37,15 @@ ValveMonitor::ValveMonitor(const std::string& id,
                            const std::optional<EngineParts>& parts,
                            const TraceOptions& options, LookWorker* looks,
                            std::shared_ptr<const SeverityCatalogue> severities,
-                           AuditWorker* audits)
+                           AuditWorker* audits,
+                           std::shared_ptr<const AlarmGate> gate)
     : id_(id),
       models_(ModelsOf(parts)),
       required_(parts ? parts->plan->required() : 0),
       looks_(looks),
       pending_(id, looks),
       severities_(std::move(severities)),
-      tracker_(id, options),
+      tracker_(id, options, std::move(gate)),
       judge_(id_, audits, severities_) {
   if (parts) {
     decision_.emplace(*parts, Physics(), severities_);
@@ -152,7 +153,8 @@ ValveOutcome ValveMonitor::Step(const Sample& sample, std::uint64_t writer,
           .missing = missing,
           .period_s = period_s(),
           .unjudged_ns = unjudged_since_ns(),
-          .found_normal = std::exchange(found_normal_, false)};
+          .found_normal = std::exchange(found_normal_, false),
+          .notice = tracker_.notice()};
 }
 
 // A superseded publisher that goes on sending must neither end the stream of
@@ -211,7 +213,8 @@ ValveOutcome ValveMonitor::StepLoop(const Sample& sample, bool superseded,
           .models = models_.get(),
           .model_swapped = swapped,
           .period_s = period_s(),
-          .found_normal = std::exchange(found_normal_, false)};
+          .found_normal = std::exchange(found_normal_, false),
+          .notice = tracker_.notice()};
 }
 
 // The loop of a valve with a model set is followed while the observers find

@@ -35,11 +35,13 @@ class ValveMonitor {
   ///   outlives this; null: none.
   /// @param severities by which episodes get their priority.
   /// @param audits of the loop; outlives this; null: none.
+  /// @param gate tells which episodes are alarms; null: all.
   ValveMonitor(const std::string& id, const std::optional<EngineParts>& parts,
                const TraceOptions& options, LookWorker* looks = nullptr,
                std::shared_ptr<const SeverityCatalogue> severities =
                    std::make_shared<const SeverityCatalogue>(),
-               AuditWorker* audits = nullptr);
+               AuditWorker* audits = nullptr,
+               std::shared_ptr<const AlarmGate> gate = nullptr);
 
   /// Call before the first Step().
   void Recover(const OpenEpisode& episode);

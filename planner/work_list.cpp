@@ -279,8 +279,7 @@ Json WorkList(storage::History* history, const report::FaultTexts& texts,
   Json list = Json::array();
   for (const WorkRow& row : rows) {
     const Finding& finding = row.finding;
-    if (finding.kind == "episode" &&
-        finding.layer != LayerName(Layer::kAudit)) {
+    if (finding.is_episode() && finding.layer != LayerName(Layer::kAudit)) {
       coverage.KnowNamed(finding.valve_id);
     } else {
       coverage.Know(finding.valve_id);

@@ -289,6 +289,9 @@ void RowReader::AddFault(SameFault& same) {
     finding.words.severity = severity;
   }
   std::string why = EpisodeText(finding, texts_, query_.now_ns);
+  if (episode.notice) {
+    why = "notice, within the budget of alarms: " + why;
+  }
   if (const auto labels = facts_.labels.find(episode.fault.value_or(""));
       !finding.confirmed && labels != facts_.labels.end() &&
       labels->second.wrong > labels->second.right) {
@@ -529,7 +532,7 @@ bool RowReader::JoinFault(const LoopAudits::Window& audit,
   for (WorkRow& row : rows_) {
     const Finding& f = row.finding;
     const std::int64_t end_ns = f.ended_ns.value_or(query_.now_ns);
-    if (f.kind == "episode" && f.valve_id == audit.loop &&
+    if (f.is_episode() && f.valve_id == audit.loop &&
         audit.start_ns <= end_ns && audit.end_ns >= *f.since_ns) {
       Doubt(CatalogueName(audit.verdict), row.finding);
       if (row.why.find(text) == std::string::npos) {

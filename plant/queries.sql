@@ -60,7 +60,7 @@ SELECT e.episode_id, e.valve_id, e.source_id, e.detected_ns, e.isolated_ns,
   e.strength, e.unknown_kind, e.layer, e.model_set, e.model_hash, e.flow_unit,
   e.channels, e.faults, e.label, e.acked_by, e.acked_ns, e.session_id,
   e.lowest, e.highest, e.priority, e.worst_strength, e.unconfirmed_ns, e.known,
-  e.certainty, e.look_alikes
+  e.certainty, e.look_alikes, e.return_hours, e.notice
 FROM (SELECT DISTINCT key FROM batch
       WHERE item IN ('episode', 'trace', 'strength')) c
   CROSS JOIN episode e ON e.episode_id = c.key
@@ -305,7 +305,7 @@ SELECT * FROM (
        AND a.detected_ns < e.detected_ns
        AND utc(a.detected_ns) <= utc(e.detected_ns)
      ORDER BY utc(a.detected_ns) DESC, a.detected_ns DESC LIMIT 1), l.rival, l.times, l.observers,
-    description(e.monitor_id, e.fault),
+    description(e.monitor_id, e.fault), e.return_hours, e.notice,
     e.host, e.monitor
   FROM episode e LEFT JOIN episode_look l
     ON (l.episode_id, l.monitor_id) = (e.episode_id, e.monitor_id)
@@ -320,7 +320,8 @@ SELECT e.valve_id, coalesce(e.fault, ''), e.detected_ns, e.ended_ns, e.label,
     WHERE (t.episode_id, t.monitor_id) = (e.episode_id, e.monitor_id)
       AND is_stamp(last_ns)) END
 FROM episode e
-WHERE {episodes} AND (e.ended_ns IS NULL OR e.ended_ns >= {since})
+WHERE {episodes} AND e.notice = 0
+  AND (e.ended_ns IS NULL OR e.ended_ns >= {since})
 ORDER BY e.detected_ns, e.valve_id
 -- name: plant_gaps
 SELECT {columns} FROM data_gap JOIN monitor m USING (monitor_id)

@@ -9,7 +9,7 @@ set -euo pipefail
 bin=$(realpath "${1:?folder of the programs}")
 # The 47 of the list of names, and the two of the gateway.
 max_verbs=49
-max_options=256
+max_options=257
 max_shown=12
 
 # The placeholders that a name may have, wherever it occurs; "-" is none.

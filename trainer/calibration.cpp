@@ -11,6 +11,7 @@
 #include "base/error.h"
 #include "diagnosis/model/model_set.h"
 #include "diagnosis/model/student.h"
+#include "diagnosis/model/tail.h"
 #include "diagnosis/observers/residual_windows.h"
 #include "trainer/rule_text.h"
 #include "trainer/statistics.h"
@@ -19,10 +20,7 @@ namespace fdi::trainer {
 namespace {
 
 constexpr double kTailQuantile = 0.95;
-constexpr double kShrinkage = 50.0;
-constexpr double kUpperBound = 1.645;  // 95 % of a normal distribution
 constexpr double kMinShape = -0.1;
-constexpr double kMaxShape = 0.3;
 constexpr double kMaxRate = 0.01;  // per sample; more is no tail any more
 
 double Quantile(std::vector<double> values, double q) {
@@ -53,23 +51,6 @@ std::vector<double> ClusterMaxima(std::span<const double> series, double u,
   return maxima;
 }
 
-// ξ = 2 − b0/(b0 − 2 b1),  σ = 2 b0 b1/(b0 − 2 b1) with b1 = E[z (1 − G(z))].
-void FitPareto(const std::vector<double>& maxima, TailThreshold& tail) {
-  const auto n = static_cast<double>(maxima.size());
-  double b0 = 0.0;
-  double b1 = 0.0;
-  for (std::size_t i = 0; i < maxima.size(); ++i) {
-    const double rank = (static_cast<double>(i) + 0.65) / n;
-    b0 += maxima[i] / n;
-    b1 += maxima[i] * (1.0 - rank) / n;
-  }
-  const double difference = b0 - 2.0 * b1;
-  const double raw = difference > 0.0 ? 2.0 - b0 / difference : 0.0;
-  tail.shape = std::clamp(raw * n / (n + kShrinkage), kMinShape, kMaxShape);
-  // σ keeps the mean excess σ/(1 − ξ), at its 95 % upper bound.
-  tail.scale = b0 * (1.0 - tail.shape) * (1.0 + kUpperBound / std::sqrt(n));
-}
-
 }  // namespace
 
 TailThreshold FitTail(std::span<const double> series, double rate,
@@ -86,7 +67,9 @@ TailThreshold FitTail(std::span<const double> series, double rate,
     tail.level = tail.base;
     return tail;
   }
-  FitPareto(maxima, tail);
+  const ParetoTail pareto = FitPareto(maxima, kMinShape);
+  tail.scale = pareto.scale;
+  tail.shape = pareto.shape;
   const double n = tail.clusters;
   const double base_rate = n / static_cast<double>(series.size());
   const double ratio = base_rate / rate;
@@ -339,7 +322,7 @@ constexpr double kSupportMargin = 1.0;  // standard deviations
 // A detection needs more than this: the least of n_d values in a row.
 std::vector<double> SustainedOf(const std::vector<double>& series, double sign,
                                 int samples) {
-  Sustained last(samples);
+  fdi::Sustained last(samples);
   std::vector<double> least;
   for (std::size_t k = 0; k < series.size(); ++k) {
     const double value = last.Push(sign * series[k]);

@@ -1,32 +1,13 @@
 #pragma once
 
-#include <algorithm>
 #include <cstddef>
 #include <span>
 #include <vector>
 
 #include "diagnosis/model/model_set.h"
+#include "diagnosis/model/sustained.h"
 
 namespace fdi::trainer {
-
-/// The least of the last `samples` values: a detection needs that many in a row
-/// beyond a limit. Zeros at the start keep fewer from counting.
-class Sustained {
- public:
-  explicit Sustained(int samples)
-      : last_(static_cast<std::size_t>(samples), 0.0) {}
-
-  void Restart() { std::fill(last_.begin(), last_.end(), 0.0); }
-  double Push(double value) {
-    last_[next_] = value;
-    next_ = (next_ + 1) % last_.size();
-    return *std::min_element(last_.begin(), last_.end());
-  }
-
- private:
-  std::vector<double> last_;
-  std::size_t next_{0};
-};
 
 /// A threshold from the upper tail of a series, and what it rests on.
 struct TailThreshold {
@@ -42,19 +23,13 @@ struct TailThreshold {
 ///
 ///     P(z > u + y) = (1 + ξ y/σ)^(−1/ξ),
 ///
-/// fitted by probability-weighted moments [Hosking & Wallis, 1987]; ξ is
-/// shrunk towards 0, the exponential tail, with n/(n + 50) for n clusters and
-/// kept within [-0.1, 0.3] (-0.1 is what a Gaussian shows between its 95 %
-/// quantile and 1e-7); σ is taken at its 95 % upper bound, mean excess times
-/// 1 + 1.645/√n. The level is at least σ beyond the largest value. Exceedances
-/// less than `separation` samples apart are one cluster.
+/// fitted by FitPareto() with ξ ≥ −0.1, which is what a Gaussian shows between
+/// its 95 % quantile and 1e-7. The level is at least σ beyond the largest
+/// value. Exceedances less than `separation` samples apart are one cluster.
 ///
 /// @param series in its order of time; at least 100 values.
 /// @param rate in (0, 0.01] [1/sample].
 /// @throws std::invalid_argument if an argument is out of its range.
-///
-/// - [Hosking & Wallis, 1987] "Parameter and quantile estimation for the
-///   generalized Pareto distribution", Technometrics 29(3), pp. 339–349.
 TailThreshold FitTail(std::span<const double> series, double rate,
                       int separation);
 

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "base/error.h"
+#include "diagnosis/model/tail.h"
 
 namespace fdi::trainer {
 double Mean(std::span<const double> values) {
@@ -65,34 +66,11 @@ double PValue(const SignTest& test) {
   return std::min(1.0, 2.0 * sum);
 }
 
-namespace {
-
-constexpr double kTail = 0.05;
-
-// P(N ≤ events) of a Poisson distribution of mean μ. Each term by its
-// logarithm, because powers and factorials overflow.
-double AtMost(int events, double mean) {
-  double sum = 0.0;
-  for (int k = 0; k <= events; ++k) {
-    sum += std::exp(k * std::log(mean) - mean - std::lgamma(k + 1.0));
-  }
-  return sum;
-}
-
-}  // namespace
-
 EventRate RateOf(int events, double hours) {
   Require(events >= 0 && hours > 0.0,
           "a rate needs a number of events and a time");
-  // AtMost() falls with the mean, so bisection finds where it passes 5 %. For
-  // any number of events that is below 10 + 3 events.
-  double low = 1e-6;
-  double high = 10.0 + 3.0 * events;
-  for (int i = 0; i < 100; ++i) {
-    const double mean = 0.5 * (low + high);
-    (AtMost(events, mean) > kTail ? low : high) = mean;
-  }
-  return {events / hours * kHoursPerYear, high / hours * kHoursPerYear};
+  return {events / hours * kHoursPerYear,
+          PoissonBound(events) / hours * kHoursPerYear};
 }
 
 }  // namespace fdi::trainer

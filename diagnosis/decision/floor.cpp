@@ -91,6 +91,8 @@ Floor::Floor(const ModelSet& models)
           std::max(FaultIndex(models, kFirstFinding), 0))) {
   if (limits_ != nullptr) {
     rod_.emplace(*limits_);
+    shares_.assign(kTests, Sustained(limits_->flow_samples));
+    shares_[0] = Sustained(limits_->deviation_samples);
   }
 }
 
@@ -101,9 +103,14 @@ void Floor::Restart() {
   flow_ = {};
   findings_ = 0;
   beginning_ = 0;
+  for (Sustained& share : shares_) {
+    share.Restart();
+  }
+  share_ = 0.0;
 }
 
 void Floor::Push(const Sample& sample) {
+  share_ = 0.0;
   if (limits_ == nullptr) {
     return;
   }
@@ -138,9 +145,11 @@ void Floor::Push(const Sample& sample) {
   }
 }
 
-void Floor::Count(int finding, bool beyond, double size, int needed,
-                  std::int64_t stamp_ns) {
-  Test& test = tests_[static_cast<std::size_t>(finding - kTravelDeviation)];
+void Floor::Count(int finding, bool beyond, double share, double size,
+                  int needed, std::int64_t stamp_ns) {
+  const auto at = static_cast<std::size_t>(finding - kTravelDeviation);
+  Test& test = tests_[at];
+  share_ = std::max(share_, shares_[at].Push(std::max(0.0, share)));
   test.since_ns = beyond && test.length == 0 ? stamp_ns : test.since_ns;
   test.length = beyond ? std::min(test.length + 1, needed) : 0;
   test.size = std::clamp(size, -1.0, 1.0);
@@ -178,9 +187,11 @@ void Floor::PushTravel(const Sample& sample) {
   Test& test = tests_[0];
   if (test.length > 0 && std::signbit(test.size) != std::signbit(deviation)) {
     test.length = 0;
+    shares_[0].Restart();
   }
   Count(kTravelDeviation, std::abs(deviation) > limits_->deviation,
-        0.01 * deviation, limits_->deviation_samples, sample.stamp_ns);
+        std::abs(deviation) / limits_->deviation, 0.01 * deviation,
+        limits_->deviation_samples, sample.stamp_ns);
   // At a stop the rod does not move, whatever the command.
   const auto within = [](double at) {
     return std::clamp(at, kStop, 100.0 - kStop);
@@ -218,16 +229,22 @@ void Floor::PushFlow(const Sample& sample) {
   const double seat = std::clamp((100.0 - x) / (100.0 - kShut), 0.0, 1.0);
   const double leak =
       margin + limits_->flow_factor * seat * FlowAt(*limits_, kShut, dp);
-  Count(kShutFlow, shut && flow > leak, (flow - leak) / limits_->flow_high,
-        limits_->flow_samples, sample.stamp_ns);
+  Count(kShutFlow, shut && flow > leak, shut ? flow / leak : 0.0,
+        (flow - leak) / limits_->flow_high, limits_->flow_samples,
+        sample.stamp_ns);
   const double most = limits_->flow_factor *
                           FlowAt(*limits_, x - 0.5 * limits_->deviation, dp) +
                       margin;
-  Count(kExcessFlow, !shut && flow > most, (flow - most) / limits_->flow_high,
-        limits_->flow_samples, sample.stamp_ns);
+  Count(kExcessFlow, !shut && flow > most, shut ? 0.0 : flow / most,
+        (flow - most) / limits_->flow_high, limits_->flow_samples,
+        sample.stamp_ns);
   const double least = LeastFlow(least_open, sample);
   const bool follows = std::abs(rod_->Beyond(x)) <= limits_->deviation;
-  Count(kLowFlow, limits_->flow_share > 0.0 && !shut && follows && flow < least,
+  const bool judged = limits_->flow_share > 0.0 && !shut && follows;
+  // No flow at all would be beyond any multiple of the limit. So what lacks
+  // counts in shares of the largest flow.
+  Count(kLowFlow, judged && flow < least,
+        judged ? 1.0 + (least - flow) / limits_->flow_high : 0.0,
         (least - flow) / limits_->flow_high, limits_->flow_samples,
         sample.stamp_ns);
   const bool within = flow > margin && flow < kFlowBorder * limits_->flow_high;

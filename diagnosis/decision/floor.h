@@ -3,9 +3,11 @@
 #include <array>
 #include <cstdint>
 #include <optional>
+#include <vector>
 
 #include "diagnosis/model/model_set.h"
 #include "diagnosis/model/sample.h"
+#include "diagnosis/model/sustained.h"
 
 namespace fdi {
 
@@ -94,6 +96,9 @@ class Floor {
   /// How far a finding is from its model, as a signed share of the span.
   double size(std::size_t finding) const { return tests_[finding].size; }
   static constexpr std::size_t kTests = 6;
+  /// The largest share of its limit that a test of the last sample has held for
+  /// as long as it needs; above 1: a finding. Readings that repeat have none.
+  double share() const { return share_; }
 
  private:
   struct Test {  // consecutive samples beyond a limit
@@ -114,7 +119,7 @@ class Floor {
 
   double DpOf(const Sample& sample) const;
   double LeastFlow(double x, const Sample& sample) const;
-  void Count(int finding, bool beyond, double size, int needed,
+  void Count(int finding, bool beyond, double share, double size, int needed,
              std::int64_t stamp_ns);
   void Watch(int finding, double reading, Expectations expected, double most,
              bool counts, const Sample& sample, Repeat& repeat);
@@ -130,6 +135,8 @@ class Floor {
   Repeat flow_;
   FaultSet findings_{0};
   FaultSet beginning_{0};
+  std::vector<Sustained> shares_;  // by test; empty: no floor
+  double share_{0.0};
 };
 
 }  // namespace fdi

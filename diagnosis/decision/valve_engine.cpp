@@ -223,6 +223,7 @@ const Verdict& ValveEngine::Impl::Step(const Sample& measured) {
   verdict_.source_id = trained.source_id;
   verdict_.seq = trained.seq;
   verdict_.initialised = false;
+  verdict_.share = 0.0;
   verdict_.transition_count = 0;
   verdict_.single = 0;
   judged_ = false;
@@ -430,6 +431,7 @@ void ValveEngine::Impl::Decide(const Sample& sample) {
   for (std::size_t i = 0; i < Floor::kTests; ++i) {
     findings.sizes[i] = floor.size(i);
   }
+  verdict_.share = floor.share();
   if (findings.settled) {
     findings.stuck = diagnosis_->stuck.faults();
     // Push() comes first: after another operand, || could skip it and the
@@ -437,6 +439,7 @@ void ValveEngine::Impl::Decide(const Sample& sample) {
     findings.abnormal = detection.Push(diagnosis_->bank, sample, {},
                                        diagnosis_->lone.residuals()) ||
                         findings.stuck != 0 || findings.abnormal || suspected_;
+    verdict_.share = std::max(verdict_.share, detection.share());
     const auto suspicion =
         suspected_ ? std::optional(sample.stamp_ns) : std::nullopt;
     for (const auto& stamp :

@@ -149,8 +149,9 @@ void ValidateFloor(const ModelSet& models, const FloorLimits& floor) {
       models,
       "the trim of the floor must be " +
           std::to_string(FloorLimits::kShapePoints) + " values in 0..1");
-  Check(floor.deviation_samples >= 1 && floor.flow_samples >= 1, models,
-        "the floor takes at least one sample");
+  Check(floor.deviation_samples >= 1 && floor.deviation_samples <= 1000 &&
+            floor.flow_samples >= 1 && floor.flow_samples <= 1000,
+        models, "the floor takes at least one sample");
 }
 
 // By its models.

@@ -82,9 +82,9 @@ std::string WhyUnjudged(Quality quality, Intake intake,
 }
 
 std::string_view TransitionName(TransitionKind kind) {
-  return NameOf(kind, std::array<std::string_view, 7>{
+  return NameOf(kind, std::array<std::string_view, 8>{
                           "DETECTED", "ISOLATED", "REISOLATED", "CLEARED",
-                          "CLOSED", "CHANGED", "SECOND"});
+                          "CLOSED", "CHANGED", "SECOND", "RAISED"});
 }
 
 std::string DriftValue(const SlowDrift& drift) {

@@ -87,6 +87,7 @@ enum class TransitionKind : std::uint8_t {
   kClosed,
   kChanged,  ///< The priority rose. On the bus: kReisolated, the same faults.
   kSecond,   ///< What is on top of the name has changed. On the bus likewise.
+  kRaised,   ///< A notice has become an alarm. On the bus: see OnTheBus().
 };
 
 /// Gives an episode a name.
@@ -162,6 +163,12 @@ struct Transition {
   Layer layer{Layer::kObservers};      ///< The source of `faults`.
   SecondFault second{};                ///< The fault on top of them.
   SlowDrift drift{};                   ///< Where `faults` is a drift.
+  /// The largest share of the episode so far (Verdict::share).
+  double share{0.0};
+  /// In so many hours a healthy valve shows that once; nothing: not known.
+  std::optional<double> return_hours{};
+  /// Not rare enough for the budget of alarms: nobody is alarmed.
+  bool notice{false};
 };
 
 /// The engine's result for one sample.
@@ -178,7 +185,10 @@ struct Verdict {
   SignalMask single{0};
   State state{State::kNormal};
   Unknown unknown{Unknown::kNone};
-  bool detected{false};    ///< An episode is open.
+  bool detected{false};  ///< An episode is open.
+  /// The largest share of its limit that a test of the observers or the floor
+  /// has held for as long as it needs; above 1: it detects. 0: not judged.
+  double share{0.0};
   double confidence{0.0};  ///< Share of the channels that voted.
   /// r = y − ŷ of the normal observer per channel; NaN where it abstains.
   std::array<double, kMaxChannels> residuals{};

@@ -5,7 +5,17 @@
 #include <limits>
 #include <span>
 
+#include "diagnosis/model/exponential.h"
+
 namespace fdi {
+namespace {
+
+// exp(t), by our own function on either side of zero.
+double Growth(double t) {
+  return t > 0.0 ? 1.0 / Exp(-t) : Exp(t);
+}
+
+}  // namespace
 
 double CertainResidual(const ObserverBank& bank, int channel, double margin) {
   const double residual = bank.residual(0, channel);
@@ -15,11 +25,22 @@ double CertainResidual(const ObserverBank& bank, int channel, double margin) {
 }
 
 Detection::Detection(const ModelSet& models)
-    : models_(&models), windows_(models) {}
+    : models_(&models),
+      windows_(models),
+      shares_(models.channels.size() * kTestsPerChannel,
+              Sustained(models.decision.detection_samples)) {}
 
 void Detection::Restart() {
   windows_.Restart();
+  Interrupt();
+}
+
+void Detection::Interrupt() {
   runs_.fill({});
+  for (Sustained& share : shares_) {
+    share.Restart();
+  }
+  share_ = 0.0;
 }
 
 bool Detection::Push(const ObserverBank& bank, const Sample& sample,
@@ -39,6 +60,7 @@ bool Detection::Push(const ObserverBank& bank, const Sample& sample,
   windows_.Push({certain.data(), channels},
                 sample.Has(Signal::kCv) ? sample[Signal::kCv] : kNan);
   bool abnormal = false;
+  share_ = 0.0;
   for (std::size_t c = 0; c < channels; ++c) {
     const int index = static_cast<int>(c);
     const bool unread = bank.active(index) && !bank.measured(index);
@@ -52,8 +74,8 @@ bool Detection::Push(const ObserverBank& bank, const Sample& sample,
     const bool below = residual < channel.lower_threshold;
     const bool above = residual > channel.upper_threshold;
     abnormal = abnormal || below || above;
-    Count(test++, below, stamp_ns);
-    Count(test++, above, stamp_ns);
+    Count(test++, below, residual / channel.lower_threshold, stamp_ns);
+    Count(test++, above, residual / channel.upper_threshold, stamp_ns);
     if (held_out) {
       continue;
     }
@@ -62,10 +84,15 @@ bool Detection::Push(const ObserverBank& bank, const Sample& sample,
       const ResidualWindow& window = windows_.window(c, w);
       const ResidualWindow& command = windows_.command(c, w);
       const bool applies = Applies(limits, window, command);
-      Count(test++, applies && window.mean() < limits.lower_mean, stamp_ns);
-      Count(test++, applies && window.mean() > limits.upper_mean, stamp_ns);
-      Count(test++, applies && window.log_rms() > UpperLogRms(limits, command),
-            stamp_ns);
+      const auto count = [&](bool beyond, double share) {
+        Count(test++, applies && beyond, applies ? share : 0.0, stamp_ns);
+      };
+      const double energy = window.log_rms() - UpperLogRms(limits, command);
+      count(window.mean() < limits.lower_mean,
+            window.mean() / limits.lower_mean);
+      count(window.mean() > limits.upper_mean,
+            window.mean() / limits.upper_mean);
+      count(energy > 0.0, Growth(energy));
     }
   }
   return abnormal;
@@ -79,8 +106,11 @@ bool Detection::Restore(SnapshotReader& reader) {
   return windows_.Restore(reader);
 }
 
-void Detection::Count(std::size_t test, bool beyond, std::int64_t stamp_ns) {
+void Detection::Count(std::size_t test, bool beyond, double share,
+                      std::int64_t stamp_ns) {
   Run& run = runs_[test];
+  // In this order a NaN counts as 0.
+  share_ = std::max(share_, shares_[test].Push(std::max(0.0, share)));
   run.since_ns = beyond && run.length == 0 ? stamp_ns : run.since_ns;
   run.length = beyond ? run.length + 1 : 0;
 }

@@ -4,7 +4,9 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <vector>
 
+#include "diagnosis/model/sustained.h"
 #include "diagnosis/observers/observer_bank.h"
 #include "diagnosis/observers/residual_windows.h"
 
@@ -31,7 +33,7 @@ class Detection {
   void Restart();
 
   /// Samples are missing: runs end, the windows stay.
-  void Interrupt() { runs_.fill({}); }
+  void Interrupt();
 
   /// Takes one sample and its residuals. Returns whether a single residual is
   /// beyond its threshold.
@@ -52,6 +54,10 @@ class Detection {
   /// The channels, by bit, with a run beyond a limit that is n_d long.
   std::uint32_t beyond() const;
 
+  /// The largest share of its limit that a test of the last sample has held for
+  /// n_d samples; above 1: detected.
+  double share() const { return share_; }
+
   /// First sample of the earliest run beyond a limit that is n_d long.
   std::optional<std::int64_t> stamp_ns() const;
 
@@ -63,11 +69,14 @@ class Detection {
   // Below and above of the residual; of each window below, above and energy.
   static constexpr std::size_t kTestsPerChannel = 2 + 3 * kMaxWindows;
 
-  void Count(std::size_t test, bool beyond, std::int64_t stamp_ns);
+  void Count(std::size_t test, bool beyond, double share,
+             std::int64_t stamp_ns);
 
   const ModelSet* models_;
   ResidualWindows windows_;
   std::array<Run, kTestsPerChannel * kMaxChannels> runs_{};
+  std::vector<Sustained> shares_;  // by test
+  double share_{0.0};
 };
 
 }  // namespace fdi

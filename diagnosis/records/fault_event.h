@@ -57,11 +57,19 @@ struct FaultEvent {
   FIELD(model_set) FIELD(model_version) FIELD(model_hash) FIELD(persisted)
 
 /// The kind as it is on the bus, whose types cannot grow: a rise of priority,
-/// or a second fault, is an isolation of the same faults.
-constexpr TransitionKind OnTheBus(TransitionKind kind) {
-  return kind == TransitionKind::kChanged || kind == TransitionKind::kSecond
-             ? TransitionKind::kReisolated
-             : kind;
+/// or a second fault, is an isolation of the same faults. A notice is not on
+/// the bus, so one that becomes an alarm begins there, with its name if it has
+/// one.
+constexpr TransitionKind OnTheBus(TransitionKind kind, bool named = true) {
+  switch (kind) {
+    case TransitionKind::kChanged:
+    case TransitionKind::kSecond:
+      return TransitionKind::kReisolated;
+    case TransitionKind::kRaised:
+      return named ? TransitionKind::kIsolated : TransitionKind::kDetected;
+    default:
+      return kind;
+  }
 }
 
 /// How bad the episode is by `event`: as its transition says, or else as the
@@ -82,6 +90,8 @@ struct OpenEpisode {
   Layer layer{Layer::kObservers};    ///< What named them.
   std::optional<Severity> severity;  ///< As last stored.
   SecondFault second;                ///< What was on top of them.
+  double share{0.0};                 ///< As last stored (Verdict::share).
+  bool notice{false};
   std::string model_set;
   int model_version{0};
   std::uint64_t model_hash{0};

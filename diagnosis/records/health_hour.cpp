@@ -43,6 +43,7 @@ void HealthHour::Add(const HealthHour& part) {
   normal_factor += part.normal_factor;
   travel += part.travel;
   reversals += part.reversals;
+  share = std::max(share, part.share);
   counts.Add(part.counts);
   for (std::size_t b = 0; b < bins.size(); ++b) {
     if (bins[b].empty()) {

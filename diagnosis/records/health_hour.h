@@ -51,7 +51,7 @@ struct StrengthSums {
 /// equipment: whole numbers all, so that adding is exact in any order. Times in
 /// ms. Residuals, d_0 and strengths are of LIVE samples; the rest of all.
 struct HealthHour {
-  static constexpr double kShare = 1e-3;   ///< Quantum of d_0 and strength [-].
+  static constexpr double kShare = 1e-3;   ///< Quantum of shares [-].
   static constexpr double kTravel = 1e-3;  ///< Of the travel [% of stroke].
   static constexpr double kFullStroke = 100.0;  ///< Of the travel [%].
 
@@ -72,6 +72,8 @@ struct HealthHour {
   std::int64_t normal_factor{0};  ///< Σ d_0/kShare over live_samples.
   std::int64_t travel{0};         ///< [kTravel]
   std::int64_t reversals{0};
+  /// The largest Verdict::share without an open episode [kShare].
+  std::int64_t share{0};
   loop::ValveCounts counts;
   std::vector<HealthChannel> channels;
   /// By bin of CV, then by channel; an empty bin has no samples.

@@ -145,6 +145,9 @@ BusEventSink::BusEventSink(idl::Participant& participant, LogSink log)
 // The log names the transition itself. On the bus a kind that its type does not
 // know goes by an older one (OnTheBus).
 bool BusEventSink::Publish(const FaultEvent& event, bool persisted) {
+  if (event.transition.notice) {
+    return true;
+  }
   FaultEvent message = event;
   message.persisted = persisted;
   if (log_) {
@@ -159,7 +162,8 @@ bool BusEventSink::Publish(const FaultEvent& event, bool persisted) {
                    {"episode", storage::EpisodeIdText(message.episode_id)},
                    {"persisted", message.persisted ? "true" : "false"}}));
   }
-  message.transition.kind = OnTheBus(message.transition.kind);
+  message.transition.kind =
+      OnTheBus(message.transition.kind, message.transition.faults != 0);
   return publisher_.Write(message) == idl::WriteResult::kSent;
 }
 

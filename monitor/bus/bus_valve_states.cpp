@@ -70,8 +70,10 @@ void BusValveStates::OnEvent(const FaultEvent& event) {
   episode.audit = valve.audit;
   const bool over = episode.cleared_ns || episode.ended_ns;
   // The valve may have been found normal before its events were stored.
-  if (over &&
-      (!episode.unconfirmed_ns || valve.normal_ns > *episode.unconfirmed_ns)) {
+  if (episode.notice) {
+    valve.alarm.reset();
+  } else if (over && (!episode.unconfirmed_ns ||
+                      valve.normal_ns > *episode.unconfirmed_ns)) {
     valve.alarm.reset();
   } else {
     valve.alarm = findings::FindingOf(episode, texts_);
@@ -120,16 +122,17 @@ void BusValveStates::OnVerdict(const std::string& valve_id,
     return;
   }
   const bool partly = verdict.confidence < 1.0 || outcome.contested;
+  const State state = outcome.notice ? State::kNormal : verdict.state;
   const MutexLock lock(mutex_);
   Valve& valve = valves_[valve_id];
   const bool news = valve.silent || valve.quality != verdict.quality ||
-                    valve.state != verdict.state || valve.partly != partly ||
+                    valve.state != state || valve.partly != partly ||
                     valve.models != outcome.models || outcome.model_swapped ||
                     valve.unjudged_ns != outcome.unjudged_ns ||
                     (valve.left && (verdict.detected || outcome.found_normal));
   valve.silent = false;
   valve.quality = verdict.quality;
-  valve.state = verdict.state;
+  valve.state = state;
   valve.partly = partly;
   valve.unjudged_ns = outcome.unjudged_ns;
   if (valve.unjudged_ns) {

@@ -132,7 +132,7 @@ bool HistoryStore::Record(const FaultEvent& event) {
   } else if (stored) {
     std::vector<FaultEvent>& events = open_[event.episode_id];
     if (kind != TransitionKind::kChanged && kind != TransitionKind::kSecond &&
-        kind != TransitionKind::kCleared) {
+        kind != TransitionKind::kRaised && kind != TransitionKind::kCleared) {
       events.clear();
     } else if (events.size() > 1) {
       events.pop_back();

@@ -34,6 +34,8 @@
 #include "report/fault_texts.h"
 #include "report/findings/finding.h"
 #include "report/logging.h"
+#include "report/text_table.h"
+#include "storage/history/healthy_hours.h"
 #include "storage/history/history_reader.h"
 #include "storage/models/models.h"
 #include "storage/models/plant_loops.h"
@@ -51,6 +53,8 @@ constexpr milliseconds kTickPeriod{1000};
 // After a reload that failed; doubled each time, as all sets are read again.
 constexpr milliseconds kReloadPause{2000};
 constexpr milliseconds kMaxReloadPause{300'000};
+// Return periods are told from hours.
+constexpr std::chrono::hours kBudgetPeriod{1};
 // Each of these bounds one step of a stop. SIGTERM ends the monitor within 5 s,
 // also with a subscriber that does not read (docs/operations.md).
 constexpr milliseconds kHookPatience{1000};
@@ -139,6 +143,10 @@ Service::Service(const ServiceOptions& options, const report::Context& context)
           data_.models(), options.model_set,
           [this](const ModelSet& models) { AnnounceModels(models); })),
       model_sets_(assignment_->loaded()),
+      between_alarms_h_(options.alarm_budget.empty()
+                            ? 0.0
+                            : ParseAlarmBudget(options.alarm_budget)),
+      gate_(std::make_shared<AlarmGate>()),
       history_(data_.history(), NowNs, context.log),
       runs_(options.recording == Recording::kOff
                 ? nullptr
@@ -216,7 +224,7 @@ void Service::ListAfterCommit() {
         "on_event", [this, texts = report::LoadFaultTexts(context_.options)](
                         const FaultEvent& event, bool stored) {
           // Its session may have notified of it.
-          if (!event.resent) {
+          if (!event.resent && !event.transition.notice) {
             hook_->Notify(EventJson(event, stored, texts, ShelvesInForce(),
                                     IdentityOf(event.valve_id)));
           }
@@ -260,6 +268,7 @@ std::vector<storage::Shelf> Service::ShelvesInForce() {
 PipelineOptions Service::WithDelivery(PipelineOptions options) {
   options.severities = std::make_shared<const SeverityCatalogue>(
       report::LoadFaultTexts(context_.options).Severities());
+  options.alarms = gate_;
   options.journal.acknowledged = [this](milliseconds patience) {
     return events_.WaitForAcknowledged(patience);
   };
@@ -302,6 +311,7 @@ void Service::Start() {
   StartParts();
   ResendEvents();
   RecoverAlarms();
+  RefreshBudget();
   if (recorder_) {
     recorder_->Start();
   }
@@ -351,6 +361,36 @@ void Service::EndAcknowledgedAlarms() {
     states_.EndUnconfirmed(alarm_reader_->Over(waiting));
   } catch (const std::exception&) {
     alarm_reader_.reset();
+  }
+}
+
+// The hours of the valves grow, and what they support with them. Nobody is
+// alarmed less because the history cannot be read: the last answer stands.
+void Service::RefreshBudget() {
+  if (between_alarms_h_ == 0.0 || Clock::now() < next_budget_) {
+    return;
+  }
+  next_budget_ = Clock::now() + kBudgetPeriod;
+  storage::HistoryReader reader(data_.history());
+  const auto budget = std::make_shared<const AlarmBudget>(
+      between_alarms_h_, storage::ReadHealthyHours(reader.database()));
+  gate_->Set(budget);
+  const AlarmBudget::Promise promise = budget->Now();
+  context_.log(
+      promise.wait_hours == 0.0 ? LogLevel::kInfo : LogLevel::kWarning,
+      EventLine("alarm_budget",
+                {{"budget", options_.alarm_budget},
+                 {"valves", std::to_string(promise.valves)},
+                 {"with_tails", std::to_string(promise.ready)},
+                 {"needed_h", report::FormatNumber(promise.needed_hours, 0)},
+                 {"longest_h", report::FormatNumber(promise.longest_hours, 0)},
+                 {"kept", PromiseText(promise)}}));
+  for (const AlarmBudget::Spender& valve : budget->spenders()) {
+    context_.log(LogLevel::kWarning,
+                 EventLine("alarm_share_exceeded",
+                           {{"valve", valve.valve_id},
+                            {"alarms", std::to_string(valve.alarms)},
+                            {"share", report::FormatNumber(valve.share, 2)}}));
   }
 }
 
@@ -532,6 +572,7 @@ void Service::Tick() {
   attempt("transport", [this] { ReportLoss(); });
   attempt("heartbeat", [this] { ReportStall(); });
   attempt("alarms", [this] { EndAcknowledgedAlarms(); });
+  attempt("alarm_budget", [this] { RefreshBudget(); });
   attempt("status", [this] { PublishStatus(); });
   if (Clock::now() - last_status_line_ >=
       Milliseconds(options_.status_period_s)) {

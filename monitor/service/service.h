@@ -54,6 +54,9 @@ struct ServiceOptions {
   std::function<void()> on_ready{[] {}};
   /// Optional parts, which follow valves and events in this order.
   std::vector<std::shared_ptr<ServicePart>> parts{};
+  /// Of false alarms for all valves, ParseAlarmBudget(); empty: every episode
+  /// is an alarm.
+  std::string alarm_budget{};
 };
 
 /// Tells the service manager (systemd, Type=notify), if there is one.
@@ -92,6 +95,7 @@ class Service {
   void ResendEvents();
   void RecoverAlarms();
   void EndAcknowledgedAlarms();
+  void RefreshBudget();
   void StartParts();
   void TellAssignedValves();
   void ServeProbes();
@@ -133,6 +137,8 @@ class Service {
   storage::ChangeCounter changes_;
   std::shared_ptr<const ModelAssignment> assignment_;
   std::atomic<std::size_t> model_sets_;
+  const double between_alarms_h_;  // 0: no budget.
+  const std::shared_ptr<AlarmGate> gate_;
   HistoryStore history_;
   std::unique_ptr<RunStore> runs_;     // Null: nothing is recorded.
   std::stop_source publication_stop_;  // Ends waits for slow subscribers.
@@ -154,6 +160,7 @@ class Service {
   std::int64_t started_ns_;
   std::uint64_t reported_loss_{0};
   TimePoint last_status_line_;
+  TimePoint next_budget_{};
   std::optional<TimePoint> retry_reload_at_;   // After a reload that failed,
   std::chrono::milliseconds reload_pause_{0};  // this long after the last try.
   std::atomic<bool> stopping_{false};

@@ -62,6 +62,8 @@ CREATE TABLE fdi.episode (
   known text COLLATE "C" NOT NULL,
   certainty text COLLATE "C" NOT NULL DEFAULT 'not yet',
   look_alikes text COLLATE "C",
+  return_hours double precision,
+  notice bigint NOT NULL DEFAULT 0,
   label text COLLATE "C",
   acked_by text COLLATE "C",
   acked_ns bigint,
@@ -78,7 +80,8 @@ CREATE TABLE fdi.episode (
     AND fdi.is_stamp(unconfirmed_ns) AND flow_unit IN ('m3/h', 't/h')
     AND priority BETWEEN 1 AND 4 AND fdi.is_finite(peak_factor)
     AND fdi.is_finite(strength) AND fdi.is_finite(lowest)
-    AND fdi.is_finite(highest) AND fdi.is_finite(worst_strength))
+    AND fdi.is_finite(highest) AND fdi.is_finite(worst_strength)
+    AND fdi.is_finite(return_hours))
 );
 
 CREATE TABLE fdi.episode_fault (
@@ -422,6 +425,7 @@ SELECT e.episode_id, e.valve_id, fdi.utc(e.detected_ns) AS detected_utc,
   fdi.ack_comment(e.monitor_id, e.episode_id, e.acked_by, e.acked_ns)
     AS ack_comment,
   CASE
+    WHEN e.notice <> 0 THEN 'NOTICE'
     WHEN e.unconfirmed_ns IS NOT NULL
       OR (e.ended_ns IS NULL AND e.cleared_ns IS NULL)
       THEN CASE WHEN e.acked_by IS NULL THEN 'UNACK' ELSE 'ACKED' END
@@ -436,7 +440,7 @@ SELECT e.episode_id, e.valve_id, fdi.utc(e.detected_ns) AS detected_utc,
     AS shelved_until_utc,
   fdi.utc(e.ended_ns) AS ended_utc, e.certainty, e.look_alikes,
   fdi.second(e.monitor_id, e.episode_id) AS second,
-  fdi.description(e.monitor_id, e.fault) AS description
+  fdi.description(e.monitor_id, e.fault) AS description, e.return_hours
 FROM fdi.episode e;
 
 -- A day that is no date does not end the view.

@@ -6,6 +6,7 @@
 
 #include "base/error.h"
 #include "base/headroom.h"
+#include "diagnosis/decision/alarm_budget.h"
 #include "monitor/service/service.h"
 #include "monitor/service/start_notice.h"
 #include "monitor/throttled_log.h"
@@ -48,6 +49,16 @@ std::string ParseRecord(const std::string& word) {
                                word + " is none of on, lossless, off");
   }
   return word;
+}
+
+// Empty: it is one.
+std::string CheckBudget(const std::string& text) {
+  try {
+    ParseAlarmBudget(text);
+  } catch (const ConfigError& error) {
+    return error.what();
+  }
+  return "";
 }
 
 void AddOnEventOptions(CLI::App& run, ServiceOptions& service) {
@@ -147,6 +158,11 @@ void AddRunVerb(report::Program& program) {
       ->capture_default_str();
   AddGroupsOption(program, run, arguments.groups);
   AddOnEventOptions(run, service);
+  run.add_option("--alarm-budget", service.alarm_budget,
+                 "False alarms that all valves together may cost, as 1/day: "
+                 "what is less rare on a healthy valve is a notice")
+      ->check(CheckBudget)
+      ->type_name("N/PERIOD");
   AddHttpOption(run, "--http", arguments.http, "127.0.0.1:9464",
                 "Serve /metrics, /healthz and /readyz; port 0: any free one");
   AddPageOptions(program, run, arguments.page);
@@ -156,7 +172,8 @@ void AddRunVerb(report::Program& program) {
       ->capture_default_str();
   report::ShowInHelpAll(
       run, {"--lossless-decisions", "--best-effort", "--audit-all-loops",
-            "--on-event-rate", "--console-files", "--status-period"});
+            "--on-event-rate", "--console-files", "--status-period",
+            "--stale-timeout"});
 }
 
 }  // namespace fdi::monitor

@@ -257,7 +257,8 @@ Json EpisodeJson(const Alarm& alarm, const ValveNotes& valves) {
        alarm.shelf ? TimeJson(alarm.shelf->until_ns) : Json()},
       {"second", TextJson(episode.second)},
       {"description", TextJson(episode.description)},
-      {"repairs", RepairsJson(episode, valves)}};
+      {"repairs", RepairsJson(episode, valves)},
+      {"return_hours", NumberJson(episode.return_hours)}};
 }
 
 Json ShelfJson(const Shelf& shelf) {

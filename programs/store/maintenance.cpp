@@ -4,9 +4,11 @@
 #include <thread>
 
 #include "base/error.h"
+#include "diagnosis/decision/alarm_budget.h"
 #include "programs/store/clock.h"
 #include "programs/store/verbs.h"
 #include "storage/database/locks.h"
+#include "storage/history/healthy_hours.h"
 #include "storage/history/history_database.h"
 #include "storage/history/history_reader.h"
 #include "storage/history/retention.h"
@@ -192,6 +194,71 @@ report::Column NumberColumn(std::string heading, const char* key, int divisor) {
       0, report::Align::kRight);
 }
 
+// Return periods of the usual budgets of alarms, whichever the monitor has.
+Json BudgetsJson(const std::vector<HealthyHours>& valves) {
+  Json budgets = Json::array();
+  for (const char* const text : {"1/day", "1/week", "1/month", "1/year"}) {
+    const AlarmBudget budget(ParseAlarmBudget(text), valves);
+    const AlarmBudget::Promise promise = budget.Now();
+    Json spenders = Json::array();
+    for (const AlarmBudget::Spender& valve : budget.spenders()) {
+      spenders.push_back({{"valve_id", valve.valve_id},
+                          {"alarms", valve.alarms},
+                          {"share", valve.share}});
+    }
+    budgets.push_back({{"budget", text},
+                       {"needed_hours", promise.needed_hours},
+                       {"longest_hours", promise.longest_hours},
+                       {"wait_hours", NumberJson(promise.wait_hours)},
+                       {"kept", PromiseText(promise)},
+                       {"spenders", spenders}});
+  }
+  return budgets;
+}
+
+Json TailJson(const HealthyHours& valve, const ShareTails& tails) {
+  return {{"valve_id", valve.valve_id},
+          {"hours", valve.shares.size()},
+          {"days", valve.days},
+          {"tail", tails.ReturnHours(valve.valve_id, 1.0).has_value()}};
+}
+
+// Only of a history that is sound: its hours are read.
+void AddBudgets(const DataDirectory& data, Report& report) {
+  Database history(data.history(), HistorySchema(), Access::kReader);
+  const std::vector<HealthyHours> valves = ReadHealthyHours(history);
+  const ShareTails tails(valves);
+  Json& document = report.document;
+  document["alarm_budgets"] = BudgetsJson(valves);
+  document["tails"] = Rows(valves, [&tails](const HealthyHours& valve) {
+    return TailJson(valve, tails);
+  });
+  report.Line("");
+  report.Line("Budget of alarms: " + std::to_string(valves.size()) +
+              " valves are judged, " + std::to_string(tails.valves()) +
+              " have return periods, from " +
+              report::FormatNumber(tails.pooled_hours(), 0) + " healthy hours");
+  for (const Json& budget : document["alarm_budgets"]) {
+    report.Line("  " + budget["budget"].get<std::string>() + ": needs " +
+                report::FormatNumber(budget["needed_hours"].get<double>(), 0) +
+                " h, kept: " + budget["kept"].get<std::string>());
+  }
+  for (const Json& valve : document["tails"]) {
+    if (!valve["tail"].get<bool>()) {
+      report.Line("  " + valve["valve_id"].get<std::string>() +
+                  ": alarms as its limits are set; it has " +
+                  valve["hours"].dump() + " healthy hours on " +
+                  valve["days"].dump() + " days");
+    }
+  }
+  for (const Json& valve : document["alarm_budgets"][1]["spenders"]) {
+    report.Line("  " + valve["valve_id"].get<std::string>() + ": " +
+                valve["alarms"].dump() +
+                " alarms that no label calls a fault; label them, or relearn "
+                "its limits");
+  }
+}
+
 Report Doctor(const NoOptions&, const Context& context) {
   const DataDirectory data = DataOf(context);
   if (!Exists(data.path)) {
@@ -214,7 +281,13 @@ Report Doctor(const NoOptions&, const Context& context) {
     }
   }
   report.document = {{"sound", report.exit_code == report::kExitOk},
-                     {"databases", databases}};
+                     {"databases", databases},
+                     {"alarm_budgets", Json::array()},
+                     {"tails", Json::array()}};
+  const Json& history = databases.back();
+  if (history["present"].get<bool>() && history["troubles"].empty()) {
+    AddBudgets(data, report);
+  }
   return report;
 }
 

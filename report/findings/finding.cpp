@@ -54,6 +54,9 @@ bool IsWorse(const Finding& a, const Finding& b) {
   if (a.stands() != b.stands()) {
     return a.stands();
   }
+  if (a.is_notice() != b.is_notice()) {
+    return b.is_notice();
+  }
   if (a.score() != b.score()) {
     return a.score() > b.score();
   }
@@ -122,7 +125,7 @@ Finding FindingOf(const storage::Episode& episode,
   finding.valve_id = episode.valve_id;
   finding.host = episode.host;
   finding.monitor = episode.monitor;
-  finding.kind = "episode";
+  finding.kind = episode.notice ? "notice" : "episode";
   finding.fault = episode.fault;
   finding.words = texts.Words(episode.fault.value_or("unknown"),
                               episode.strength, episode.priority);

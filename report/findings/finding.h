@@ -36,7 +36,8 @@ struct Finding {
   std::string valve_id;
   std::string host{};  ///< Of the monitor; plant history only.
   std::string monitor{};
-  std::string kind;  ///< "episode", "audit", "limit", "drift" or "figure".
+  std::string kind;  ///< "episode", "audit", "limit", "drift", "figure", or
+                     ///< "notice", an episode within the budget of alarms.
 
   /// Faults as in fault_history, or the verdict of an audit; nothing before a
   /// name, and where no fault is meant.
@@ -64,6 +65,8 @@ struct Finding {
   std::optional<std::string> acked_by{};
   std::optional<std::string> label{};
 
+  bool is_notice() const { return kind == "notice"; }
+  bool is_episode() const { return kind == "episode" || is_notice(); }
   bool stands() const { return !ended_ns; }
   /// SeverityPoints() x GradeFactor() x confidence.
   double score() const;
@@ -78,9 +81,9 @@ double CertaintyFactor(Certainty certainty);
 /// grades is ranked by severity and certainty.
 double GradeFactor(std::optional<int> grade);
 
-/// The rank of findings: what stands comes before what has ended, then the
-/// larger score, then the newer one. Ids decide between equals, so that the
-/// same facts give the same list.
+/// The rank of findings: what stands comes before what has ended, an alarm
+/// before a notice, then the larger score, then the newer one. Ids decide
+/// between equals, so that the same facts give the same list.
 bool IsWorse(const Finding& a, const Finding& b);
 
 /// The loops of the plant as models.db has them. @param models its file; need

@@ -166,6 +166,8 @@ std::string_view AlarmStateName(AlarmState state) {
       return "NORMAL";
     case AlarmState::kShelved:
       return "SHELVED";
+    case AlarmState::kNotice:
+      return "NOTICE";
   }
   return "";
 }
@@ -181,6 +183,9 @@ AlarmState AlarmStateOf(bool active, bool acknowledged, bool shelved) {
 }
 
 AlarmState AlarmStateOf(const Episode& episode, bool shelved) {
+  if (episode.notice) {
+    return AlarmState::kNotice;
+  }
   const bool active =
       episode.unconfirmed_ns || (!episode.ended_ns && !episode.cleared_ns);
   // Where the data ended, an alarm has not returned to normal. It is over once
@@ -221,6 +226,8 @@ Alarm AlarmOf(const FaultEvent& event) {
   e.peak_factor = transition.factor;
   e.strength = transition.strength;
   e.priority = PriorityOf(transition.severity);
+  e.return_hours = transition.return_hours;
+  e.notice = transition.notice;
   e.model_set = event.model_set + "@" + std::to_string(event.model_version);
   if (event.models) {
     e.known = KnownFaults(event.models->faults, event.models->observers);

@@ -63,9 +63,10 @@ enum class AlarmState {
   kReturnedUnacked,  ///< Returned to normal, not acknowledged.
   kNormal,           ///< Returned to normal and acknowledged.
   kShelved,          ///< Suppressed for a limited time.
+  kNotice,           ///< No alarm: within the budget of alarms (AlarmBudget).
 };
 
-/// "UNACK", "ACKED", "RTN_UNACK", "NORMAL", "SHELVED".
+/// "UNACK", "ACKED", "RTN_UNACK", "NORMAL", "SHELVED", "NOTICE".
 std::string_view AlarmStateName(AlarmState state);
 
 /// Shelving hides any other state, which reappears when the shelf ends.

@@ -13,7 +13,7 @@
 namespace fdi::storage {
 namespace {
 
-constexpr std::array<std::pair<std::string_view, EpisodeState>, 11> kStates = {{
+constexpr std::array<std::pair<std::string_view, EpisodeState>, 12> kStates = {{
     {"any", EpisodeState::kAny},
     {"open", EpisodeState::kOpen},
     {"detected", EpisodeState::kDetected},
@@ -25,6 +25,7 @@ constexpr std::array<std::pair<std::string_view, EpisodeState>, 11> kStates = {{
     {"rtn_unack", EpisodeState::kAlarmReturnedUnacked},
     {"normal", EpisodeState::kAlarmNormal},
     {"shelved", EpisodeState::kAlarmShelved},
+    {"notice", EpisodeState::kAlarmNotice},
 }};
 
 }  // namespace

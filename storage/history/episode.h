@@ -98,6 +98,10 @@ struct Episode {
   std::optional<std::string> observers;
   /// The technical name of the fault, as the paper has it; likewise.
   std::optional<std::string> description;
+  /// In so many hours a healthy valve shows that once; nothing: not known.
+  std::optional<double> return_hours;
+  /// Not rare enough for the budget of alarms: nobody is alarmed.
+  bool notice{false};
 };
 
 /// Whether its faults have a name, and with it a strength.
@@ -127,6 +131,7 @@ enum class EpisodeState {
   kAlarmReturnedUnacked,
   kAlarmNormal,
   kAlarmShelved,
+  kAlarmNotice,
 };
 
 /// Parses "any", "open", ... "UNACK", ..., ignoring case. @throws ConfigError
@@ -168,7 +173,7 @@ FDI_FIELDS(fdi::storage::Episode, episode_id, valve_id, detected_utc,
            strength, unknown_kind, layer, flow_unit, channels, faults, known,
            lowest, highest, worst_strength, priority, unconfirmed_ns,
            fault_name, ack_comment, second, audit, rival, rival_times,
-           observers, description)
+           observers, description, return_hours, notice)
 
 FDI_FIELDS(fdi::storage::MonitorSession, session_id, start_ns, alive_ns,
            stop_ns, clean, software, config)

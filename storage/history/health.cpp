@@ -57,19 +57,35 @@ std::int64_t HourFrom(std::int64_t stamp_ns) {
   return stamp_ns / kNsPerHour + (stamp_ns % kNsPerHour > 0 ? 1 : 0);
 }
 
+namespace {
+
+std::vector<HealthHour> ReadHours(Statement& row, const std::string& valve_id) {
+  std::vector<HealthHour> hours;
+  while (row.Step()) {
+    HealthHour hour;
+    hour.valve_id = valve_id;
+    row.Read(0, hour.hour, hour.model_hash, hour.epoch);
+    hours.push_back(Unpacked(row, 3, std::move(hour)));
+  }
+  return hours;
+}
+
+}  // namespace
+
 std::vector<HealthHour> ReadHealth(Database& database,
                                    const HealthFilter& filter) {
   Statement row = database.Prepare(sql::health_hours);
   row.Bind(filter.valve_id, HourFrom(filter.since_ns),
            HourFrom(filter.until_ns));
-  std::vector<HealthHour> hours;
-  while (row.Step()) {
-    HealthHour hour;
-    hour.valve_id = filter.valve_id;
-    row.Read(0, hour.hour, hour.model_hash, hour.epoch);
-    hours.push_back(Unpacked(row, 3, std::move(hour)));
-  }
-  return hours;
+  return ReadHours(row, filter.valve_id);
+}
+
+std::vector<HealthHour> NewestHealth(Database& database,
+                                     const std::string& valve_id,
+                                     std::int64_t most) {
+  Statement row = database.Prepare(sql::newest_hours);
+  row.Bind(valve_id, most);
+  return ReadHours(row, valve_id);
 }
 
 std::vector<std::string> HealthValves(Database& database,

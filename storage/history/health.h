@@ -37,6 +37,11 @@ std::int64_t HourFrom(std::int64_t stamp_ns);
 std::vector<HealthHour> ReadHealth(Database& database,
                                    const HealthFilter& filter);
 
+/// At most so many hours of one valve with a model set, newest first.
+std::vector<HealthHour> NewestHealth(Database& database,
+                                     const std::string& valve_id,
+                                     std::int64_t most);
+
 /// Ids of valves that have stored hours, sorted; `glob` is a shell pattern.
 std::vector<std::string> HealthValves(Database& database,
                                       const std::string& glob);

@@ -8,10 +8,11 @@
 
 namespace fdi::storage {
 
-// The bytes of an hour, format 2:
+// The bytes of an hour, format 3:
 //
 //   hour     = head seen alarm open shut live_samples normal_factor travel
-//              reversals  counts  channels channel*  filled bin*  strength* 0
+//              reversals share  counts  channels channel*  filled bin*
+//              strength* 0
 //   head     = uint8: the format, with 0x80 if flow is in t/h
 //   counts   = present number*: bit i of `present` is set if number i of
 //              loop::ValveCounts follows; that of the time in automatic is
@@ -25,7 +26,8 @@ namespace fdi::storage {
 // are omitted if it has no samples.
 namespace {
 
-constexpr std::uint8_t kFormat = 2;
+constexpr std::uint8_t kFormat = 3;
+constexpr std::uint8_t kNoShare = 2;    // the format of before, without share
 constexpr std::uint8_t kTonnes = 0x80;  // beside the format: flow in t/h
 
 // LEB128 with zigzag coding: 0, -1, 1, -2, ... become 0, 1, 2, 3, ...
@@ -148,6 +150,7 @@ std::vector<std::byte> PackHealth(const HealthHour& hour) {
   out.Put(static_cast<std::uint8_t>(
       kFormat | (hour.flow_unit == FlowUnit::kTPerHour ? kTonnes : 0)));
   ForEachNumber(hour, [&out](std::int64_t value) { PutNumber(out, value); });
+  PutNumber(out, hour.share);
   PutCounts(out, hour);
   PutNumber(out, static_cast<std::int64_t>(hour.channels.size()));
   for (const HealthChannel& channel : hour.channels) {
@@ -168,13 +171,14 @@ void UnpackHealth(std::span<const std::byte> bytes, HealthHour& hour) {
   ByteReader in(bytes, "health of " + hour.valve_id);
   const auto head = in.Get<std::uint8_t>();
   const int format = head & ~kTonnes;
-  if (format != kFormat) {
+  if (format != kFormat && format != kNoShare) {
     in.Refuse("format " + std::to_string(format) +
               " is not known to this program");
   }
   hour.flow_unit =
       (head & kTonnes) != 0 ? FlowUnit::kTPerHour : FlowUnit::kM3PerHour;
   ForEachNumber(hour, [&in](std::int64_t& value) { value = GetNumber(in); });
+  hour.share = format == kFormat ? GetNumber(in) : 0;
   GetCounts(in, hour);
   hour.channels.resize(GetCount(in, kMaxChannels, "channels"));
   for (HealthChannel& channel : hour.channels) {

@@ -74,6 +74,7 @@ std::string StateCondition(EpisodeState state) {
       "'superseded' AND coalesce(e.layer, '') = 'audit')))";
   constexpr const char* kAcked = " AND e.acked_by IS NOT NULL";
   constexpr const char* kUnacked = " AND e.acked_by IS NULL";
+  constexpr const char* kAlarm = " AND e.notice = 0";
   std::string open = " AND e.ended_ns IS NULL";
   switch (state) {
     case EpisodeState::kAny:
@@ -87,18 +88,20 @@ std::string StateCondition(EpisodeState state) {
     case EpisodeState::kClosed:
       return " AND e.ended_ns IS NOT NULL";
     case EpisodeState::kUnacked:
-      return kUnacked;
+      return std::string(kUnacked) + kAlarm;
     case EpisodeState::kAlarmUnacked:
-      return std::string(" AND ") + kActive + kUnacked;
+      return std::string(" AND ") + kActive + kUnacked + kAlarm;
     case EpisodeState::kAlarmAcked:
-      return std::string(" AND ") + kActive + kAcked;
+      return std::string(" AND ") + kActive + kAcked + kAlarm;
     case EpisodeState::kAlarmReturnedUnacked:
-      return std::string(kUnacked) + " AND " + kInactive + kReturned;
+      return std::string(kUnacked) + " AND " + kInactive + kReturned + kAlarm;
     case EpisodeState::kAlarmNormal:
       return std::string(" AND ") + kInactive + " AND NOT (e.acked_by IS NULL" +
-             kReturned + ")";
+             kReturned + ")" + kAlarm;
     case EpisodeState::kAlarmShelved:
       return " AND " + std::string(sql::is_shelved);
+    case EpisodeState::kAlarmNotice:
+      return " AND e.notice <> 0";
   }
   return "";
 }

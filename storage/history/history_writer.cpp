@@ -24,7 +24,7 @@ namespace fdi::storage {
 template <>
 struct EnumText<TransitionKind> {
   static constexpr auto name = TransitionName;
-  static constexpr auto last = TransitionKind::kSecond;
+  static constexpr auto last = TransitionKind::kRaised;
 };
 
 namespace sql = history_sql;
@@ -212,7 +212,12 @@ bool StoreEvent(Database& database, const Entry& entry,
   if (database.Changes() == 0) {
     return false;
   }
-  StoreUnsent(database, event);
+  if (!t.notice) {
+    StoreUnsent(database, event);
+  }
+  database.Cached(sql::set_share)
+      .Bind(t.share, t.return_hours, t.notice, entry.id)
+      .Run();
   if (t.unknown != Unknown::kNone) {
     database.Cached(sql::set_unknown_kind)
         .Bind(UnknownName(t.unknown), entry.id)
@@ -225,7 +230,7 @@ bool StoreEvent(Database& database, const Entry& entry,
   }
   // A second fault wants an answer, whatever its priority; its end does not.
   const bool second = t.kind == TransitionKind::kSecond && t.second.open;
-  if (second) {
+  if (second || t.kind == TransitionKind::kRaised) {
     database.Cached(sql::raise_alarm).Bind(entry.id, true, std::nullopt).Run();
   } else if (IsIsolation(t.kind) || t.kind == TransitionKind::kChanged) {
     // Before the new priority replaces the one that was acknowledged.
@@ -352,6 +357,7 @@ OpenEpisode ReadOpen(const Statement& row) {
   episode.candidates = IsolatedCandidates(isolated, factor, strength);
   episode.severity = ReadSeverity(row, 13);
   episode.second = ParseSecond(row.Text(14), names);
+  row.Read(15, episode.share, episode.notice);
   SplitModelSet(model_set, episode.model_set, episode.model_version);
   return episode;
 }

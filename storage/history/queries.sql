@@ -17,7 +17,7 @@ SELECT v.episode_id, v.valve_id, v.detected_utc, v.isolated_utc,
      THEN a.fault END
    FROM episode a WHERE a.valve_id = e.valve_id AND a.detected_ns < e.detected_ns
    ORDER BY a.detected_ns DESC LIMIT 1), l.rival, l.times, l.observers,
-  v.description
+  v.description, e.return_hours, e.notice
 FROM episode e CROSS JOIN fault_history v USING (episode_id)
   LEFT JOIN episode_look l ON l.episode_id = e.episode_id
 WHERE
@@ -30,7 +30,7 @@ WHERE episode_id >= ?1 AND episode_id < ?1 || 'g' LIMIT 2
 e.episode_id IN (
   SELECT episode_id FROM (
     SELECT episode_id FROM episode INDEXED BY episode_active
-    WHERE ended_ns IS NULL OR unconfirmed_ns IS NOT NULL
+    WHERE (ended_ns IS NULL OR unconfirmed_ns IS NOT NULL) AND notice = 0
     ORDER BY detected_ns DESC, valve_id DESC LIMIT ?1)
   UNION ALL
   SELECT episode_id FROM (
@@ -40,6 +40,7 @@ e.episode_id IN (
            (end_reason NOT IN ('stream_ended', 'stale_timeout', 'unknown')
             AND NOT (end_reason = 'superseded'
                      AND coalesce(layer, '') = 'audit')))
+      AND notice = 0
     ORDER BY detected_ns DESC, valve_id DESC LIMIT ?1)
   LIMIT ?1)
 ORDER BY e.detected_ns DESC, e.valve_id DESC
@@ -49,7 +50,7 @@ ORDER BY e.detected_ns DESC, e.valve_id DESC
 SELECT e.priority, sum(e.unconfirmed_ns IS NOT NULL OR e.cleared_ns IS NULL),
   sum(e.acked_by IS NULL)
 FROM episode e INDEXED BY episode_active
-WHERE (e.ended_ns IS NULL OR e.unconfirmed_ns IS NOT NULL)
+WHERE (e.ended_ns IS NULL OR e.unconfirmed_ns IS NOT NULL) AND e.notice = 0
 -- name: count_returned
 SELECT e.priority, 0, count(*) FROM episode e INDEXED BY episode_returned
 WHERE e.acked_by IS NULL AND e.ended_ns IS NOT NULL AND e.unconfirmed_ns IS NULL
@@ -57,6 +58,7 @@ WHERE e.acked_by IS NULL AND e.ended_ns IS NOT NULL AND e.unconfirmed_ns IS NULL
        (e.end_reason NOT IN ('stream_ended', 'stale_timeout', 'unknown')
         AND NOT (e.end_reason = 'superseded'
                  AND coalesce(e.layer, '') = 'audit')))
+  AND e.notice = 0
 -- name: is_over
 SELECT 1 FROM episode
 WHERE episode_id = ? AND ended_ns IS NOT NULL AND unconfirmed_ns IS NULL
@@ -90,7 +92,8 @@ SELECT e.valve_id, coalesce(e.fault, ''), e.detected_ns, e.ended_ns, e.label,
     SELECT max(last_ns) FROM episode_trace t
     WHERE t.episode_id = e.episode_id) END
 FROM episode e INDEXED BY episode_statistics
-WHERE (e.ended_ns IS NULL OR e.ended_ns >= ?2) AND e.detected_ns < ?3 AND
+WHERE (e.ended_ns IS NULL OR e.ended_ns >= ?2) AND e.detected_ns < ?3
+  AND e.notice = 0 AND
 -- name: insert_episode
 INSERT INTO episode (episode_id, session_id, valve_id, source_id, detected_ns,
   peak_factor, strength, model_set, model_hash, flow_unit, channels, faults,
@@ -122,6 +125,11 @@ INSERT INTO episode_fault
   (episode_id, fault, fault_bit, first_ns, held, detected_ns)
 SELECT episode_id, ?, ?, ?, 1, detected_ns FROM episode WHERE episode_id = ?
 ON CONFLICT (episode_id, fault) DO UPDATE SET held = 1
+-- Parameters: share, return period, notice, episode.
+-- name: set_share
+UPDATE episode SET share = max(coalesce(share, 0), ?1), return_hours = ?2,
+  notice = ?3
+WHERE episode_id = ?4
 -- name: set_unknown_kind
 UPDATE episode SET unknown_kind = ? WHERE episode_id = ?
 -- name: set_cleared
@@ -169,7 +177,7 @@ SELECT episode_id, valve_id, source_id, detected_ns,
   peak_factor, strength, priority,
   (SELECT s.value FROM episode_event s
    WHERE s.episode_id = e.episode_id AND s.kind = 'SECOND'
-   ORDER BY s.stamp_ns DESC LIMIT 1)
+   ORDER BY s.stamp_ns DESC LIMIT 1), coalesce(share, 0), notice
 FROM episode e WHERE ended_ns IS NULL ORDER BY detected_ns, valve_id
 
 -- ---- Events.
@@ -309,6 +317,14 @@ VALUES (?, ?, ?, ?, ?, ?) ON CONFLICT DO UPDATE SET
 SELECT hour, model_hash, epoch, live_ms, bytes FROM health_hour
 WHERE valve_id = ? AND hour >= ? AND hour < ?
 ORDER BY hour, epoch, model_hash
+-- The newest hours of a valve, newest first.
+-- name: newest_hours
+SELECT hour, model_hash, epoch, live_ms, bytes FROM health_hour
+WHERE valve_id = ? AND model_hash <> 0 ORDER BY hour DESC LIMIT ?
+-- What was detected since then and has a share.
+-- name: shares_of_episodes
+SELECT share, notice, coalesce(label, '') FROM episode
+WHERE valve_id = ? AND detected_ns >= ? AND share IS NOT NULL
 -- Skips from valve to valve along the key.
 -- name: next_health_valve
 SELECT min(valve_id) FROM health_hour WHERE valve_id > ?
@@ -346,7 +362,8 @@ SELECT coalesce((SELECT min(event_id) - 1 FROM event_outbox),
 -- name: cause_events
 SELECT v.event_id, v.kind = 'CLOSED', v.episode_id, e.valve_id, v.stamp_ns
 FROM episode_event v JOIN episode e USING (episode_id)
-WHERE v.event_id > ? AND v.kind IN ('ISOLATED', 'REISOLATED', 'CLOSED')
+WHERE v.event_id > ? AND e.notice = 0
+  AND v.kind IN ('ISOLATED', 'REISOLATED', 'RAISED', 'CLOSED')
 ORDER BY v.event_id LIMIT ?
 -- name: open_causes
 SELECT cause_id FROM common_cause WHERE ended_ns IS NULL

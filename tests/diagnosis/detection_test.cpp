@@ -4,6 +4,7 @@
 #include <cmath>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -59,6 +60,50 @@ TEST(DetectionTest, EnergyOfAWindowIsWatchedUpwards) {
   });
   ASSERT_FALSE(seen.transitions.empty());
   EXPECT_EQ(seen.transitions[0].kind, TransitionKind::kDetected);
+}
+
+// Whatever test it is, and only after as many samples as a detection takes.
+TEST(DetectionTest, AShareAboveOneDetects) {
+  ModelSet models = *SharedPlant();
+  models.channels[1].windows = {{50, -0.8 * tests::kNoise, 0.8 * tests::kNoise,
+                                 std::log(1.5 * tests::kNoise)}};
+  int beyond = 0;
+  for (const double fault : {0.0, 0.02, 0.05, 0.2, 1.0}) {
+    ValveEngine engine(std::make_shared<const ModelSet>(models));
+    Noise noise(8);
+    for (std::uint64_t k = 0; k < 600; ++k) {
+      Sample sample = PlantSample(k);
+      noise.Add(sample);
+      if (k >= 300) {
+        AddF6(sample, fault * tests::kNoise);
+      }
+      const bool was_open = engine.episode_open();
+      const Verdict& verdict = engine.Step(sample);
+      if (!was_open) {
+        EXPECT_EQ(verdict.share > 1.0, verdict.detected) << k;
+        beyond += verdict.detected ? 1 : 0;
+      }
+      EXPECT_GE(verdict.share, 0.0);
+    }
+  }
+  EXPECT_GE(beyond, 3);
+}
+
+TEST(DetectionTest, AShareIsHeldForAsLongAsADetectionTakes) {
+  ModelSet models = *SharedPlant();
+  models.decision.detection_samples = 3;
+  const double limit = models.channels[1].upper_threshold;
+  ValveEngine engine(std::make_shared<const ModelSet>(models));
+  std::vector<double> shares;
+  for (std::uint64_t k = 0; k < 210; ++k) {
+    Sample sample = PlantSample(k);
+    sample.values[Index(Signal::kF)] += k < 200 ? 0.0 : 0.8 * limit;
+    shares.push_back(engine.Step(sample).share);
+  }
+  EXPECT_LT(shares[199], 0.1);
+  EXPECT_LT(shares[201], 0.1);
+  EXPECT_NEAR(shares[202], 0.8, 0.05);
+  EXPECT_NEAR(shares[209], 0.8, 0.05);
 }
 
 // An error of the model at one end of the range, where CV never stayed in

@@ -129,6 +129,26 @@ TEST(FloorTest, CommandedTravelIsNoFinding) {
   }
 }
 
+// The rod stays `off` from where it is commanded: the limit is 10.
+TEST(FloorTest, AShareAboveOneIsAFinding) {
+  for (const double off : {2.0, 8.0, 9.9, 10.2, 15.0, 40.0}) {
+    const ModelSet models = FlooredPlant();
+    Floor floor(models);
+    double share = 0.0;
+    for (int k = 0; k < 60; ++k) {
+      const double x = k < 30 ? 50.0 : 50.0 + off;
+      // A reading that repeats would be a finding without a share.
+      floor.Push(ValveAt(
+          k, {.x = x, .flow = 100.0 * std::exp(-0.02 * x) + 0.01 * (k % 7)}));
+      EXPECT_EQ(floor.share() > 1.0, floor.findings() != 0) << off << " " << k;
+      share = floor.share();
+    }
+    EXPECT_GE(share, off / models.floor->deviation - 1e-9) << off;
+    floor.Restart();
+    EXPECT_EQ(floor.share(), 0.0);
+  }
+}
+
 // Nor is a rod that follows a step at once and comes back slowly, or the
 // reverse.
 TEST(FloorTest, ARodMayMoveFasterOneWay) {

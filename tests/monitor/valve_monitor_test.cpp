@@ -1,6 +1,7 @@
 #include "monitor/valve_monitor.h"
 
 #include <algorithm>
+#include <cmath>
 #include <memory>
 #include <utility>
 #include <vector>
@@ -15,6 +16,7 @@ namespace fdi::monitor {
 namespace {
 
 using std::chrono::seconds;
+using testing::Contains;
 using testing::ElementsAre;
 
 class Notebook : public EpisodeOutlet {
@@ -105,6 +107,127 @@ TEST_F(ValveMonitorTest, AFaultIsDetectedIsolatedAndClearedAsOneEpisode) {
   EXPECT_EQ(notebook_.events.at(1).candidates.front().fault, 7);
   EXPECT_TRUE(notebook_.events.at(1).candidates.front().isolated);
   EXPECT_EQ(notebook_.events[3].transition.reason, EndReason::kCleared);
+}
+
+// Four valves whose hours exceed z with exp(-(z - 0.4)/0.1).
+std::shared_ptr<const AlarmBudget> Budget(double between_hours) {
+  std::vector<HealthyHours> fleet(4);
+  for (std::size_t v = 0; v < fleet.size(); ++v) {
+    fleet[v].valve_id = "V" + std::to_string(v);
+    fleet[v].days = 30;
+    for (int i = 0; i < 300; ++i) {
+      fleet[v].shares.push_back(0.4 - 0.1 * std::log((i + 0.5) / 300.0));
+    }
+  }
+  return std::make_shared<const AlarmBudget>(between_hours, fleet);
+}
+
+class AlarmGateTest : public ValveMonitorTest {
+ protected:
+  std::vector<bool> Notices() const {
+    std::vector<bool> notices;
+    for (const FaultEvent& event : notebook_.events) {
+      notices.push_back(event.transition.notice);
+    }
+    return notices;
+  }
+
+  std::shared_ptr<AlarmGate> gate_ = std::make_shared<AlarmGate>();
+  ValveMonitor gated_{
+      "V1",    EngineParts(SharedLinearModels()),           {},
+      nullptr, std::make_shared<const SeverityCatalogue>(), nullptr,
+      gate_};
+
+  // X is off by `offset`; the limit is 5.
+  ValveOutcome Gated(std::uint64_t from, std::uint64_t to, double offset) {
+    for (std::uint64_t k = from; k + 1 < to; ++k) {
+      gated_.Step(PlantSample(k, offset), kWriter, now_, notebook_);
+    }
+    return gated_.Step(PlantSample(to - 1, offset), kWriter, now_, notebook_);
+  }
+};
+
+// A share of 1.2 comes in some 3000 h, one of 4 never.
+TEST_F(AlarmGateTest, ANoticeIsRaisedOnceItIsRareEnough) {
+  gate_->Set(Budget(8766.0));
+  EXPECT_FALSE(Gated(0, 100, 0.0).notice);
+  EXPECT_TRUE(Gated(100, 104, -6.0).notice);
+  ASSERT_THAT(notebook_.Kinds(), ElementsAre(TransitionKind::kDetected));
+  EXPECT_TRUE(notebook_.events[0].transition.notice);
+  ASSERT_TRUE(notebook_.events[0].transition.return_hours);
+  EXPECT_GT(*notebook_.events[0].transition.return_hours, 300.0);
+  EXPECT_LT(*notebook_.events[0].transition.return_hours, 12'000.0);
+
+  // Its name may come before, and is then that of the notice.
+  EXPECT_FALSE(Gated(104, 140, kF7Offset).notice);
+  const auto raised = std::ranges::find(
+      notebook_.events, TransitionKind::kRaised,
+      [](const FaultEvent& event) { return event.transition.kind; });
+  ASSERT_NE(raised, notebook_.events.end());
+  EXPECT_EQ(raised->episode_id, notebook_.events[0].episode_id);
+  EXPECT_EQ(raised->transition.return_hours, 12'000.0);
+  EXPECT_EQ(raised->transition.detection_stamp_ns, PlantSample(100).stamp_ns);
+  for (auto event = notebook_.events.begin(); event != notebook_.events.end();
+       ++event) {
+    EXPECT_EQ(event->transition.notice, event < raised);
+  }
+
+  EXPECT_FALSE(Gated(140, 200, 0.0).notice);
+  EXPECT_EQ(notebook_.Kinds().back(), TransitionKind::kClosed);
+  EXPECT_FALSE(notebook_.events.back().transition.notice);
+  EXPECT_NEAR(notebook_.events.back().transition.share, 4.0, 1e-9);
+}
+
+TEST_F(AlarmGateTest, AStrongFaultIsAnAlarmAtOnce) {
+  gate_->Set(Budget(8766.0));
+  Gated(0, 100, 0.0);
+  EXPECT_FALSE(Gated(100, 140, kF7Offset).notice);
+  EXPECT_THAT(notebook_.Kinds(), ElementsAre(TransitionKind::kDetected,
+                                             TransitionKind::kIsolated));
+  EXPECT_THAT(Notices(), ElementsAre(false, false));
+}
+
+TEST_F(AlarmGateTest, ANoticeThatGoesWasNoAlarm) {
+  gate_->Set(Budget(8766.0));
+  Gated(0, 100, 0.0);
+  Gated(100, 104, -6.0);
+  Gated(104, 150, 0.0);
+  EXPECT_THAT(notebook_.Kinds(),
+              ElementsAre(TransitionKind::kDetected, TransitionKind::kCleared,
+                          TransitionKind::kClosed));
+  EXPECT_THAT(Notices(), ElementsAre(true, true, true));
+}
+
+TEST_F(AlarmGateTest, WithoutABudgetOrItsHoursEveryEpisodeIsAnAlarm) {
+  Gated(0, 100, 0.0);
+  EXPECT_FALSE(Gated(100, 104, -6.0).notice);
+  EXPECT_FALSE(notebook_.events[0].transition.return_hours);
+  EXPECT_NEAR(notebook_.events[0].transition.share, 1.2, 1e-9);
+  Gated(104, 150, 0.0);
+  notebook_.events.clear();
+  gate_->Set(std::make_shared<const AlarmBudget>(
+      8766.0, std::vector<HealthyHours>{{.valve_id = "V1"}}));
+  EXPECT_FALSE(Gated(150, 154, -6.0).notice);
+  EXPECT_THAT(notebook_.Kinds(), ElementsAre(TransitionKind::kDetected));
+  EXPECT_THAT(Notices(), ElementsAre(false));
+}
+
+TEST_F(AlarmGateTest, AResumedNoticeStaysOne) {
+  gate_->Set(Budget(8766.0));
+  OpenEpisode left = LeftOpen();
+  left.isolated = false;
+  left.faults = 0;
+  left.candidates.clear();
+  left.notice = true;
+  left.share = 1.25;
+  gated_.Recover(left);
+  EXPECT_TRUE(Gated(200, 220, -6.0).notice);
+  EXPECT_THAT(notebook_.resumed, ElementsAre(left.episode_id));
+  EXPECT_FALSE(Gated(220, 240, kF7Offset).notice);
+  EXPECT_THAT(notebook_.Kinds(), Contains(TransitionKind::kRaised));
+  for (const FaultEvent& event : notebook_.events) {
+    EXPECT_EQ(event.episode_id, left.episode_id);
+  }
 }
 
 // From 0.8 on, by 0.08 in a thousand seconds.

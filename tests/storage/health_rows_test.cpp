@@ -4,6 +4,7 @@
 
 #include "base/error.h"
 #include "storage/history/health.h"
+#include "storage/history/healthy_hours.h"
 #include "storage/history/history_database.h"
 #include "storage/history/history_writer.h"
 #include "storage/history/retention.h"
@@ -31,6 +32,7 @@ HealthHour Typical(const std::string& valve, std::int64_t hour, int bins,
   h.normal_factor = 3'300'000 + static_cast<std::int64_t>(9e3 * noise(random));
   h.travel = 180'000;
   h.reversals = 250;
+  h.share = 640;
   h.counts.auto_ms = h.seen_ms;
   h.counts.path = 1'200'000 + static_cast<std::int64_t>(9e4 * noise(random));
   h.counts.turns = 40;
@@ -219,6 +221,33 @@ TEST_F(HealthRowsTest, AnHourOfAValveTakesLessThan152Bytes) {
   RecordProperty("bytes_per_hour_of_a_valve", std::to_string(bytes));
   EXPECT_LT(bytes, 152.0);
   EXPECT_GT(bytes, 60.0);
+}
+
+TEST_F(HealthRowsTest, HealthyHoursAreJudgedAndWithoutAnEpisode) {
+  std::vector<HealthHour> hours;
+  for (int i = 0; i < 30; ++i) {
+    hours.push_back(Typical("V1", 400'000 + i, 1, random_));
+    hours.back().share = 600 + i;
+  }
+  hours[3].live_ms = 3'000'000;   // not judged for long enough
+  hours[4].alarm_ms = 1'000'000;  // an episode was open
+  hours[5].share = 0;             // not known
+  hours[0].model_hash = 1;        // of another model set
+  hours.push_back(Typical("V2", 400'000, 1, random_));
+  hours.back().model_hash = 0;  // nothing judges it
+  {
+    Transaction transaction(writer_.database());
+    StoreHealth(writer_.database(), hours);
+    transaction.Commit();
+  }
+
+  const std::vector<HealthyHours> valves = ReadHealthyHours(writer_.database());
+  ASSERT_EQ(valves.size(), 1U);
+  EXPECT_EQ(valves[0].valve_id, "V1");
+  ASSERT_EQ(valves[0].shares.size(), 26U);
+  EXPECT_NEAR(valves[0].shares.front(), 0.629, 1e-9);
+  EXPECT_NEAR(valves[0].shares.back(), 0.601, 1e-9);
+  EXPECT_EQ(valves[0].days, 2);
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 #include "storage/history/history_reader.h"
 
 #include <algorithm>
+#include <numeric>
 
 #include <gmock/gmock.h>
 
@@ -11,8 +12,10 @@ namespace fdi::storage {
 namespace {
 
 using Kind = TransitionKind;
+using testing::Contains;
 using testing::ElementsAre;
 using testing::IsEmpty;
+using testing::Not;
 
 class HistoryReaderTest : public HistoryFixture {
  protected:
@@ -83,6 +86,69 @@ TEST_F(HistoryReaderTest, StatesNarrowTheList) {
               ElementsAre("LV-1", "LV-2", "PV-1"));
   EXPECT_THAT(valves(EpisodeState::kUnacked),
               ElementsAre("LV-1", "PV-1", "PV-2"));
+}
+
+// As every view takes it: nobody is alarmed by a notice until it is raised.
+TEST_F(HistoryReaderTest, ANoticeIsListedAndIsNoAlarm) {
+  FaultEvent event =
+      Event(Kind::kDetected, 0, 0, 0.3, EndReason::kNone, "NV-1");
+  event.transition.share = 1.1;
+  event.transition.return_hours = 400.0;
+  event.transition.notice = true;
+  writer_.Record(event, kDetected);
+  const auto state = [this] {
+    return Sql("SELECT alarm_state FROM fault_history WHERE valve_id = 'NV-1'");
+  };
+  const auto alarms = [this] {
+    std::vector<std::string> valves;
+    for (const Alarm& alarm : HistoryReader(path_).AlarmList(kDetected)) {
+      valves.push_back(alarm.episode.valve_id);
+    }
+    return valves;
+  };
+  const auto active = [this] {
+    const AlarmCounts counts = HistoryReader(path_).CountAlarms(kDetected);
+    return std::accumulate(counts.active.begin(), counts.active.end(), 0U);
+  };
+  EpisodeFilter notices;
+  notices.state = EpisodeState::kAlarmNotice;
+  const auto unsent = [this] {
+    std::int64_t events = 0;
+    for (const FaultEvent& each : writer_.UnsentEvents()) {
+      events += each.valve_id == "NV-1" ? 1 : 0;
+    }
+    return events;
+  };
+  EXPECT_EQ(state(), "NOTICE");
+  EXPECT_EQ(unsent(), 0);
+  EXPECT_THAT(Valves(notices), ElementsAre("NV-1"));
+  EXPECT_THAT(alarms(), Not(Contains("NV-1")));
+  EXPECT_EQ(active(), 2U);  // PV-1 and PV-2
+  const Episode stored = HistoryReader(path_).Show(EpisodeIdText(Id("NV-1")));
+  EXPECT_TRUE(stored.notice);
+  EXPECT_EQ(stored.return_hours, 400.0);
+  EXPECT_EQ(AlarmStateOf(stored), AlarmState::kNotice);
+  EXPECT_EQ(AlarmOf(event).state, AlarmState::kNotice);
+  for (const OpenEpisode& open : writer_.OpenEpisodes()) {
+    EXPECT_EQ(open.notice, open.valve_id == "NV-1");
+    EXPECT_EQ(open.share, open.valve_id == "NV-1" ? 1.1 : 0.0);
+  }
+  EXPECT_EQ(HistoryReader(path_)
+                .AlarmFigures({}, kDetected + 1000 * kSecond)
+                .valves.count("NV-1"),
+            0U);
+
+  event.transition.kind = Kind::kRaised;
+  event.transition.stamp_ns += 30 * kSecond;
+  event.transition.share = 2.0;
+  event.transition.return_hours = 9000.0;
+  event.transition.notice = false;
+  writer_.Record(event, kDetected);
+  EXPECT_EQ(state(), "UNACK");
+  EXPECT_EQ(unsent(), 1);
+  EXPECT_THAT(Valves(notices), IsEmpty());
+  EXPECT_THAT(alarms(), Contains("NV-1"));
+  EXPECT_EQ(active(), 3U);
 }
 
 TEST_F(HistoryReaderTest, EpisodeIsFoundByAUniqueBeginningOfItsId) {

@@ -51,7 +51,7 @@ TEST_F(HistoryWriterTest, ViewHasTheColumnsOfTheContractInOrder) {
                   "worst_strength", "severity", "priority", "unconfirmed_utc",
                   "fault_name", "acked_utc", "ack_comment", "alarm_state",
                   "shelved_until_utc", "ended_utc", "certainty", "look_alikes",
-                  "second", "description"));
+                  "second", "description", "return_hours"));
 }
 
 TEST_F(HistoryWriterTest, ViewSaysHowCertainANameIsAndWhenItEnded) {

@@ -124,10 +124,11 @@ export function actionButtons(row, done) {
     button(text, async () => await action(target) && done?.(),
         {'aria-label': `${text} ${row.valve}`});
   const open = row.isa === 'UNACK' || row.isa === 'RTN_UNACK';
+  const over = ['RTN_UNACK', 'NORMAL', 'NOTICE'].includes(row.isa);
   return [
     open ? acting('Acknowledge', acknowledge, [row]) : null,
     row.shelved ? acting('Unshelve', unshelve, row) :
-      row.isa === 'RTN_UNACK' || row.isa === 'NORMAL' ? null :
+      over ? null :
         acting('Shelve', shelve, row),
     canLabel() ? acting('Label', label, row) : null,
   ];

@@ -78,7 +78,8 @@ export const groups = [
 
 export function groupName(row) {
   const key = groupOf(row);
-  return groups.find((group) => group.key === key)?.name ?? 'Normal';
+  return key === 'NOTICE' ? 'Notice' :
+    groups.find((group) => group.key === key)?.name ?? 'Normal';
 }
 
 /** In the order of the work list, which has nothing that is shelved. */
@@ -153,8 +154,10 @@ function refusalText({reason, signals, flow_unit: unit}) {
 }
 
 // "no P1; F not judged"
-function lackText({quality, missing, unjudged, refused, blind, contested}) {
+function lackText(
+    {quality, missing, unjudged, refused, blind, contested, notice}) {
   return [
+    notice ? 'a notice, within the budget of alarms' : '',
     contested ? 'two publishers send it, the newest counts' : '',
     blind ? 'limits too wide to see a fault' : '',
     missing?.length ? `no ${missing.join(', ')}` : '',
@@ -189,7 +192,7 @@ export function notJudgedText(tile) {
 }
 
 const kMarkWords = {
-  ISOLATED: 'named', REISOLATED: 'named anew', CHANGED: 'priority rose', SECOND: 'second fault', ACK: 'acknowledged',
+  ISOLATED: 'named', REISOLATED: 'named anew', CHANGED: 'priority rose', RAISED: 'became an alarm', SECOND: 'second fault', ACK: 'acknowledged',
   LABEL: 'labelled',
 };
 /** `text` of a mark, or faults of an event: none if a name was withdrawn. */

@@ -194,7 +194,7 @@ class Store extends EventTarget {
 
   #updateAlarm(row) {
     const known = this.alarms.has(row.episode);
-    if (row.isa === 'NORMAL') {
+    if (row.isa === 'NORMAL' || row.isa === 'NOTICE') {
       this.alarms.delete(row.episode);
     } else {
       this.alarms.set(row.episode, row);

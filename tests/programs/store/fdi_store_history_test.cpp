@@ -1,11 +1,13 @@
 // Runs the built program on a history: list, show, ack, export, doctor, backup.
 #include <algorithm>
+#include <cmath>
 #include <sstream>
 
 #include <gmock/gmock.h>
 
 #include "base/time_text.h"
 #include "storage/database/locks.h"
+#include "storage/history/health.h"
 #include "storage/models/models.h"
 #include "storage/runs/run_recorder.h"
 #include "tests/programs/store/store_program_fixture.h"
@@ -63,7 +65,7 @@ TEST_F(FdiStoreHistoryTest, ListedEpisodesHaveTheColumnsOfTheView) {
           "worst_strength", "severity", "priority", "unconfirmed_utc",
           "certainty", "look_alikes", "fault_name", "acked_utc", "ack_comment",
           "alarm_state", "shelved_until_utc", "second", "description",
-          "witness", "repairs"));
+          "witness", "repairs", "return_hours"));
   EXPECT_EQ(episode["fault_name"], "Flashing or critical flow");
   EXPECT_EQ(episode["fault"], "f7");
   EXPECT_EQ(episode["detected_utc"], "2026-11-20T14:56:11.000Z");
@@ -626,9 +628,53 @@ TEST_F(FdiStoreHistoryTest, DoctorFindsASoundDirectorySound) {
   EXPECT_EQ(report["sound"], true);
   ASSERT_EQ(report["databases"].size(), 3U);
   EXPECT_EQ(report["databases"][0]["present"], false);
-  EXPECT_EQ(report["databases"][2]["version"], 19);
+  EXPECT_EQ(report["databases"][2]["version"], 20);
   EXPECT_EQ(report["databases"][2]["figures"]["open_episodes"], 1);
   EXPECT_EQ(report["databases"][2]["figures"]["unsent_events"], 2);
+}
+
+// Four valves with 300 healthy hours each; a fifth has none.
+TEST_F(FdiStoreHistoryTest, DoctorTellsWhichBudgetsOfAlarmsAreKept) {
+  std::vector<HealthHour> hours;
+  for (int v = 0; v < 5; ++v) {
+    for (int i = 0; i < (v < 4 ? 300 : 1); ++i) {
+      HealthHour& hour = hours.emplace_back();
+      hour.valve_id = "TV-" + std::to_string(v);
+      hour.hour = 490'000 + i;
+      hour.model_hash = 7;
+      hour.seen_ms = hour.live_ms = 3'600'000;
+      hour.share = 400 + std::llround(-100.0 * std::log((i + 0.5) / 300.0));
+    }
+  }
+  {
+    Database history(path_, HistorySchema(), Access::kWriter);
+    Transaction transaction(history);
+    StoreHealth(history, hours);
+    transaction.Commit();
+  }
+  const json report = StoreJson("doctor");
+  ASSERT_EQ(report["alarm_budgets"].size(), 4U);
+  const json& day = report["alarm_budgets"][0];
+  EXPECT_EQ(day["budget"], "1/day");
+  EXPECT_EQ(day["needed_hours"], 120.0);
+  EXPECT_EQ(day["longest_hours"], 12'000.0);
+  EXPECT_EQ(day["wait_hours"], 0.0);
+  EXPECT_EQ(report["alarm_budgets"][1]["kept"], "yes");
+  const json& year = report["alarm_budgets"][3];
+  EXPECT_EQ(year["needed_hours"], 43'830.0);
+  EXPECT_NEAR(year["wait_hours"].get<double>(), (4383 - 1201) / 5.0, 1.0);
+  ASSERT_EQ(report["tails"].size(), 5U);
+  EXPECT_EQ(report["tails"][0]["tail"], true);
+  EXPECT_EQ(report["tails"][0]["hours"], 300);
+  EXPECT_EQ(report["tails"][4]["tail"], false);
+
+  const std::string text = Store("doctor").out;
+  EXPECT_THAT(text, HasSubstr("5 valves are judged, 4 have return periods, "
+                              "from 1200 healthy hours"));
+  EXPECT_THAT(text, HasSubstr("1/day: needs 120 h, kept: yes"));
+  EXPECT_THAT(text, HasSubstr("1/year: needs 43830 h, kept: not yet: about"));
+  EXPECT_THAT(text, HasSubstr("TV-4: alarms as its limits are set; it has 1 "
+                              "healthy hours on 1 days"));
 }
 
 // Read-only media, or a member of the group after the service was stopped: root

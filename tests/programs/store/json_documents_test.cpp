@@ -429,7 +429,8 @@ TEST_F(JsonDocumentsTest, ProgramsAndPageHaveTheSameKeys) {
     EXPECT_THAT(
         page.Unseen(called_, {"channel.regressor_max", "channel.regressor_min",
                               "channel.regressors", "channel.rule_list",
-                              "fuzzy_set", "rule"}),
+                              "fuzzy_set", "rule", "spender.alarms",
+                              "spender.share", "spender.valve_id"}),
         IsEmpty());
   }
   for (const auto& [verb, type] : page.verbs()) {
