@@ -13,5 +13,6 @@ int main(int argc, char** argv) {
   fdi::trainer::study::AddReduceVerb(program);
   fdi::trainer::study::AddInjectVerb(program);
   fdi::trainer::study::AddPicturesVerb(program);
+  fdi::trainer::study::AddBudgetVerbs(program);
   return program.Run(argc, argv);
 }

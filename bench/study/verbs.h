@@ -13,5 +13,6 @@ void AddScoringVerbs(report::Program& program);
 void AddReduceVerb(report::Program& program);
 void AddInjectVerb(report::Program& program);
 void AddPicturesVerb(report::Program& program);
+void AddBudgetVerbs(report::Program& program);
 
 }  // namespace fdi::trainer::study
