@@ -18,7 +18,6 @@
 #include "bench/study/study_detectors.h"
 #include "bench/study/verbs.h"
 #include "diagnosis/decision/alarm_budget.h"
-#include "base/time_units.h"
 #include "diagnosis/decision/decision.h"
 #include "diagnosis/decision/look_answer.h"
 #include "diagnosis/model/fault_catalogue.h"
@@ -179,8 +178,7 @@ void WriteRun(const storage::StoredRun& run, Book& book) {
   const std::int64_t start_ns = run.samples.front().sample.stamp_ns;
   double at_s = 0.0;
   for (const storage::StoredSample& stored : run.samples) {
-    at_s =
-        1e-9 * static_cast<double>(stored.sample.stamp_ns - start_ns);
+    at_s = 1e-9 * static_cast<double>(stored.sample.stamp_ns - start_ns);
     book.Take(at_s, stored.sample, stored.truth ? stored.truth->fault : 0);
   }
   book.End(at_s);
