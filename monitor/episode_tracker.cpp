@@ -5,6 +5,7 @@
 #include <limits>
 #include <utility>
 
+#include "base/time_units.h"
 #include "diagnosis/model/model_set.h"
 
 namespace fdi::monitor {
@@ -285,15 +286,22 @@ void EpisodeTracker::Take(const Transition& transition, const Verdict& verdict,
   Emit(transition, models, outlet);
 }
 
-// An alarm stays one: its evidence does not go away by what follows.
+// An alarm stays one: its evidence does not go away by what follows. An episode
+// that reached a limit lasts while it is beyond one, another while it is open.
 void EpisodeTracker::Weigh(const Verdict& verdict) {
   open_->share = std::max(open_->share, verdict.share);
+  if (verdict.share > 1.0 || open_->share <= 1.0) {
+    const std::int64_t open_ns = verdict.stamp_ns - open_->detection_stamp_ns;
+    open_->lasted =
+        std::max(open_->lasted, static_cast<int>(open_ns / kNsPerHour));
+  }
   const auto budget = gate_ ? gate_->Get() : nullptr;
   if (!budget) {
     open_->notice = false;
     return;
   }
-  const AlarmBudget::Weight weight = budget->Weigh(valve_id_, open_->share);
+  const AlarmBudget::Weight weight =
+      budget->Weigh(valve_id_, open_->share, open_->lasted);
   open_->return_hours = weight.return_hours;
   open_->notice = open_->notice && weight.notice;
 }

@@ -115,6 +115,7 @@ class EpisodeTracker {
     FaultSet faults{0};  // Its name.
     std::vector<FaultCandidate> candidates;
     double share{0.0};  // The largest so far.
+    int lasted{0};      // Whole hours.
     std::optional<double> return_hours;
     bool notice{true};  // Until it is weighed, which is at once.
     Transition last{};  // The last one that was told.

@@ -48,6 +48,7 @@ struct HoursOptions {
   std::string model_set;
   StudySelection selection;
   fs::path scenario;
+  int first_day{0};
   int days{1};
   fs::path output;
 };
@@ -55,8 +56,9 @@ struct HoursOptions {
 enum Column : std::size_t { kKind, kAt, kShare, kWhat };
 const std::vector<std::string> kHeads{"kind", "at_s", "share", "what"};
 
-// Follows one valve. Writes a row for each hour without an episode, each change
-// of an episode's largest share, and where the truth of a run begins.
+// Follows one valve. Writes a row for each hour without an episode, each time
+// an episode's largest share or the whole hours that it lasts grow, and where
+// the truth of a run begins.
 class Book {
  public:
   Book(std::ostream& out, const std::shared_ptr<const ModelSet>& models)
@@ -107,10 +109,17 @@ class Book {
     if (!open_) {
       open_ = true;
       share_ = verdict.share;
+      open_s_ = at_s;
+      lasted_ = 0;
       name_ = 0;
       Row("open", at_s, share_, "");
-    } else if (verdict.share > share_) {
-      share_ = verdict.share;
+    } else if (const int lasted =
+                   verdict.share > 1.0 || share_ <= 1.0
+                       ? static_cast<int>((at_s - open_s_) / kSecondsPerHour)
+                       : 0;
+               verdict.share > share_ || lasted > lasted_) {
+      share_ = std::max(share_, verdict.share);
+      lasted_ = std::max(lasted_, lasted);
       Row("rise", at_s, share_, "");
     }
     name_ = verdict.isolated != 0 ? verdict.isolated : name_;
@@ -146,6 +155,8 @@ class Book {
   bool open_{false};
   bool spoilt_{false};
   double share_{0.0};
+  double open_s_{0.0};
+  int lasted_{0};  // Whole hours [h], as EpisodeTracker counts them.
   double hour_share_{0.0};
   double hour_s_{0.0};
   int samples_{0};
@@ -156,7 +167,8 @@ class Book {
 void WriteSimulated(const HoursOptions& options, Book& book) {
   simulator::Scenario scenario;
   simulator::ApplyScenarioFile(options.scenario, scenario);
-  for (int day = 0; day < options.days; ++day) {
+  for (int day = options.first_day; day < options.first_day + options.days;
+       ++day) {
     simulator::ValveSimulationConfig config = scenario.config;
     config.seed += static_cast<std::uint64_t>(day);
     config.source_id = static_cast<std::uint64_t>(day) + 1;
@@ -205,8 +217,9 @@ report::Report Hours(const HoursOptions& options,
       options.selection, detector.required, detector.flow, context);
   fs::create_directory(options.output);
   for (const ScoredRun& run : runs) {
-    write(options.output / (fs::path(run.name).filename().string() + ".csv"),
-          [&](Book& book) { WriteRun(run.run, book); });
+    std::string name = fs::path(run.name).filename().string();
+    name += name.ends_with(".csv") ? "" : ".csv";
+    write(options.output / name, [&](Book& book) { WriteRun(run.run, book); });
   }
   return {};
 }
@@ -226,6 +239,10 @@ struct Episode {
   std::string name;
 };
 
+int WholeHours(const Episode& episode, double until_s) {
+  return static_cast<int>((until_s - episode.open_s) / kSecondsPerHour);
+}
+
 struct ValveRows {
   std::string id;
   std::vector<std::pair<double, double>> hours;  // At [s], share.
@@ -233,10 +250,9 @@ struct ValveRows {
   std::optional<double> fault_s;
 };
 
-ValveRows ReadRows(const fs::path& path) {
+// Further parts are of later days.
+void ReadRows(const fs::path& path, ValveRows& valve) {
   const CsvRows rows(path, kHeads);
-  ValveRows valve;
-  valve.id = path.stem().string();
   for (std::size_t r = 0; r < rows.size(); ++r) {
     const std::string& kind = rows.Cell(r, kKind);
     const double at_s = rows.Number(r, kAt);
@@ -256,7 +272,21 @@ ValveRows ReadRows(const fs::path& path) {
       valve.episodes.back().name = rows.Cell(r, kWhat);
     }
   }
-  return valve;
+}
+
+// VALVE.csv, VALVE.00.csv, VALVE.01.csv, ... in order of names.
+std::vector<ValveRows> ReadValves(std::vector<fs::path> files) {
+  std::ranges::sort(files);
+  std::vector<ValveRows> valves;
+  for (const fs::path& file : files) {
+    const std::string name = file.filename().string();
+    const std::string id = name.substr(0, name.find('.'));
+    if (valves.empty() || valves.back().id != id) {
+      valves.push_back({.id = id});
+    }
+    ReadRows(file, valves.back());
+  }
+  return valves;
 }
 
 // As ReadHealthyHours(), of what was before an instant; nobody has labelled an
@@ -270,7 +300,8 @@ std::vector<HealthyHours> HoursBefore(const std::vector<ValveRows>& valves,
     std::set<int> days;
     for (const auto& [at_s, share] : rows.hours) {
       if (at_s + kSecondsPerHour <= until_s) {
-        valve.shares.push_back(share);
+        valve.hours.push_back(
+            {static_cast<std::int64_t>(at_s / kSecondsPerHour), share});
         days.insert(static_cast<int>(at_s / kSecondsPerDay));
       }
     }
@@ -279,10 +310,14 @@ std::vector<HealthyHours> HoursBefore(const std::vector<ValveRows>& valves,
       if (episode.close_s > until_s) {
         continue;
       }
+      const int lasted = WholeHours(episode, episode.close_s);
       if (episode.shares.back().second > 1.0) {
-        valve.shares.push_back(1.0);
+        valve.hours.push_back(
+            {static_cast<std::int64_t>(episode.open_s / kSecondsPerHour), 1.0,
+             lasted});
       } else {
         ++valve.others;
+        valve.others_lasted += lasted;
       }
     }
     all.push_back(std::move(valve));
@@ -294,7 +329,7 @@ std::vector<HealthyHours> HoursBefore(const std::vector<ValveRows>& valves,
 std::optional<double> AlarmAt(const AlarmBudget& budget, const std::string& id,
                               const Episode& episode) {
   for (const auto& [at_s, share] : episode.shares) {
-    if (!budget.Weigh(id, share).notice) {
+    if (!budget.Weigh(id, share, WholeHours(episode, at_s)).notice) {
       return at_s;
     }
   }
@@ -337,7 +372,9 @@ void CountDay(const std::vector<ValveRows>& valves, double from_s,
 // it.
 void TellFault(const std::string& valve, const fs::path& file,
                const AlarmBudget& budget, report::Report& report) {
-  const ValveRows run = ReadRows(file);
+  ValveRows run;
+  run.id = file.stem().string();
+  ReadRows(file, run);
   if (!run.fault_s) {
     return;
   }
@@ -359,11 +396,11 @@ void TellFault(const std::string& valve, const fs::path& file,
 }
 
 report::Report Budget(const BudgetOptions& options) {
-  std::vector<ValveRows> valves;
+  const std::vector<ValveRows> valves = ReadValves(options.hours);
   double end_s = 0.0;
-  for (const fs::path& path : options.hours) {
-    valves.push_back(ReadRows(path));
-    end_s = std::max(end_s, valves.back().hours.back().first);
+  for (const ValveRows& valve : valves) {
+    end_s =
+        std::max(end_s, valve.hours.empty() ? 0.0 : valve.hours.back().first);
   }
   // What the real number of valves would need of each of these.
   const double between_h = ParseAlarmBudget(options.budget) * options.valves /
@@ -385,12 +422,23 @@ report::Report Budget(const BudgetOptions& options) {
                 ',' + std::to_string(count.episodes) + ',' +
                 std::to_string(count.alarms));
   }
+  if (!budget) {
+    throw DataError("no hour is after the first " +
+                    report::FormatNumber(options.taught, 0));
+  }
   const AlarmBudget::Promise promise = budget->Now();
+  const double allowed = all.hours / promise.needed_hours;
   report.Line("all: " + report::FormatNumber(all.hours, 0) + " h, " +
               std::to_string(all.episodes) + " episodes, " +
               std::to_string(all.alarms) + " alarms (95 %: at most " +
               report::FormatNumber(PoissonBound(all.alarms), 1) + "); budget " +
-              report::FormatNumber(all.hours / promise.needed_hours, 2) +
+              report::FormatNumber(allowed, 2) +
+              (PoissonAtLeast(all.alarms, allowed) < 0.05 ? ", exceeded"
+               : PoissonBound(all.alarms) > allowed       ? ", not shown"
+                                                          : ", kept") +
+              "; q " +
+              report::FormatNumber(
+                  ShareTails(HoursBefore(valves, from_s)).goes_on(), 3) +
               "; valves with return periods " + std::to_string(promise.ready) +
               ", longest " + report::FormatNumber(promise.longest_hours, 0) +
               " h");
@@ -422,6 +470,10 @@ void AddBudgetVerbs(report::Program& program) {
       ->type_name("FILE.toml");
   write.add_option("--days", hours->days, "Of the scenario")->type_name("N");
   write
+      .add_option("--first-day", hours->first_day,
+                  "Number of the first one: seeds and times go on from there")
+      ->type_name("N");
+  write
       .add_option("-o,--output", hours->output,
                   "File of the scenario, or folder of the runs")
       ->required()
@@ -432,7 +484,8 @@ void AddBudgetVerbs(report::Program& program) {
       [weigh](const report::Context&) -> report::Report {
         return Budget(*weigh);
       });
-  verb.add_option("hours", weigh->hours, "VALVE.csv of the verb hours")
+  verb.add_option("hours", weigh->hours,
+                  "VALVE.csv, or parts VALVE.*.csv, of the verb hours")
       ->required()
       ->type_name("FILE.csv");
   verb.add_option("--faults", weigh->faults,

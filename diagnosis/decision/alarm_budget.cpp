@@ -19,12 +19,37 @@ constexpr double kReach = 10.0;           // times the pooled hours
 constexpr double kUnlikely = 0.05;
 
 double HoursOf(const HealthyHours& valve) {
-  return static_cast<double>(valve.shares.size());
+  return static_cast<double>(valve.hours.size());
 }
 
 bool IsKnown(const HealthyHours& valve) {
   return HoursOf(valve) >= kLeastHours && valve.days >= kLeastDays;
 }
+
+// Of hours above a level, those whose next hour is known, and of these the ones
+// that it followed likewise. An episode that nobody calls a fault was above it
+// in each of its hours.
+struct Runs {
+  double hours{0.0};
+  double followed{0.0};
+
+  void Add(const HealthyHours& valve, double level) {
+    std::map<std::int64_t, bool> above;
+    for (const HealthyHours::Hour& each : valve.hours) {
+      above[each.hour] |= each.share > level;
+      for (int i = 1; i <= each.lasted; ++i) {
+        above[each.hour + i] = true;
+      }
+    }
+    for (const auto& [hour, is_above] : above) {
+      const auto next = above.find(hour + 1);
+      if (is_above && next != above.end()) {
+        hours += 1.0;
+        followed += next->second ? 1.0 : 0.0;
+      }
+    }
+  }
+};
 
 // Hours of operation of all valves until a return period is supported.
 std::optional<double> WaitFor(double needed_hours, const ShareTails& tails,
@@ -52,12 +77,16 @@ ShareTails::ShareTails(const std::vector<HealthyHours>& valves) {
   std::map<std::string, Place, std::less<>> known;
   std::map<std::string, double> hours;
   std::vector<double> excesses;
+  Runs runs;
   int others = 0;
+  double others_lasted = 0.0;
   for (const HealthyHours& valve : valves) {
     if (!IsKnown(valve)) {
       continue;
     }
-    std::vector<double> shares = valve.shares;
+    std::vector<double> shares;
+    std::ranges::transform(valve.hours, std::back_inserter(shares),
+                           &HealthyHours::Hour::share);
     std::ranges::sort(shares);
     const auto above = static_cast<std::size_t>(
         std::ceil((1.0 - kTailShare) * static_cast<double>(shares.size())));
@@ -75,14 +104,19 @@ ShareTails::ShareTails(const std::vector<HealthyHours>& valves) {
     known[valve.valve_id] = {level, mean};
     hours[valve.valve_id] = HoursOf(valve);
     pooled_hours_ += HoursOf(valve);
+    runs.Add(valve, level);
     others += valve.others;
+    others_lasted += valve.others_lasted;
   }
   if (excesses.empty()) {
     return;
   }
   std::ranges::sort(excesses);
   tail_ = FitPareto(excesses, 0.0);
+  goes_on_ = ProbabilityBound(runs.followed, runs.hours);
   other_hours_ = pooled_hours_ / PoissonBound(others);
+  longest_other_hours_ = pooled_hours_ / PoissonBound(0);
+  other_goes_on_ = ProbabilityBound(others_lasted, others + others_lasted);
   for (const auto& [valve_id, place] : known) {
     if (known.size() > kLeastOthers &&
         pooled_hours_ - hours[valve_id] >= kLeastOfOthers) {
@@ -95,19 +129,26 @@ double ShareTails::longest_hours() const {
   return places_.empty() ? 0.0 : kReach * pooled_hours_;
 }
 
+double ShareTails::LongestHours(double share) const {
+  return share > 1.0 ? longest_hours() : longest_other_hours_;
+}
+
 std::optional<double> ShareTails::ReturnHours(std::string_view valve_id,
-                                              double share) const {
+                                              double share, int lasted) const {
   const auto found = places_.find(valve_id);
   if (found == places_.end()) {
     return std::nullopt;
   }
+  double rate = 0.0;
   if (share <= 1.0) {
-    return other_hours_;
+    rate = std::pow(other_goes_on_, lasted) / other_hours_;
+  } else {
+    const double y =
+        std::max(share - found->second.level, 0.0) / found->second.scale;
+    rate = kTailShare * tail_.Beyond(y) * std::pow(goes_on_, lasted);
   }
-  const double y =
-      std::max(share - found->second.level, 0.0) / found->second.scale;
-  const double rate = kTailShare * tail_.Beyond(y);
-  return rate * longest_hours() > 1.0 ? 1.0 / rate : longest_hours();
+  const double longest = LongestHours(share);
+  return rate * longest > 1.0 ? 1.0 / rate : longest;
 }
 
 double ParseAlarmBudget(const std::string& text) {
@@ -148,13 +189,13 @@ AlarmBudget::AlarmBudget(double between_hours,
   }
 }
 
-AlarmBudget::Weight AlarmBudget::Weigh(std::string_view valve_id,
-                                       double share) const {
+AlarmBudget::Weight AlarmBudget::Weigh(std::string_view valve_id, double share,
+                                       int lasted) const {
   Weight weight;
-  weight.return_hours = tails_.ReturnHours(valve_id, share);
+  weight.return_hours = tails_.ReturnHours(valve_id, share, lasted);
   weight.notice = weight.return_hours &&
-                  *weight.return_hours <
-                      std::min(promise_.needed_hours, promise_.longest_hours);
+                  *weight.return_hours < std::min(promise_.needed_hours,
+                                                  tails_.LongestHours(share));
   return weight;
 }
 

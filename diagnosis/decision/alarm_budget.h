@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <map>
 #include <optional>
 #include <string>
@@ -12,16 +13,23 @@ namespace fdi {
 
 /// What is known of one valve without a fault, with its present model set.
 struct HealthyHours {
+  struct Hour {
+    std::int64_t hour{0};  ///< Since the epoch, of any one clock.
+    /// The largest Verdict::share. Of an episode that a label calls false its
+    /// own, and of one that nobody has judged 1: it may have been a fault, so
+    /// all that counts is that it reached a limit.
+    double share{0.0};
+    int lasted{0};  ///< Whole hours that an episode lasted, which is over.
+  };
+
   std::string valve_id;
-  /// The largest Verdict::share of each hour. Of an episode that a label calls
-  /// false its own, and of one that nobody has judged 1: it may have been a
-  /// fault, so that all that counts is that it reached a limit.
-  std::vector<double> shares;
+  std::vector<Hour> hours;
   int days{0};  ///< UTC days that the hours are of.
-  int others{
-      0};  ///< Episodes beyond no limit (looks, stuck transmitters, ...).
+  /// Episodes beyond no limit (looks, stuck transmitters, ...), and the whole
+  /// hours that they lasted. No label calls them a fault, nor the alarms.
+  int others{0};
+  int others_lasted{0};
   int alarms{0};  ///< Episodes that were alarms.
-                  ///< Of both those that no label calls a fault.
 };
 
 /// How rarely a healthy valve shows what an episode shows, from the hours of
@@ -36,23 +44,35 @@ struct HealthyHours {
 /// with σ at its upper 95 % bound (FitPareto). The return period is 1/P hours.
 /// Assumed is that hours are alike and that what comes is like what was.
 ///
+/// It grows with each hour that a deviation lasts. Of the hours above u, q is
+/// the upper 95 % bound of the part that the next hour followed likewise, again
+/// of all valves; of k whole hours the return period is 1/(P q^k). So what q
+/// measures is how dependent hours are. Assumed is that it is the same after
+/// one hour as after ten, and for large shares as for small ones.
+///
 /// A valve has return periods once it has 72 hours on 3 days, and at least two
 /// others with as many have 500 hours together: with less, alarms came up to 73
 /// times as often as expected in 1008 healthy hours of three simulated valves.
 /// None is longer than ten times the hours of all. Episodes beyond no limit are
-/// counted: the hours by the 95 % bound of their number.
+/// counted: the hours by the 95 % bound of their number, at most by that of
+/// none. Their q is that of the whole hours that they lasted.
 class ShareTails {
  public:
   explicit ShareTails(const std::vector<HealthyHours>& valves);
 
-  /// [h]; nothing: the valve has none yet.
-  std::optional<double> ReturnHours(std::string_view valve_id,
-                                    double share) const;
+  /// @param lasted whole hours.
+  /// @returns [h]; nothing: the valve has none yet.
+  std::optional<double> ReturnHours(std::string_view valve_id, double share,
+                                    int lasted = 0) const;
   /// Hours of all valves that have return periods.
   double pooled_hours() const { return pooled_hours_; }
-  /// The longest return period; 0: there is none.
+  /// The longest return period of an episode beyond a limit; 0: there is none.
   double longest_hours() const;
+  /// The same of an episode with this share.
+  double LongestHours(double share) const;
   std::size_t valves() const { return places_.size(); }
+  /// q, by which a return period is divided for each whole hour.
+  double goes_on() const { return goes_on_; }
 
  private:
   struct Place {
@@ -63,7 +83,10 @@ class ShareTails {
   std::map<std::string, Place, std::less<>> places_;
   ParetoTail tail_;
   double pooled_hours_{0.0};
+  double goes_on_{1.0};  // q
   double other_hours_{0.0};
+  double longest_other_hours_{0.0};
+  double other_goes_on_{1.0};
 };
 
 /// Hours between two false alarms: of "1/day", "2/week", "1/month", "1/year".
@@ -79,12 +102,12 @@ class AlarmBudget {
   /// @param valves those that are judged, each of them once.
   AlarmBudget(double between_hours, const std::vector<HealthyHours>& valves);
 
-  /// What an episode is, by its largest share so far.
+  /// What an episode is, by its largest share and its whole hours so far.
   struct Weight {
     std::optional<double> return_hours;
     bool notice{false};  ///< Never where the return period is not known.
   };
-  Weight Weigh(std::string_view valve_id, double share) const;
+  Weight Weigh(std::string_view valve_id, double share, int lasted = 0) const;
 
   /// What can be said of the budget now.
   struct Promise {

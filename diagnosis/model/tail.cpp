@@ -51,6 +51,18 @@ ParetoTail FitPareto(std::span<const double> excesses, double least_shape) {
   return tail;
 }
 
+double ProbabilityBound(double successes, double trials) {
+  if (!(trials > 0.0)) {
+    return 1.0;
+  }
+  constexpr double kSquare = kUpperBound * kUpperBound;
+  const double p = successes / trials;
+  const double spread =
+      p * (1.0 - p) / trials + kSquare / (4.0 * trials * trials);
+  return (p + kSquare / (2.0 * trials) + kUpperBound * std::sqrt(spread)) /
+         (1.0 + kSquare / trials);
+}
+
 double PoissonAtLeast(int events, double mean) {
   return 1.0 - AtMost(events - 1, mean);
 }

@@ -28,6 +28,13 @@ ParetoTail FitPareto(std::span<const double> excesses, double least_shape);
 /// probability of 5 %: the one-sided 95 % bound of what was counted.
 double PoissonBound(int events);
 
+/// The one-sided 95 % bound of a probability of which `successes` of `trials`
+/// tell [Wilson, 1927]; 1 without trials.
+///
+/// - [Wilson, 1927] "Probable inference, the law of succession, and statistical
+///   inference", J. Am. Stat. Assoc. 22(158), pp. 209–212.
+double ProbabilityBound(double successes, double trials);
+
 /// P(N ≥ events) of a Poisson distribution of mean μ > 0.
 double PoissonAtLeast(int events, double mean);
 

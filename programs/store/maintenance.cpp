@@ -218,7 +218,7 @@ Json BudgetsJson(const std::vector<HealthyHours>& valves) {
 
 Json TailJson(const HealthyHours& valve, const ShareTails& tails) {
   return {{"valve_id", valve.valve_id},
-          {"hours", valve.shares.size()},
+          {"hours", valve.hours.size()},
           {"days", valve.days},
           {"tail", tails.ReturnHours(valve.valve_id, 1.0).has_value()}};
 }

@@ -31,15 +31,18 @@ void AddEpisodes(Database& database, std::int64_t since_ns,
     double share = 0.0;
     bool notice = false;
     std::string label;
-    row.Read(0, share, notice, label);
+    std::int64_t hour = 0;
+    int lasted = 0;
+    row.Read(0, share, notice, label, hour, lasted);
     if (!label.empty() && label != "false") {
       continue;
     }
     valve.alarms += notice ? 0 : 1;
     if (share <= 1.0) {
       ++valve.others;
+      valve.others_lasted += lasted;
     } else {
-      valve.shares.push_back(label.empty() ? 1.0 : share);
+      valve.hours.push_back({hour, label.empty() ? 1.0 : share, lasted});
     }
   }
   row.Reset();
@@ -68,8 +71,8 @@ std::vector<HealthyHours> ReadHealthyHours(Database& database) {
       }
       first = hour.hour;
       if (IsHealthy(hour)) {
-        valve.shares.push_back(HealthHour::kShare *
-                               static_cast<double>(hour.share));
+        valve.hours.push_back(
+            {hour.hour, HealthHour::kShare * static_cast<double>(hour.share)});
         days.insert(hour.hour / kHoursPerDay);
       }
     }

@@ -1,5 +1,6 @@
 #include "diagnosis/decision/alarm_budget.h"
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 
@@ -21,7 +22,7 @@ HealthyHours Valve(const std::string& id, int hours, int days,
   valve.valve_id = id;
   valve.days = days;
   for (int i = 0; i < hours; ++i) {
-    valve.shares.push_back(0.4 + tail(random));
+    valve.hours.push_back({i, 0.4 + tail(random)});
   }
   return valve;
 }
@@ -97,12 +98,12 @@ TEST(ShareTailsTest, WithTooFewHoursThereIsNone) {
 
 TEST(ShareTailsTest, HoursThatAreAllTheSameHaveNoTail) {
   std::vector<HealthyHours> fleet = Fleet(4, 300);
-  fleet[2].shares.assign(300, 0.5);
+  fleet[2].hours.assign(300, {0, 0.5});
   const ShareTails tails(fleet);
   EXPECT_FALSE(tails.ReturnHours("V2", 2.0));
   EXPECT_TRUE(tails.ReturnHours("V1", 2.0));
   for (HealthyHours& valve : fleet) {
-    valve.shares.assign(300, 0.5);
+    valve.hours.assign(300, {0, 0.5});
   }
   EXPECT_EQ(ShareTails(fleet).longest_hours(), 0.0);
 }
@@ -113,6 +114,58 @@ TEST(ShareTailsTest, EpisodesBeyondNoLimitAreCounted) {
   EXPECT_NEAR(*ShareTails(fleet).ReturnHours("V1", 0.0), 1200 / 2.996, 1.0);
   fleet[0].others = 2;
   EXPECT_NEAR(*ShareTails(fleet).ReturnHours("V1", 0.3), 1200 / 6.296, 1.0);
+}
+
+// Of independent hours a fifth follows one of the highest fifth: 0.2 of 20 x
+// 60, whose 95 % bound is 0.22.
+TEST(ShareTailsTest, AReturnPeriodGrowsWithTheHoursThatItLasts) {
+  const ShareTails tails(Fleet(20, 300));
+  EXPECT_NEAR(tails.goes_on(), 0.22, 0.025);
+  const double first = *tails.ReturnHours("V1", 1.01);
+  EXPECT_NEAR(*tails.ReturnHours("V1", 1.01, 2),
+              first / (tails.goes_on() * tails.goes_on()), 1e-6 * first);
+  EXPECT_EQ(tails.ReturnHours("V1", 1.01, 100'000), 60'000.0);
+}
+
+// Alternate days: whoever is high stays so, and growth is as slow as that.
+TEST(ShareTailsTest, HoursThatDependOnEachOtherGrowSlowly) {
+  std::vector<HealthyHours> fleet = Fleet(4, 300);
+  for (HealthyHours& valve : fleet) {
+    std::ranges::sort(valve.hours, {}, &HealthyHours::Hour::share);
+    for (std::size_t i = 0; i < valve.hours.size(); ++i) {
+      valve.hours[i].hour = static_cast<std::int64_t>(i);
+    }
+  }
+  EXPECT_GT(ShareTails(fleet).goes_on(), 0.98);
+  for (HealthyHours& valve : fleet) {
+    for (HealthyHours::Hour& each : valve.hours) {
+      each.hour *= 2;
+    }
+  }
+  // No hour has a next one, so nothing is known.
+  EXPECT_EQ(ShareTails(fleet).goes_on(), 1.0);
+}
+
+// An episode that nobody has judged was in each of its hours above the level.
+TEST(ShareTailsTest, LongEpisodesOfHealthyValvesSlowTheGrowth) {
+  std::vector<HealthyHours> fleet = Fleet(20, 300);
+  const double without = ShareTails(fleet).goes_on();
+  fleet[3].hours.push_back({400, 1.0, 600});
+  EXPECT_GT(ShareTails(fleet).goes_on(), without + 0.2);
+}
+
+// Five of 3 h each: 15 of 20 hours were followed by another.
+TEST(ShareTailsTest, EpisodesBeyondNoLimitGrowByTheirOwnHours) {
+  std::vector<HealthyHours> fleet = Fleet(4, 300);
+  EXPECT_EQ(ShareTails(fleet).ReturnHours("V1", 0.0, 9),
+            ShareTails(fleet).ReturnHours("V1", 0.0));
+  fleet[0].others = 5;
+  fleet[0].others_lasted = 15;
+  const ShareTails tails(fleet);
+  const double first = *tails.ReturnHours("V1", 0.0);
+  EXPECT_NEAR(*tails.ReturnHours("V1", 0.0, 5),
+              first / std::pow(ProbabilityBound(15, 20), 5), 1e-6 * first);
+  EXPECT_GT(ProbabilityBound(15, 20), 0.75);
 }
 
 TEST(AlarmBudgetTest, WhatIsTooCommonForTheBudgetIsANotice) {
@@ -130,6 +183,18 @@ TEST(AlarmBudgetTest, WhatIsTooCommonForTheBudgetIsANotice) {
   }
   EXPECT_TRUE(month.Weigh("V3", 1.05).notice);
   EXPECT_FALSE(month.Weigh("V3", 2.0).notice);
+  EXPECT_FALSE(month.Weigh("V3", 1.05, 10).notice);
+}
+
+// 6000 hours without one say at most one in 2003 h, which is less than a month
+// of 20 valves needs, but all that can be said. Three in them are more common.
+TEST(AlarmBudgetTest, AnEpisodeBeyondNoLimitIsANoticeOnceSuchAreKnown) {
+  std::vector<HealthyHours> fleet = Fleet(20, 300);
+  EXPECT_FALSE(AlarmBudget(730.5, fleet).Weigh("V3", 0.5).notice);
+  fleet[0].others = 3;
+  const AlarmBudget budget(730.5, fleet);
+  EXPECT_TRUE(budget.Weigh("V3", 0.5).notice);
+  EXPECT_FALSE(budget.Weigh("V3", 0.5, 24).notice);
 }
 
 // A year for 20 valves takes 17 532 hours of 20 valves: nothing is a notice for

@@ -116,7 +116,9 @@ std::shared_ptr<const AlarmBudget> Budget(double between_hours) {
     fleet[v].valve_id = "V" + std::to_string(v);
     fleet[v].days = 30;
     for (int i = 0; i < 300; ++i) {
-      fleet[v].shares.push_back(0.4 - 0.1 * std::log((i + 0.5) / 300.0));
+      // 7 of the highest 60 follow one another.
+      const int rank = 53 * i % 300;
+      fleet[v].hours.push_back({i, 0.4 - 0.1 * std::log((rank + 0.5) / 300.0)});
     }
   }
   return std::make_shared<const AlarmBudget>(between_hours, fleet);
@@ -176,6 +178,22 @@ TEST_F(AlarmGateTest, ANoticeIsRaisedOnceItIsRareEnough) {
   EXPECT_EQ(notebook_.Kinds().back(), TransitionKind::kClosed);
   EXPECT_FALSE(notebook_.events.back().transition.notice);
   EXPECT_NEAR(notebook_.events.back().transition.share, 4.0, 1e-9);
+}
+
+// A share of 1.2 comes in some 3000 h, and one hour of its kind after another
+// in a seventh of them: nothing grows but the time that it lasts.
+TEST_F(AlarmGateTest, ANoticeThatLastsIsRaisedWithoutAnotherMaximum) {
+  constexpr std::uint64_t kHour = 3600;
+  gate_->Set(Budget(2000.0));
+  Gated(0, 100, 0.0);
+  EXPECT_TRUE(Gated(100, 100 + kHour - 10, -6.0).notice);
+  EXPECT_FALSE(Gated(100 + kHour - 10, 100 + 4 * kHour, -6.0).notice);
+  EXPECT_THAT(notebook_.Kinds(), Contains(TransitionKind::kRaised).Times(1));
+  for (const FaultEvent& event : notebook_.events) {
+    EXPECT_NEAR(event.transition.share, 1.2, 1e-9);
+    EXPECT_EQ(event.transition.notice,
+              event.transition.kind != TransitionKind::kRaised);
+  }
 }
 
 TEST_F(AlarmGateTest, AStrongFaultIsAnAlarmAtOnce) {

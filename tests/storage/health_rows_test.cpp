@@ -244,9 +244,10 @@ TEST_F(HealthRowsTest, HealthyHoursAreJudgedAndWithoutAnEpisode) {
   const std::vector<HealthyHours> valves = ReadHealthyHours(writer_.database());
   ASSERT_EQ(valves.size(), 1U);
   EXPECT_EQ(valves[0].valve_id, "V1");
-  ASSERT_EQ(valves[0].shares.size(), 26U);
-  EXPECT_NEAR(valves[0].shares.front(), 0.629, 1e-9);
-  EXPECT_NEAR(valves[0].shares.back(), 0.601, 1e-9);
+  ASSERT_EQ(valves[0].hours.size(), 26U);
+  EXPECT_EQ(valves[0].hours.front().hour, 400'029);
+  EXPECT_NEAR(valves[0].hours.front().share, 0.629, 1e-9);
+  EXPECT_NEAR(valves[0].hours.back().share, 0.601, 1e-9);
   EXPECT_EQ(valves[0].days, 2);
 }
 

@@ -6,6 +6,9 @@
 #include <gmock/gmock.h>
 
 #include "base/error.h"
+#include "base/time_units.h"
+#include "storage/history/health.h"
+#include "storage/history/healthy_hours.h"
 #include "tests/storage/history_fixture.h"
 
 namespace fdi::storage {
@@ -149,6 +152,40 @@ TEST_F(HistoryReaderTest, ANoticeIsListedAndIsNoAlarm) {
   EXPECT_THAT(Valves(notices), IsEmpty());
   EXPECT_THAT(alarms(), Contains("NV-1"));
   EXPECT_EQ(active(), 3U);
+}
+
+// One that is open does not make itself common.
+TEST_F(HistoryReaderTest, AnEpisodeIsAnHourThatLastsOnceItIsOver) {
+  HealthHour hour;
+  hour.valve_id = "NV-1";
+  hour.hour = kDetected / kNsPerHour - 1;
+  hour.model_hash = 1;
+  hour.seen_ms = hour.live_ms = 3'600'000;
+  hour.share = 700;
+  {
+    Transaction transaction(writer_.database());
+    StoreHealth(writer_.database(), {{hour}});
+    transaction.Commit();
+  }
+  const auto hours = [this] {
+    return ReadHealthyHours(writer_.database()).at(0).hours;
+  };
+  FaultEvent event =
+      Event(Kind::kDetected, 0, 0, 0.3, EndReason::kNone, "NV-1");
+  event.transition.share = 1.1;
+  event.transition.notice = true;
+  writer_.Record(event, kDetected);
+  ASSERT_EQ(hours().size(), 2U);
+  EXPECT_EQ(hours()[1].hour, kDetected / kNsPerHour);
+  EXPECT_EQ(hours()[1].share, 1.0);
+  EXPECT_EQ(hours()[1].lasted, 0);
+
+  event.transition.kind = Kind::kClosed;
+  event.transition.reason = EndReason::kStaleTimeout;
+  event.transition.stamp_ns += 2 * kNsPerHour + kNsPerMinute;
+  writer_.Record(event, kDetected);
+  ASSERT_EQ(hours().size(), 2U);
+  EXPECT_EQ(hours()[1].lasted, 2);
 }
 
 TEST_F(HistoryReaderTest, EpisodeIsFoundByAUniqueBeginningOfItsId) {
