@@ -145,7 +145,7 @@ class Book {
   void Row(const char* kind, double at_s, double share,
            const std::string& what) {
     WriteCsvLine(out_, {kind, report::FormatNumber(at_s, 1),
-                        report::FormatNumber(share, 4), what});
+                        report::FormatNumber(share, 6), what});
   }
 
   std::ostream& out_;
@@ -230,6 +230,7 @@ struct BudgetOptions {
   double taught{170.0};
   std::string budget{"1/day"};
   double valves{300.0};
+  bool labelled{false};
 };
 
 struct Episode {
@@ -289,10 +290,10 @@ std::vector<ValveRows> ReadValves(std::vector<fs::path> files) {
   return valves;
 }
 
-// As ReadHealthyHours(), of what was before an instant; nobody has labelled an
-// episode.
+// As ReadHealthyHours(), of what was before an instant. Episodes are labelled
+// false, or nobody has judged them.
 std::vector<HealthyHours> HoursBefore(const std::vector<ValveRows>& valves,
-                                      double until_s) {
+                                      double until_s, bool labelled) {
   std::vector<HealthyHours> all;
   for (const ValveRows& rows : valves) {
     HealthyHours valve;
@@ -311,10 +312,10 @@ std::vector<HealthyHours> HoursBefore(const std::vector<ValveRows>& valves,
         continue;
       }
       const int lasted = WholeHours(episode, episode.close_s);
-      if (episode.shares.back().second > 1.0) {
+      if (const double share = episode.shares.back().second; share > 1.0) {
         valve.hours.push_back(
-            {static_cast<std::int64_t>(episode.open_s / kSecondsPerHour), 1.0,
-             lasted});
+            {static_cast<std::int64_t>(episode.open_s / kSecondsPerHour),
+             labelled ? share : 1.0, lasted, !labelled});
       } else {
         ++valve.others;
         valve.others_lasted += lasted;
@@ -410,7 +411,7 @@ report::Report Budget(const BudgetOptions& options) {
   double from_s = options.taught * kSecondsPerHour;
   std::optional<AlarmBudget> budget;
   for (; from_s < end_s; from_s += kSecondsPerDay) {
-    budget.emplace(between_h, HoursBefore(valves, from_s));
+    budget.emplace(between_h, HoursBefore(valves, from_s, options.labelled));
     CountDay(valves, from_s, *budget, counts, report);
   }
   Counts all;
@@ -428,20 +429,21 @@ report::Report Budget(const BudgetOptions& options) {
   }
   const AlarmBudget::Promise promise = budget->Now();
   const double allowed = all.hours / promise.needed_hours;
-  report.Line("all: " + report::FormatNumber(all.hours, 0) + " h, " +
-              std::to_string(all.episodes) + " episodes, " +
-              std::to_string(all.alarms) + " alarms (95 %: at most " +
-              report::FormatNumber(PoissonBound(all.alarms), 1) + "); budget " +
-              report::FormatNumber(allowed, 2) +
-              (PoissonAtLeast(all.alarms, allowed) < 0.05 ? ", exceeded"
-               : PoissonBound(all.alarms) > allowed       ? ", not shown"
-                                                          : ", kept") +
-              "; q " +
-              report::FormatNumber(
-                  ShareTails(HoursBefore(valves, from_s)).goes_on(), 3) +
-              "; valves with return periods " + std::to_string(promise.ready) +
-              ", longest " + report::FormatNumber(promise.longest_hours, 0) +
-              " h");
+  report.Line(
+      "all: " + report::FormatNumber(all.hours, 0) + " h, " +
+      std::to_string(all.episodes) + " episodes, " +
+      std::to_string(all.alarms) + " alarms (95 %: at most " +
+      report::FormatNumber(PoissonBound(all.alarms), 1) + "); budget " +
+      report::FormatNumber(allowed, 2) +
+      (PoissonAtLeast(all.alarms, allowed) < 0.05 ? ", exceeded"
+       : PoissonBound(all.alarms) > allowed       ? ", not shown"
+                                                  : ", kept") +
+      "; q " +
+      report::FormatNumber(
+          ShareTails(HoursBefore(valves, from_s, options.labelled)).goes_on(),
+          3) +
+      "; valves with return periods " + std::to_string(promise.ready) +
+      ", longest " + report::FormatNumber(promise.longest_hours, 0) + " h");
   for (const std::string& pair : options.faults) {
     const std::size_t equals = pair.find('=');
     for (const auto& entry : fs::directory_iterator(pair.substr(equals + 1))) {
@@ -495,6 +497,7 @@ void AddBudgetVerbs(report::Program& program) {
       ->type_name("H");
   verb.add_option("--budget", weigh->budget, "NUMBER/day, /week, ...")
       ->type_name("BUDGET");
+  verb.add_flag("--labelled", weigh->labelled, "Episodes are labelled false");
   verb.add_option("--valves", weigh->valves, "Of the plant")->type_name("N");
 }
 

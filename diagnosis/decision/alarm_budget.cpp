@@ -4,6 +4,7 @@
 #include <charconv>
 #include <cmath>
 #include <numeric>
+#include <span>
 
 #include "base/error.h"
 
@@ -84,22 +85,25 @@ ShareTails::ShareTails(const std::vector<HealthyHours>& valves) {
     if (!IsKnown(valve)) {
       continue;
     }
-    std::vector<double> shares;
-    std::ranges::transform(valve.hours, std::back_inserter(shares),
-                           &HealthyHours::Hour::share);
-    std::ranges::sort(shares);
+    std::vector<HealthyHours::Hour> each = valve.hours;
+    std::ranges::sort(each, {}, &HealthyHours::Hour::share);
     const auto above = static_cast<std::size_t>(
-        std::ceil((1.0 - kTailShare) * static_cast<double>(shares.size())));
-    const double level = shares[above - 1];
-    double mean = 0.0;
-    for (std::size_t i = above; i < shares.size(); ++i) {
-      mean += (shares[i] - level) / static_cast<double>(shares.size() - above);
+        std::ceil((1.0 - kTailShare) * static_cast<double>(each.size())));
+    const double level = each[above - 1].share;
+    const std::span highest = std::span(each).subspan(above);
+    double sum = 0.0;
+    double known_shares = 0.0;
+    for (const HealthyHours::Hour& hour : highest) {
+      sum += hour.share - level;
+      known_shares += hour.at_least ? 0.0 : 1.0;
     }
-    if (!(mean > 0.0)) {
-      continue;  // All its highest hours are the same.
+    const double mean = sum / known_shares;
+    if (!(mean > 0.0) || !std::isfinite(mean)) {
+      continue;  // All its highest hours are the same, or unjudged.
     }
-    for (std::size_t i = above; i < shares.size(); ++i) {
-      excesses.push_back((shares[i] - level) / mean);
+    for (const HealthyHours::Hour& hour : highest) {
+      excesses.push_back((hour.share - level) / mean +
+                         (hour.at_least ? 1.0 : 0.0));
     }
     known[valve.valve_id] = {level, mean};
     hours[valve.valve_id] = HoursOf(valve);

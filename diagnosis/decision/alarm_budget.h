@@ -15,11 +15,12 @@ namespace fdi {
 struct HealthyHours {
   struct Hour {
     std::int64_t hour{0};  ///< Since the epoch, of any one clock.
-    /// The largest Verdict::share. Of an episode that a label calls false its
-    /// own, and of one that nobody has judged 1: it may have been a fault, so
-    /// all that counts is that it reached a limit.
-    double share{0.0};
+    double share{0.0};     ///< The largest Verdict::share.
     int lasted{0};  ///< Whole hours that an episode lasted, which is over.
+    /// The share is this or more: 1 of an episode that nobody has judged. It
+    /// may have been a fault, so all that counts is that it reached a limit.
+    /// One that a label calls false has its own share.
+    bool at_least{false};
   };
 
   std::string valve_id;
@@ -42,6 +43,9 @@ struct HealthyHours {
 ///     P(share of an hour > z) = 0.2 (1 + ξ y/σ)^(−1/ξ),  y = (z − u)/m, ξ ≥ 0,
 ///
 /// with σ at its upper 95 % bound (FitPareto). The return period is 1/P hours.
+/// A share of which only "this or more" is known counts for m as in an
+/// exponential tail: m is the sum of all excesses by the number of those that
+/// are known, and what is missing of the others is m in the mean.
 /// Assumed is that hours are alike and that what comes is like what was.
 ///
 /// It grows with each hour that a deviation lasts. Of the hours above u, q is

@@ -42,7 +42,8 @@ void AddEpisodes(Database& database, std::int64_t since_ns,
       ++valve.others;
       valve.others_lasted += lasted;
     } else {
-      valve.hours.push_back({hour, label.empty() ? 1.0 : share, lasted});
+      valve.hours.push_back(
+          {hour, label.empty() ? 1.0 : share, lasted, label.empty()});
     }
   }
   row.Reset();

@@ -108,6 +108,29 @@ TEST(ShareTailsTest, HoursThatAreAllTheSameHaveNoTail) {
   EXPECT_EQ(ShareTails(fleet).longest_hours(), 0.0);
 }
 
+// Of 13 % of these hours it is known only that they reached a limit. Taken as
+// if they had been no higher, they would make a share of 2 seem ten times as
+// rare.
+TEST(ShareTailsTest, EpisodesThatNobodyHasJudgedReachedALimitOrMore) {
+  std::vector<HealthyHours> labelled = Fleet(20, 300);
+  std::vector<HealthyHours> unlabelled = labelled;
+  std::vector<HealthyHours> no_higher = labelled;
+  for (std::size_t v = 0; v < labelled.size(); ++v) {
+    for (std::size_t i = 0; i < labelled[v].hours.size(); ++i) {
+      const double share = 3.0 * labelled[v].hours[i].share - 0.8;
+      labelled[v].hours[i].share = share;
+      unlabelled[v].hours[i].share = std::min(share, 1.0);
+      unlabelled[v].hours[i].at_least = share > 1.0;
+      no_higher[v].hours[i].share = std::min(share, 1.0);
+    }
+  }
+  const double with_labels = *ShareTails(labelled).ReturnHours("V1", 2.0);
+  const double without = *ShareTails(unlabelled).ReturnHours("V1", 2.0);
+  EXPECT_GT(without, with_labels / 3.0);
+  EXPECT_LT(without, with_labels * 3.0);
+  EXPECT_GT(*ShareTails(no_higher).ReturnHours("V1", 2.0), 10.0 * with_labels);
+}
+
 // 95 % bounds of what was counted: 3.00 of none, 6.30 of two.
 TEST(ShareTailsTest, EpisodesBeyondNoLimitAreCounted) {
   std::vector<HealthyHours> fleet = Fleet(4, 300);

@@ -178,6 +178,7 @@ TEST_F(HistoryReaderTest, AnEpisodeIsAnHourThatLastsOnceItIsOver) {
   ASSERT_EQ(hours().size(), 2U);
   EXPECT_EQ(hours()[1].hour, kDetected / kNsPerHour);
   EXPECT_EQ(hours()[1].share, 1.0);
+  EXPECT_TRUE(hours()[1].at_least);
   EXPECT_EQ(hours()[1].lasted, 0);
 
   event.transition.kind = Kind::kClosed;
