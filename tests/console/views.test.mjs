@@ -558,6 +558,45 @@ test('a plant without valves and a list without alarms say what comes',
       await close(page);
     });
 
+test('plant, alarms and work list agree on order, counts and silence',
+    async () => {
+      const episode = (n) => `000000000000000${n}`;
+      const shelf = {until_ms: kNowMs + kDayMs, who: 'bo', comment: ''};
+      const named = (id, n, more) => tile(id, 'ISOLATED', ['f19'],
+          {episode: episode(n), unacked: true, severity: 'high', ...more});
+      monitor.reset([named('Aside', 1, {shelved_until_ms: shelf.until_ms}),
+        named('Low', 2, {severity: 'critical'}),
+        named('Seen', 3, {unacked: false}),
+        named('Silent', 4, {quality: 'STALE', stamp_ms: kNowMs - 60000})],
+      [alarm(episode(1), 'Aside', 'f19', {score: 16, shelved: shelf}),
+        alarm(episode(2), 'Low', 'f19', {score: 1, severity: 'critical'}),
+        alarm(episode(3), 'Seen', 'f19', {score: 9, isa: 'ACKED'}),
+        alarm(episode(4), 'Silent', 'f19', {score: 4})]);
+      monitor.answers.worklist = {...kList, rows: [{...kWork, fault: 'f19|f6',
+        valve_id: 'Silent', certainty: 'one of', look_alikes: [],
+        acked_by: null, expected_utc: '2026-12-09T00:00:00Z',
+        in_work_utc: '2026-12-01T00:00:00Z'}], shelved: [{valve_id: 'Aside',
+        fault: 'f19', until_utc: '2026-12-09T00:00:00Z', who: 'bo',
+        comment: null}]};
+      for (const width of [1400, 390]) {
+        const page = await openShared(browser, address, '#/',
+            {viewport: {width, height: 800}});
+        await page.getByRole('button', {name: 'Unacknowledged 2'}).waitFor();
+        const order = ['Seen', 'Silent', 'Low', 'Aside'];
+        await until(async () => (await page.locator('.tile-id')
+            .allTextContents()).join() === order.join(), 'the order', 5000);
+        await page.goto(`${address}/#/alarms`);
+        await page.getByRole('button', {name: 'Unacknowledged 2'}).waitFor();
+        assert.deepEqual(await page.locator('tbody th').allInnerTexts(), order);
+        await page.goto(`${address}/#/worklist`);
+        await page.getByText(/^not confirmed since \d\d:\d\d:\d\d; in work, /)
+            .waitFor();
+        await page.getByText(/expected back 2026-12-09$/).waitFor();
+        await page.getByText('one of 2 (×0.75)').waitFor();
+        await close(page);
+      }
+    });
+
 test('groups have counts and select their valves', async () => {
   monitor.reset([tile('U1-FV-1', 'NORMAL'), tile('U1-FV-2', 'ISOLATED',
       ['f19']), tile('U2-LV-1A', 'NORMAL')]);
@@ -731,8 +770,8 @@ test('the work list has the order of its document, factors, and what nobody ' +
       {viewport: {width: 1900, height: 900}});
   await page.getByText('<b>Plug worn (f6)').first().waitFor();
   const text = await page.locator('main').innerText();
-  for (const part of ['As of ', '2 of 3 loops are watched', 'high · 4',
-    '1 · 2.0', 'likely · 0.75', '6.00', 'shares cause: air header',
+  for (const part of ['As of ', '2 of 3 loops are watched', 'high (×4)',
+    '1 (×2.0)', 'likely (×0.75)', '6.00', 'shares cause: air header',
     'no data came', '25.0 %', 'mechanical or instrument', 'returned',
     'stands; acknowledged', 'in work, order 4711, expected back 2026-11-26',
     'Done, and watched for their return', 'recalibrated',

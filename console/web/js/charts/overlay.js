@@ -85,9 +85,9 @@ function drawGaps(u, ctx, {left, top, width, height}, gaps, first) {
 export const reasonText = ({reason}) => reason.replaceAll('_', ' ');
 
 // Detected: a thin strip along the upper edge; isolated: a thick one.
-function drawRibbon(u, ctx, {top}, table) {
+function drawRibbon(u, ctx, {top}, {table, priority}) {
   const {t, state} = table;
-  ctx.fillStyle = cssColor('--p2');
+  ctx.fillStyle = cssColor(`--p${priority}`);
   for (let i = 1; i < t.length; ++i) {
     // Nothing is said of a gap, which has an instant without a state.
     if (!state[i - 1] || !state[i] || state[i] === 'NORMAL') continue;
@@ -133,7 +133,7 @@ export function overlayHooks(panel, scene, isFirst) {
       drawGaps(u, ctx, box, scene.gaps, isFirst);
     })],
     draw: [(u) => clipped(u, (ctx, box) => {
-      if (panel.ribbon) drawRibbon(u, ctx, box, scene.table);
+      if (panel.ribbon) drawRibbon(u, ctx, box, scene);
       drawMarks(u, ctx, box, scene.marks, isFirst);
     })],
   };

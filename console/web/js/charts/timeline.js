@@ -18,7 +18,7 @@ const linesOf = (panels) => panels.flatMap(({lines}) =>
 export class Timeline {
   element;
   #stack = new PanelStack();
-  #scene = {table: {t: []}, gaps: [], marks: []};
+  #scene = {table: {t: []}, gaps: [], marks: [], priority: 3};
   #panelBox = this.#stack.element;
   #buttons = h('div', {
     'class': 'chart-tools', 'role': 'group', 'aria-label': 'Time shown'});
@@ -118,7 +118,7 @@ export class Timeline {
     const gaps = this.#data.allGaps();
     Object.assign(this.#scene, {
       gaps, table: this.#data.columns ? this.#data.table(gaps) : {t: []},
-      marks: this.#data.marks,
+      marks: this.#data.marks, priority: this.#data.priority,
     });
   }
 

@@ -38,6 +38,7 @@ export class TrendData {
   gaps = [];
   marks = [];
   words = '';
+  priority = 3;  // Of the alarm: the colour of its strip.
   columns = null;
   openGapFromMs = null;  // While nothing is heard.
 

@@ -220,6 +220,7 @@ class EpisodePage extends View {
   #showTrend(trace) {
     if (!trace || trace.t_ms.length === 0) return;
     this.#data.load(trace, false);
+    this.#data.priority = priorityOf(this.#row);
     this.#timeline ??= new Timeline(this.#data, {
       live: false, nowMs: () => store.nowMs(),
       describe: 'Trend of the episode; arrows move, plus and minus zoom',

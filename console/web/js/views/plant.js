@@ -8,7 +8,7 @@ import {rememberQuery} from '../route.js';
 import {settings} from '../settings.js';
 import {store} from '../store.js';
 import {dataTable, timeCell} from './table.js';
-import {rankOf, tailLength, Tile} from './tile.js';
+import {compareTiles, rankOf, tailLength, Tile} from './tile.js';
 import {oncePerFrame, View} from './view.js';
 
 const kFrameBudgetMs = 4;
@@ -18,7 +18,8 @@ const kRowsBeyond = 3;  // Above and below what is in sight.
 const kFilters = [
   {key: 'all', text: 'All', test: () => true},
   {key: 'alarm', text: 'In alarm', test: isAlarm},
-  {key: 'unack', text: 'Unacknowledged', test: (t) => t.unacked},
+  {key: 'unack', text: 'Unacknowledged', test: (t) =>
+    t.unacked && t.shelved_until_ms === null},
   {key: 'silent', text: 'Not or partly judged', test: (t) =>
     t.quality !== 'LIVE' || t.state === 'PARTLY_JUDGED'},
 ];
@@ -162,8 +163,9 @@ class Plant extends View {
       for (const tile of this.#tiles.values()) tile.showId(this.#tail);
     }
     for (const id of ids ?? this.#ids) {
-      const [group, priority] = rankOf(store.tiles.get(id));
-      const rank = 10 * group + priority;
+      const [group] = rankOf(store.tiles.get(id));
+      // Seen or not, alarms stand as in the work list.
+      const rank = group === 1 ? 0 : group;
       if (this.#ranks.get(id) !== rank) this.#needsOrder = true;
       this.#ranks.set(id, rank);
       if (this.#inDocument.has(id)) this.#dirty.add(id);
@@ -174,6 +176,7 @@ class Plant extends View {
 
   // A label is of the alarm, not of the tile; null: of any of them.
   #redraw(id) {
+    this.#needsOrder = true;
     for (const each of id ? [id] : this.#inDocument) {
       if (this.#inDocument.has(each)) this.#dirty.add(each);
     }
@@ -253,7 +256,8 @@ class Plant extends View {
     this.#needsOrder = false;
     this.#shown = this.#ids.filter((id) => this.#shows(store.tiles.get(id)));
     if (this.#order !== 'name') {
-      this.#shown.sort((a, b) => this.#ranks.get(a) - this.#ranks.get(b));
+      this.#shown.sort((a, b) => this.#ranks.get(a) - this.#ranks.get(b) ||
+          compareTiles(a, b));
     }
     this.#placeSoon();
   }

@@ -70,7 +70,7 @@ function keyFigures(figures, days) {
     ['A day', days.length === 0 ? '–' : (episodes / days.length).toFixed(
         episodes < days.length ? 2 : 1)],
     ['Time in alarm', durationText(1000 * sum('alarm_s'))],
-    ['Confirmed now', String(sum('open'))],
+    ['Still open', String(sum('open'))],
     ['Chattering', String(sum('chattering'))],
     ['Standing', String(sum('standing'))],
     ['False alarms', judged === 0 ? 'none labelled' :

@@ -34,6 +34,16 @@ export function rankOf(tile) {
   return [tile.unacked ? 3 : tile.state === 'NORMAL' ? 5 : 4, 0];
 }
 
+/** Alarms in the order of the work list; others stay as they are. */
+export function compareTiles(a, b) {
+  const [first, second] = [a, b].map((id) => store.tiles.get(id));
+  if (!isAlarm(first) || !isAlarm(second)) return 0;
+  const [one, two] = [first, second].map(({episode}) =>
+    store.alarms.get(episode) ?? {score: 0, detected_ms: 0});
+  return two.score - one.score || priorityOf(first) - priorityOf(second) ||
+      two.detected_ms - one.detected_ms;
+}
+
 function whatText(tile) {
   if (isAlarm(tile)) {
     const name = faultName(faultOfTile(tile)) + moreText(tile, faultName);

@@ -350,6 +350,7 @@ class ValvePage extends View {
     const tile = store.tiles.get(this.id);
     replace(this.#state, stateLine(tile));
     setText(this.#scope, tile ? scopeText(tile, this.#about) : '');
+    if (tile && isAlarm(tile)) this.#data.priority = priorityOf(tile);
     const row = tile?.episode ? store.alarms.get(tile.episode) : null;
     const key = JSON.stringify([row, tile?.faults, tile?.fault,
       tile?.quality, store.status?.write]);

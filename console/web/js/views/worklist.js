@@ -3,9 +3,10 @@
 
 import {get, url} from '../api.js';
 import {button, errorNote, h, replace} from '../dom.js';
-import {moreText} from '../faults.js';
+import {certaintyText, faultTitle, moreText, notJudgedText} from '../faults.js';
 import {timeText} from '../format.js';
 import {link} from '../route.js';
+import {store} from '../store.js';
 import {columns, dataTable, forText, timeCell, valveCell, valveLink}
   from './table.js';
 import {View} from './view.js';
@@ -16,6 +17,10 @@ const utcCell = (text) => timeCell(text && Date.parse(text));
 
 const utcText = (text) => timeText(Date.parse(text));
 
+// A day that was given without a time is a midnight of UTC.
+const dayText = (text) =>
+  /T00:00:00(\.0*)?(Z|\+00:00)$/.test(text) ? text.slice(0, 10) : utcText(text);
+
 function findingCell({name, fault, episode_id: id, ...row}) {
   const text = (fault && fault !== 'unknown' ? `${name} (${fault})` : name) +
     moreText(row);
@@ -24,11 +29,17 @@ function findingCell({name, fault, episode_id: id, ...row}) {
 
 const workText = ({in_work_utc: since, order, expected_utc: back}) => !since ?
   null : ['in work', order && `order ${order}`,
-    back && `expected back ${utcText(back)}`].filter(Boolean).join(', ');
+    back && `expected back ${dayText(back)}`].filter(Boolean).join(', ');
 
+// A valve that nobody judges now confirms nothing, though its alarm stands.
 const stateText = (row) => [!row.open ? 'returned' : row.unconfirmed_utc ?
-  `not confirmed since ${utcText(row.unconfirmed_utc)}` : 'stands',
+  `not confirmed since ${utcText(row.unconfirmed_utc)}` :
+  notJudgedText(store.tiles.get(row.valve_id)) || 'stands',
 row.acked_by && 'acknowledged', workText(row)].filter(Boolean).join('; ');
+
+// A word, and the factor of the score that it is.
+const weighed = (word, factor) => h('span', {title:
+  'score = severity × how sure × grade'}, `${word} (×${factor})`);
 
 const kRows = [
   {text: 'Rank', class: 'num', cell: (row) => String(row.rank)},
@@ -39,11 +50,11 @@ const kRows = [
     shares ? `${why}; shares ${shares}` : why},
   {text: 'State', cell: stateText},
   {text: 'Severity', class: 'wide', cell: (row) =>
-    `${row.severity} · ${number(row.severity_points, 0)}`},
-  {text: 'How sure', class: 'wide', cell: (row) =>
-    `${row.certainty ?? '–'} · ${number(row.confidence, 2)}`},
+    weighed(row.severity, number(row.severity_points, 0))},
+  {text: 'How sure', class: 'wide sure', cell: (row) =>
+    weighed(certaintyText(row) || '–', number(row.confidence, 2))},
   {text: 'Grade', class: 'wider', cell: (row) =>
-    `${row.grade ?? '–'} · ${number(row.grade_factor, 1)}`},
+    weighed(row.grade ?? '–', number(row.grade_factor, 1))},
   {text: 'Score', class: 'num wider', cell: (row) => number(row.score, 2)},
   {text: 'For', class: 'wider', cell: (row) => forText(row.discipline)},
   {text: 'What to check', class: 'remark check', cell: (row) =>
