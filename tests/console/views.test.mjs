@@ -593,6 +593,11 @@ test('plant, alarms and work list agree on order, counts and silence',
             .waitFor();
         await page.getByText(/expected back 2026-12-09$/).waitFor();
         await page.getByText('one of 2 (×0.75)').waitFor();
+        // A code never stands without its name.
+        await page.getByText('Flow transmitter wrong (f19) or Plug worn (f6)',
+            {exact: true}).waitFor();
+        assert.equal(await page.locator('td').filter({hasText: /^f\d+$/})
+            .count(), 0);
         await close(page);
       }
     });

@@ -20,11 +20,19 @@ export function faultName(fault) {
   return members(fault).map(nameOf).join(' or ');
 }
 
-/** "flow sensor (f19)" */
+const titleOf = (fault) =>
+  nameOf(fault) === fault ? fault : `${nameOf(fault)} (${fault})`;
+
+/** "flow sensor (f19) or erosion (f3)" */
 export function faultTitle(fault) {
-  const name = faultName(fault);
-  return members(fault).length > 0 && name !== fault ?
-    `${name} (${fault})` : name;
+  return members(fault).map(titleOf).join(' or ') || faultName(fault);
+}
+
+/** The same as nodes, the codes in small letters. */
+export function faultNodes(fault) {
+  return members(fault).map((each, i) => [i > 0 ? ' or ' : '', nameOf(each),
+    nameOf(each) === each ? null :
+      h('span', {class: 'number'}, ` ${each}`)]);
 }
 
 /** Of an alarm; one that ended before it had a name is like no other. */

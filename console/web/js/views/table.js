@@ -1,7 +1,7 @@
 // Tables by declaration of their columns: {text, cell(row), class, header}.
 
 import {h} from '../dom.js';
-import {certaintyNode, faultName, faultTitle, groupName, members, moreText,
+import {certaintyNode, faultNodes, faultTitle, groupName, members, moreText,
   namurText, priorityNames, priorityOf, prioritySign, qualityText, rowTitle,
   unconfirmedText} from '../faults.js';
 import {durationText, percentText, strengthText, timeText} from '../format.js';
@@ -51,12 +51,12 @@ function priorityCell(row) {
 }
 
 function faultCell(row) {
-  const name = rowTitle(row, faultName);
-  const numbers = members(row.fault).join(', ');
+  const named = members(row.fault).length > 0;
   return h('a', {href: link('episode', row.episode), title:
-    rowTitle(row) + moreText(row)}, name, numbers && numbers !== name ?
-    h('span', {class: 'number'}, ` ${numbers}`) : null,
-  moreText(row, faultName));
+    rowTitle(row) + moreText(row)},
+  named ? faultNodes(row.fault) : rowTitle(row),
+  (row.look_alikes ?? []).map((fault) => [' or ', faultNodes(fault)]),
+  moreText({second: row.second}));
 }
 
 /** A fault, what somebody found it to be, and what to check. */

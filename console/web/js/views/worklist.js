@@ -22,7 +22,8 @@ const dayText = (text) =>
   /T00:00:00(\.0*)?(Z|\+00:00)$/.test(text) ? text.slice(0, 10) : utcText(text);
 
 function findingCell({name, fault, episode_id: id, ...row}) {
-  const text = (fault && fault !== 'unknown' ? `${name} (${fault})` : name) +
+  const text = (!fault || fault === 'unknown' ? name :
+    fault.includes('|') ? faultTitle(fault) : `${name} (${fault})`) +
     moreText(row);
   return id ? h('a', {href: link('episode', id)}, text) : text;
 }
@@ -64,7 +65,8 @@ const kRows = [
 const kShared = [
   {text: 'Share', header: true, cell: (row) => row.shares},
   {text: 'Group', cell: (row) => row.group ?? '–'},
-  {text: 'Faults', cell: (row) => row.faults.join(', ') || '–'},
+  {text: 'Faults', cell: (row) => 
+    row.faults.map((fault) => faultTitle(fault)).join(', ') || '–'},
   {text: 'Since', cell: (row) => utcCell(row.since_utc)},
   {text: 'Ended', cell: (row) => utcCell(row.ended_utc)},
   {text: 'Loops', cell: (row) => row.valve_ids.map((valve, i) =>
@@ -80,7 +82,7 @@ const kUnjudged = [
 
 const kDone = [
   {text: 'Valve', header: true, cell: (row) => valveLink(row.valve_id)},
-  {text: 'Finding', cell: (row) => row.name},
+  {text: 'Finding', cell: findingCell},
   {text: 'Done', cell: (row) => utcCell(row.done_utc)},
   {text: 'By', cell: (row) => row.who ?? '–'},
   {text: 'What', class: 'remark', cell: (row) => row.what},
@@ -88,7 +90,8 @@ const kDone = [
 
 const kShelved = [
   {text: 'Valve', header: true, cell: (row) => valveLink(row.valve_id)},
-  {text: 'Fault', cell: (row) => row.fault ?? 'any'},
+  {text: 'Fault', cell: (row) =>
+    row.fault ? faultTitle(row.fault) : 'any'},
   {text: 'Until', cell: (row) => utcCell(row.until_utc)},
   {text: 'By', cell: (row) => row.who},
   {text: 'Comment', class: 'remark', cell: (row) => row.comment ?? '–'},
