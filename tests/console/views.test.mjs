@@ -135,7 +135,7 @@ test('a name that was withdrawn is not called a new one', async () => {
     const {markWord} = await import('/js/faults.js');
     return ['f3', '', null].map((faults) => markWord('REISOLATED', faults));
   });
-  assert.deepEqual(words, ['named anew', 'name withdrawn', 'name withdrawn']);
+  assert.deepEqual(words, ['renamed', 'name withdrawn', 'name withdrawn']);
 });
 
 test('a new valve leaves the worst ones first', async () => {
@@ -1132,8 +1132,8 @@ test('every other view and dialog can be read, at any size, light and dark',
           await page.setViewportSize({width, height});
         }
         await page.goto(`${address}/#/alarms`);
-        for (const name of [`Shelve ${kLongId}`, 'Label V', 'Keys']) {
-          if (name === 'Keys') await page.keyboard.press('?');
+        for (const name of [`Shelve ${kLongId}`, 'Label V', 'Shortcuts']) {
+          if (name === 'Shortcuts') await page.keyboard.press('?');
           else await page.getByRole('button', {name, exact: true}).click();
           const dialog = page.getByRole('dialog');
           await dialog.waitFor();

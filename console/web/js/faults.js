@@ -123,8 +123,8 @@ export const faultOfTile = (tile) => !inAlarm(tile) ? tile.fault :
 const kStateWords = {
   NORMAL: 'normal', NOT_JUDGED: 'not judged',
   PARTLY_JUDGED: 'partly judged', DETECTED: 'fault detected',
-  ISOLATED: 'fault named', REISOLATED: 'named anew', CLEARED: 'returned',
-  CLOSED: 'closed',
+  ISOLATED: 'fault named', REISOLATED: 'renamed', CLEARED: 'returned',
+  CLOSED: 'ended',
 };
 export const stateWord = (state) => kStateWords[state] ?? state;
 
@@ -200,8 +200,9 @@ export function notJudgedText(tile) {
 }
 
 const kMarkWords = {
-  ISOLATED: 'named', REISOLATED: 'named anew', CHANGED: 'priority rose', RAISED: 'became an alarm', SECOND: 'second fault', ACK: 'acknowledged',
-  LABEL: 'labelled',
+  ISOLATED: 'named', REISOLATED: 'renamed', CHANGED: 'priority rose',
+  RAISED: 'became an alarm', SECOND: 'second fault', ACK: 'acknowledged',
+  LABEL: 'labelled', CLOSED: 'episode ended',  // "Closed" is said of a valve.
 };
 /** `text` of a mark, or faults of an event: none if a name was withdrawn. */
 export const markWord = (kind, text) => kind === 'REISOLATED' && !text ?

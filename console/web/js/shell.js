@@ -86,8 +86,8 @@ export function createShell(top, banner) {
   const theme = button('', nextTheme, {title: 'Light or dark (key T)'});
   const utc = button('', () => settings.set('utc', !settings.get('utc')),
       {title: 'Local time or UTC (key U)'});
-  const help = button('Keys', showHelp, {class: 'help',
-    title: 'Keys (key ?)'});
+  const help = button('Shortcuts', showHelp, {class: 'help',
+    title: 'Shortcuts (key ?)'});
   replace(top, h('span', {class: 'brand'}, 'Valves'),
       h('nav', {'aria-label': 'Views'}, links), summary,
       h('div', {class: 'tools'}, health, clock, user, utc, theme,

@@ -25,7 +25,7 @@ function isTyping(target) {
 export function showHelp() {
   const on = h('input', {type: 'checkbox', checked: settings.get('shortcuts'),
     onchange: () => settings.set('shortcuts', on.checked)});
-  const dialog = h('dialog', {class: 'help'}, h('h2', {}, 'Keys'),
+  const dialog = h('dialog', {class: 'help'}, h('h2', {}, 'Shortcuts'),
       h('table', {},
           h('thead', {}, h('tr', {}, h('th', {scope: 'col'}, 'Key'),
               h('th', {scope: 'col'}, 'What it does'))),

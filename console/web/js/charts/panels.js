@@ -72,7 +72,7 @@ function decisionPanel({faults, T}) {
     dash: kDashes[Math.floor(f / kFaultColors.length) % kDashes.length],
   }));
   return {
-    key: 'decision', title: 'How well each explains the data (dashed: enough)',
+    key: 'decision', title: 'How well each explains the data (above the dashed line: fits)',
     height: 220, lines, range: [-0.03, 1.05], threshold: T, ribbon: true,
   };
 }

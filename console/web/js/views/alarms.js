@@ -112,13 +112,14 @@ class Alarms extends View {
     setText(this.#readOnly, store.status?.plant ? 'Read-only: acknowledge, ' +
       'shelve and label on the page of the monitor, or with fdi-store.' :
       store.status?.user ? 'Read-only: your role is view.' :
-      'Read-only: whoever acts opens the page through nginx.');
+      'Read-only: to act, open the page through nginx.');
     replace(this.#head, headRow([
       ...(canAct() ? [{class: 'for-hand',
         text: h('span', {class: 'sr-only'}, 'Selected')}] : []),
       ...kColumns, ...(canAct() ? [{text: 'Actions', class: 'for-hand'}] : [])]));
     replace(this.#body, rows.map((row) => this.#row(row)));
     this.#showCounts(rows);
+    this.#showLasted();
     this.#restoreFocus(focused);
   }
 
@@ -149,7 +150,7 @@ class Alarms extends View {
     this.#nothing.hidden = rows.length > 0;
     this.#table.hidden = rows.length === 0;
     setText(this.#nothing, all.length === 0 ?
-      'No alarm is open or waits for somebody.' : 'No alarm in this group.');
+      'No alarm is open or waiting to be acknowledged.' : 'No alarm in this group.');
     this.#bulk.hidden = this.#selected.size === 0;
     setText(this.#bulk, `Acknowledge ${this.#selected.size} selected`);
   }

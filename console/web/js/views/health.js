@@ -71,15 +71,18 @@ function countsOf(health) {
       .filter(({value}) => value !== null);
 }
 
-const kCountColumns = [
+// Most valves exceed no limit: then there is no column for it.
+const countsTable = (rows) => dataTable('Counts', [
   {text: 'Count', header: true, cell: (row) => row.text},
   {text: 'Value', cell: ({value, unit}) =>
     `${Number.isInteger(value) ? value : numberText(value)} ${unit}`},
-  {text: 'Limit', cell: (row) => row.exceeded ? 'exceeded' : ''},
-];
+  ...rows.some((row) => row.exceeded) ? [{text: 'Limit', cell: (row) =>
+    row.exceeded ? 'exceeded' : ''}] : [],
+], rows);
 
 const kTrendColumns = [
-  {text: 'Limit', header: true, cell: (row) => row.limit.replace('=', ' = ')},
+  {text: 'Limit', header: true, cell: (row) => row.limit.replace('=', ' = ')
+    .replace('-', '−').replace(/\s*%/, ' %')},
   {text: 'Now', cell: (row) => withUnit(row.now, row)},
   {text: 'A day', cell: (row) => withUnit(row.per_day, row)},
   {text: 'Reaches it', cell: (row) => row.text},
@@ -112,7 +115,7 @@ export class HealthSection {
         h('h2', {}, `Counts of the last ${health.step}`),
         h('p', {}, 'Status (NAMUR NE 107): ' + (away() ?
           `check function, ${away()}` : namurText(health.status.at(-1)))),
-        dataTable('Counts', kCountColumns, countsOf(health)),
+        countsTable(countsOf(health)),
         h('h2', {}, 'Months'),
         dataTable('Trends to limits', kTrendColumns, health.trends));
     if (health.t_ms.length < kMinDays) {

@@ -18,7 +18,7 @@ const kDayMs = 86400000;
 const kDefaultDays = 30;
 const kStates = [
   ['', 'any'], ['open', 'open'], ['detected', 'detected, not named'],
-  ['isolated', 'named'], ['closed', 'closed'], ['unack', 'unacknowledged'],
+  ['isolated', 'named'], ['closed', 'ended'], ['unack', 'unacknowledged'],
   ['rtn_unack', 'returned'], ['acked', 'acknowledged'],
   ['shelved', 'shelved'],
 ];

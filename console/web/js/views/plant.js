@@ -104,7 +104,7 @@ class Plant extends View {
         timeCell(heard) : 'now'},
     ];
     replace(this.#monitors, monitors.length > 0 && dataTable(
-        'Monitors: press one for its valves alone', columns, monitors,
+        'Monitors: press one to see only its valves', columns, monitors,
         {attributesOf: ({silent}) => ({class: silent ? 'out' : ''})}));
     this.#placeSoon();
   }

@@ -191,14 +191,15 @@ class ValvePage extends View {
         h('div', {class: 'controls'}, h('h1', {}, id), this.#state,
             this.#actions),
         h('div', {class: 'live'}, this.#words, this.#checks,
-            this.#who, this.#now, this.#scope),
+            this.#who, this.#now),
         this.#note,
         h('div', {class: 'row-end'}, button('Save as PNG', () =>
           exportPng(this.#timeline, id)), h('a', {href: link('history', '', {valve: id})},
             'Episodes of this valve')),
         this.#timeline.element,
-        h('p', {class: 'hint'}, 'Drag to zoom, Shift and drag to pan, double ' +
-          'click for all; Ctrl and wheel zoom, Shift and wheel pan.'),
+        h('p', {class: 'hint for-mouse'}, 'Drag to zoom, Shift and drag to ' +
+          'pan, double click for all; Ctrl and wheel zoom, Shift and wheel pan.'),
+        this.#scope,
         health.element);
     this.atEnd(() => {
       clearTimeout(this.#retry);
@@ -338,8 +339,12 @@ class ValvePage extends View {
     const tile = store.tiles.get(this.id);
     const partly = tile?.state === 'PARTLY_JUDGED';
     const away = notJudgedText(tile);
-    setText(this.#words, away || unitText(this.#data.words) +
+    // The line above may say it already, behind the name of the alarm.
+    const said = away !== '' && !inAlarm(tile) && isAlarm(tile) &&
+        openText(tile).endsWith(away);
+    setText(this.#words, said ? '' : away || unitText(this.#data.words) +
       (partly && this.#data.words ? ', as far as it is judged' : ''));
+    this.#words.hidden = this.#words.textContent === '';
     if (this.#data.size > 0) {
       replace(this.#now, nowTables(this.#data, partly, away !== '',
           tile?.blind));
