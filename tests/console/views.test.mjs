@@ -602,6 +602,35 @@ test('plant, alarms and work list agree on order, counts and silence',
       }
     });
 
+test('labels of axes are the values of their lines', async () => {
+  monitor.reset();
+  const page = await openShared(browser, address, '#/');
+  const labels = await page.evaluate(async () => {
+    const {numberLabels} = await import('/js/charts/panel.js');
+    return [[62.5, 65, 67.5], [-20, 0, 20], [0, 0.25, 0.5], [0, 0.2, 0.4]]
+        .map((splits) => numberLabels(null, splits));
+  });
+  assert.deepEqual(labels, [['62.5', '65.0', '67.5'], ['−20', '0', '20'],
+    ['0.00', '0.25', '0.50'], ['0.0', '0.2', '0.4']]);
+  await close(page);
+});
+
+test('a history without episodes shows no empty tables and no odd axis',
+    async () => {
+      monitor.reset();
+      monitor.answers.history = {episodes: [], more: false};
+      monitor.answers.statistics = {per_day: [], valves: [], faults: [],
+        labelled: {true: 0, false: 0, none: 0}, most_in_10_min: 0, gaps: []};
+      const page = await openShared(browser, address, '#/history');
+      await page.getByText('No episode fits the question.').waitFor();
+      await page.locator('.bars').nth(1).waitFor();
+      assert.equal(await page.locator('thead:visible').count(), 0);
+      for (const text of await page.locator('.bars text').allTextContents()) {
+        assert.doesNotMatch(text, /e/);
+      }
+      await close(page);
+    });
+
 test('groups have counts and select their valves', async () => {
   monitor.reset([tile('U1-FV-1', 'NORMAL'), tile('U1-FV-2', 'ISOLATED',
       ['f19']), tile('U2-LV-1A', 'NORMAL')]);

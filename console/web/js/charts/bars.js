@@ -27,7 +27,7 @@ function gridLines(max, step, yOf) {
 
 /** `bars`: [{name, value}]; whole numbers have whole steps. */
 export function barChart(title, unit, bars, whole = false) {
-  const most = Math.max(...bars.map((bar) => bar.value), whole ? 3 : 1e-9);
+  const most = Math.max(...bars.map((bar) => bar.value), whole ? 3 : 0) || 1;
   const step = Math.max(stepFor(most), whole ? 1 : 0);
   const max = Math.ceil(most / step) * step;
   const yOf = (value) =>

@@ -26,11 +26,13 @@ function timeLabels(u, splits) {
   });
 }
 
-// As many decimals as the steps have.
-function numberLabels(u, splits) {
+// As many decimals as the steps have: one of 2.5 has one.
+export function numberLabels(u, splits) {
   const step = splits.length > 1 ? Math.abs(splits[1] - splits[0]) : 1;
-  const decimals =
-    Math.min(6, Math.max(0, -Math.floor(Math.log10(step) + 1e-9)));
+  const power = Math.floor(Math.log10(step) + 1e-9);
+  const digits = step / 10 ** power;
+  const halves = Math.abs(digits - Math.round(digits)) > 1e-6 ? 1 : 0;
+  const decimals = Math.min(6, Math.max(0, halves - power));
   return splits.map((v) => (v + 0).toFixed(decimals).replace('-', '−'));
 }
 

@@ -38,6 +38,8 @@ class History extends View {
   #asked = 0;  // Only the last question is answered.
   #inputs;
   #body = h('tbody', {role: 'rowgroup'});
+  #table = dataTable('Episodes, newest first', kColumns, [],
+      {layout: 'cards', body: this.#body});
   #found = h('p', {class: 'note', role: 'status'});
   #more = button('Older ones', () => this.#fetchRows(true), {hidden: true});
   #statistics = h('div', {});
@@ -51,8 +53,7 @@ class History extends View {
         h('div', {class: 'controls'}, h('h2', {}, 'Episodes'), this.#found,
             button('Save as CSV', () => download('episodes.csv',
                 new Blob([csvOf(kSaved, this.#rows)], {type: 'text/csv'})))),
-        dataTable('Episodes, newest first', kColumns, [],
-            {layout: 'cards', body: this.#body}), this.#more);
+        this.#table, this.#more);
     this.on(store, 'tiles', (ids) => {
       if (ids === null) this.#fillFaults(query.get('fault') ?? '');
     });
@@ -149,6 +150,7 @@ class History extends View {
       this.#rows.push(...episodes);
       this.#body.append(...episodes.map((row) => bodyRow(kColumns, row)));
       this.#more.hidden = !more;
+      this.#table.hidden = this.#rows.length === 0;
       setText(this.#found, this.#rows.length === 0 ?
         'No episode fits the question.' :
         `${this.#rows.length}${more ? ' newest' : ''}`);

@@ -94,7 +94,8 @@ export function statisticsSection(figures, time) {
             ({name: day.day, value: day.episodes})), true),
           barChart('Time in alarm per day [h]', 'h', drawn.map((day) =>
             ({name: day.day, value: day.alarm_s / 3600}))),
-          valveTable(figures.valves), faultTable(figures.faults)),
+          figures.valves.length > 0 && valveTable(figures.valves),
+          figures.faults.length > 0 && faultTable(figures.faults)),
       h('p', {class: 'hint'}, 'Days are UTC. Chattering: episodes that came ' +
         'three times or more within half an hour; standing: those that ' +
         'lasted more than a day.'));
