@@ -1155,6 +1155,9 @@ test('every other view and dialog can be read, at any size, light and dark',
           await page.goto(`${address}/${hash}`);
           await page.locator(seen).first().waitFor();
           await checkReadable(page, `${hash} ${width}`);
+          for (const text of await page.locator('.bars text').all()) {
+            assert.ok((await text.boundingBox()).height >= 9, hash);
+          }
           if (width === 390) continue;
           await page.setViewportSize({width: 1280, height});
           await checkReadable(page, `${hash} 1280`, false);

@@ -6,7 +6,7 @@ import {numberText} from '../format.js';
 const kWidth = 640;
 const kHeight = 150;
 const kLeft = 44;
-const kBottom = 20;
+const kBottom = 24;
 
 // 1, 2 or 5 times a power of ten, so that about three lines are drawn.
 function stepFor(max) {
@@ -42,7 +42,7 @@ export function barChart(title, unit, bars, whole = false) {
       width: 0.8 * wide, height: Math.max(0, kHeight - kBottom - yOf(value))},
     svg('title', {}, `${name}: ${numberText(value)} ${unit}`)),
     i % every === 0 ? svg('text', {'x': kLeft + (i + 0.5) * wide,
-      'y': kHeight - 5, 'text-anchor': 'middle'}, name.slice(5)) : null]));
+      'y': kHeight - 3, 'text-anchor': 'middle'}, name.slice(5)) : null]));
   return h('figure', {}, h('figcaption', {}, title), chart,
       h('details', {}, h('summary', {}, 'As a table'),
           h('table', {class: 'small'},

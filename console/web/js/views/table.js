@@ -1,4 +1,5 @@
-// Tables by declaration of their columns: {text, cell(row), class, header}.
+// Tables by declaration of their columns: {text, cell(row), class, header,
+// said}; `said` where a card needs the title of the column, too.
 
 import {h} from '../dom.js';
 import {certaintyNode, faultNodes, faultTitle, groupName, members, moreText,
@@ -15,9 +16,10 @@ export function headRow(list) {
 
 export function bodyRow(list, row, attributes = {}) {
   return h('tr', {role: 'row', ...attributes}, list.map(
-      ({header, cell, class: name}) => h(header ? 'th' : 'td', {
-        class: name, scope: header ? 'row' : null,
-        role: header ? 'rowheader' : 'cell'}, cell(row))));
+      ({header, cell, said, text, class: name}) => h(header ? 'th' : 'td', {
+        'class': name, 'scope': header ? 'row' : null,
+        'data-said': said ? text : null,
+        'role': header ? 'rowheader' : 'cell'}, cell(row))));
 }
 
 /**
@@ -123,7 +125,7 @@ export const columns = {
   fault: {text: 'Fault', class: 'fault', cell: faultCell},
   group: {text: 'State', class: 'remark', cell: (row) => [
     groupName(row), h('div', {class: 'number'}, personText(row))]},
-  lasted: {text: 'Lasted', class: 'num', cell: lastedText},
+  lasted: {text: 'Lasted', class: 'num', said: true, cell: lastedText},
   certainty: {text: 'How sure', cell: (row) =>
     certaintyNode(row, '')},
   strength: {text: 'Strength', cell: (row) =>

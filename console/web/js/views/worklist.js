@@ -65,17 +65,17 @@ const kRows = [
 const kShared = [
   {text: 'Share', header: true, cell: (row) => row.shares},
   {text: 'Group', cell: (row) => row.group ?? '–'},
-  {text: 'Faults', cell: (row) => 
+  {text: 'Faults', said: true, cell: (row) => 
     row.faults.map((fault) => faultTitle(fault)).join(', ') || '–'},
-  {text: 'Since', cell: (row) => utcCell(row.since_utc)},
-  {text: 'Ended', cell: (row) => utcCell(row.ended_utc)},
-  {text: 'Loops', cell: (row) => row.valve_ids.map((valve, i) =>
+  {text: 'Since', said: true, cell: (row) => utcCell(row.since_utc)},
+  {text: 'Ended', said: true, cell: (row) => utcCell(row.ended_utc)},
+  {text: 'Loops', said: true, cell: (row) => row.valve_ids.map((valve, i) =>
     [i > 0 ? ', ' : null, valveLink(valve)])},
 ];
 
 const kUnjudged = [
   {text: 'Loop', header: true, cell: (row) => valveLink(row.valve_id)},
-  {text: 'Judged', class: 'num', cell: (row) =>
+  {text: 'Judged', class: 'num', said: true, cell: (row) =>
     `${number(100 * row.judged_share, 1)} %`},
   {text: 'Mostly because', class: 'remark', cell: (row) => row.reason},
 ];
@@ -83,17 +83,17 @@ const kUnjudged = [
 const kDone = [
   {text: 'Valve', header: true, cell: (row) => valveLink(row.valve_id)},
   {text: 'Finding', cell: findingCell},
-  {text: 'Done', cell: (row) => utcCell(row.done_utc)},
-  {text: 'By', cell: (row) => row.who ?? '–'},
+  {text: 'Done', said: true, cell: (row) => utcCell(row.done_utc)},
+  {text: 'By', said: true, cell: (row) => row.who ?? '–'},
   {text: 'What', class: 'remark', cell: (row) => row.what},
 ];
 
 const kShelved = [
   {text: 'Valve', header: true, cell: (row) => valveLink(row.valve_id)},
-  {text: 'Fault', cell: (row) =>
+  {text: 'Fault', said: true, cell: (row) =>
     row.fault ? faultTitle(row.fault) : 'any'},
-  {text: 'Until', cell: (row) => utcCell(row.until_utc)},
-  {text: 'By', cell: (row) => row.who},
+  {text: 'Until', said: true, cell: (row) => utcCell(row.until_utc)},
+  {text: 'By', said: true, cell: (row) => row.who},
   {text: 'Comment', class: 'remark', cell: (row) => row.comment ?? '–'},
 ];
 
