@@ -1058,7 +1058,7 @@ test('every kind of tile can be read, at any size, light and dark',
       tile('FV-4', 'NOT_JUDGED', [], {quality: 'STALE', stamp_ms: 1}),
       tile('FV-6', 'NOT_JUDGED', [], {quality: 'SETTLING', active: true,
         reasons: 'waiting', fault: 'f19|f6', since_ms: 1, strength: 0.5}),
-      tile('LV-5', 'NORMAL')],
+      tile('LV-5', 'NORMAL'), tile('LV-7', 'NORMAL', [], {notice: true})],
       [alarm(episode, 'FV-1', 'f19|f6', {label: 'f6', check: 'Look.'}),
         alarm('0000000000000002', kLongId, 'f19|f6', {label: 'f6',
           check: kWork.check})]);
