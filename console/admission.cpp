@@ -156,7 +156,7 @@ bool Admission::Authorize(const httplib::Request& request,
   const std::optional<Visitor> visitor = VisitorOf(request);
   if (!visitor) {
     Refuse(request, response, "read_only",
-           "this address is read-only: whoever acts comes through the proxy "
+           "this address is read-only: to act, come through the proxy "
            "(docs/console.md, The page beyond this host)");
     return false;
   }

@@ -582,9 +582,9 @@ void RowReader::AddAudits() {
   }
 }
 
-// "in work since 3 days, order 4711, expected back in 2 days"
+// "in work for 3 days, order 4711, expected back in 2 days"
 std::string OrderText(const Repair& order, std::int64_t now_ns) {
-  std::string text = "in work since " + SpanText(now_ns - order.at_ns);
+  std::string text = "in work for " + SpanText(now_ns - order.at_ns);
   if (!order.order.empty()) {
     text += ", order " + order.order;
   }

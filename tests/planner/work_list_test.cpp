@@ -306,7 +306,7 @@ TEST_F(WorkListTest, WhatIsInWorkStaysWithItsOrderUntilItIsDone) {
     EXPECT_EQ(row["done_utc"], nullptr);
     EXPECT_THAT(
         row["why"].get<std::string>(),
-        HasSubstr("; in work since 23 h, order 4711, expected back in 2 days"));
+        HasSubstr("; in work for 23 h, order 4711, expected back in 2 days"));
   }
   query_.now_ns = kDetected + 5 * kDay;
   EXPECT_THAT(Rows()[0]["why"].get<std::string>(),
