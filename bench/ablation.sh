@@ -243,7 +243,8 @@ done
 
 # Flow that is lost with the pressure, in four seconds, while the command is
 # what it was; and a trim that fills until next to nothing passes.
-if is_wanted lost-flow; then
+for n in 1 2; do
+  is_wanted lost-flow-$n || continue
   own_set
   files=()
   for share in .01 .03 .1; do
@@ -252,19 +253,43 @@ if is_wanted lost-flow; then
         $3 = $4 + (1 - away * (1 - share)) * ($3 - $4) }
       { print $1, $2, $3, $4, $5, $6, $7 }' <(head -n 2402 \
       "$dir/runs/own-healthy.csv") >"$dir/pump-$share.in"
-    simulate "pump-$share" 31000 2400 --excitation "csv:$dir/pump-$share.in"
-    files+=("$dir/runs/pump-$share.csv")
+    simulate "pump-$n-$share" 3${n}000 2400 \
+      --excitation "csv:$dir/pump-$share.in"
+    files+=("$dir/runs/pump-$n-$share.csv")
   done
-  for n in 1 2; do
-    simulate grown-$n $((31100 + n)) 9000 "${level_loop[@]}" \
+  for k in 1 2; do
+    simulate grown-$n-$k 3${n}10$k 9000 "${level_loop[@]}" \
       --fault f2:incipient@900+5400:strength=1
-    files+=("$dir/runs/grown-$n.csv")
+    files+=("$dir/runs/grown-$n-$k.csv")
   done
-  ablate lost-flow own "${files[@]}"
+  ablate lost-flow-$n own "${files[@]}"
   once three "$bin/fdi-trainer" onboard --valve three --no-coverage \
     --signals CV,X,F --file "$dir/runs/own-healthy.csv"
-  ablate lost-flow-of-three three "${files[@]}"
-fi
+  ablate three-lost-flow-$n three "${files[@]}"
+done
+
+# Valves whose physics is 15 % off the data sheet that onboarding starts from
+# (bench/set_calibration.sh), so that effects are off by a share.
+n=0
+for off in trim.kv_m3_h=102 trim.kv_m3_h=138 positioner.gain=85 \
+  actuator.supply_pressure_gauge_pa=510e3; do
+  n=$((n + 1))
+  is_wanted perturbed-$n || continue
+  valve=(--excitation level-loop --set "parameters.$off")
+  seed=93${n}00
+  simulate perturbed-healthy-$n $seed 7200 "${valve[@]}"
+  once perturbed-$n "$bin/fdi-trainer" onboard --valve perturbed-$n \
+    --no-coverage --file "$dir/runs/perturbed-healthy-$n.csv"
+  files=()
+  for fault in f1=.6 f2=.35 f2=.85 f3=.4 f3=.9 f4=.6 f5=.85 f6=.35 f7=.6 f10=.4 \
+    f11=.85 f12=.65 f13=.2 f13=-.4 f15=.35 f16=.6 f17=.35 f18=.35 f19=.2 f19=-.35; do
+    seed=$((seed + 1))
+    simulate "perturbed-$n-$fault" $seed 2400 "${valve[@]}" \
+      --fault "${fault%%=*}:abrupt@1200:strength=${fault#*=}"
+    files+=("$dir/runs/perturbed-$n-$fault.csv")
+  done
+  ablate perturbed-$n perturbed-$n "${files[@]}"
+done
 
 # Columns with looks: the given loop; weak faults, which the observers name now
 # and then; and a valve with 500 N of friction that is known without its
