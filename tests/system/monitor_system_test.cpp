@@ -1,6 +1,7 @@
 // The built fdi-monitor as a process of its own, over DDS on loopback; this
 // process publishes the samples and reads bus and databases.
 
+#include <cmath>
 #include <csignal>
 #include <fstream>
 #include <iterator>
@@ -8,6 +9,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "base/time_text.h"
+#include "storage/history/health.h"
+#include "storage/history/history_database.h"
 #include "storage/history/history_reader.h"
 #include "storage/runs/runs.h"
 #include "tests/system/monitor_fixture.h"
@@ -48,6 +52,69 @@ TEST_F(MonitorSystemTest, AFaultOnTheBusIsOnTheBusAndInTheHistory) {
   EXPECT_EQ(episodes[0].end_reason, "stream_ended");
   EXPECT_EQ(history.Trace(episodes[0].id).size(), 80U);
   EXPECT_TRUE(history.Sessions().at(0).clean);
+}
+
+// Three valves that show four times a limit in every fifth of their hours.
+void StoreCommonHours(const std::filesystem::path& history) {
+  std::vector<HealthHour> hours;
+  const std::int64_t newest = NowNs() / 3'600'000'000'000;
+  for (const char* valve : {"V1", "V2", "V3"}) {
+    for (int i = 0; i < 300; ++i) {
+      HealthHour& hour = hours.emplace_back();
+      hour.valve_id = valve;
+      hour.hour = newest - 300 + i;
+      hour.model_hash = LinearModels().content_hash;
+      hour.seen_ms = hour.live_ms = 3'600'000;
+      hour.share = std::llround(3680.0 - 200.0 * std::log((i + 0.5) / 300.0));
+    }
+  }
+  storage::Database database(history, storage::HistorySchema(),
+                             storage::Access::kWriter);
+  storage::Transaction transaction(database);
+  storage::StoreHealth(database, hours);
+  transaction.Commit();
+}
+
+TEST_F(MonitorSystemTest, WhatIsCommonIsANoticeUntilItIsRare) {
+  StoreModels(directory_.path(), LinearModels());
+  std::filesystem::create_directories(data_);
+  StoreCommonHours(data_ / "history.db");
+  std::ofstream(data_ / "hook") << "#!/bin/sh\ncat >>" << data_ / "told";
+  std::filesystem::permissions(data_ / "hook",
+                               std::filesystem::perms::owner_all);
+  const auto monitor =
+      StartMonitor({"--model-set", "linear", "--alarm-budget", "1/year",
+                    "--on-event", (data_ / "hook").string()});
+  EXPECT_THAT(monitor->errors(), testing::HasSubstr("alarm_budget"));
+  const auto state = [this] {
+    const std::vector<storage::Episode> episodes = History().List();
+    return episodes.empty() ? "" : (episodes[0].notice ? "notice" : "alarm");
+  };
+
+  Publish(0, 50);
+  Publish(50, 80, kF7Offset);
+  ASSERT_TRUE(AwaitVectors(80));
+  ASSERT_TRUE(Await([&] { return state() == std::string("notice"); }));
+  EXPECT_TRUE(faults_.empty());
+
+  Publish(80, 110, 45.0);  // Nine times the limit.
+  ASSERT_TRUE(Await([this] { return !faults_.empty(); }));
+  ASSERT_TRUE(Await([&] { return state() == std::string("alarm"); }));
+  samples_->Dispose({"V1", {}});
+  ASSERT_TRUE(AwaitEvent(TransitionKind::kClosed));
+  monitor->Signal(SIGTERM);
+  EXPECT_EQ(monitor->AwaitExit(), 0) << monitor->errors();
+
+  std::vector<std::string> kinds;
+  for (const storage::HistoryEntry& event :
+       History().Events(History().List().at(0).id)) {
+    kinds.push_back(event.kind);
+  }
+  EXPECT_THAT(kinds, testing::Contains("RAISED"));
+  std::ifstream file(data_ / "told");
+  const std::string told(std::istreambuf_iterator<char>(file), {});
+  EXPECT_THAT(told, testing::HasSubstr("RAISED")) << monitor->errors();
+  EXPECT_THAT(told, testing::Not(testing::HasSubstr("\"DETECTED\"")));
 }
 
 TEST_F(MonitorSystemTest, WithoutModelsItSaysWhatIsJudged) {
