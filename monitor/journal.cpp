@@ -19,7 +19,7 @@ constexpr std::size_t kPointsPerCommit = 5'000;
 // Number of open episodes extended per commit; each takes half a millisecond.
 constexpr int kTracesPerCommit = 100;
 
-// How long Stop() waits for the subscribers' acknowledgements of the last
+// Stop() waits this long for the subscribers' acknowledgements of the last
 // events. Unacknowledged ones are published again by the next session.
 constexpr std::chrono::milliseconds kLastDelivery{300};
 

@@ -30,7 +30,7 @@ struct JournalOptions {
   /// Queued events, gaps and marks; and events that wait for the bus.
   std::size_t max_records{100'000};
   std::size_t max_trace_points{2'000'000};  ///< Queued evidence.
-  /// Whether all current subscribers acknowledge, within the timeout, what was
+  /// True if all current subscribers acknowledge, within the timeout, what was
   /// published.
   std::function<bool(std::chrono::milliseconds)> acknowledged{
       [](std::chrono::milliseconds) { return true; }};

@@ -40,11 +40,11 @@ struct PipelineOptions {
   std::chrono::milliseconds checkpoint_period{60'000};
   JournalOptions journal;
   bool second_look{true};       ///< By simulation, for model sets with physics.
-  bool loop_audit{true};        ///< Of valves without a model set.
-  bool audit_all_loops{false};  ///< And of those with one.
-  /// By which episodes get their severity; without bands all are medium.
+  bool loop_audit{true};        ///< For valves without a model set.
+  bool audit_all_loops{false};  ///< And for those with one.
   /// Tells which episodes are alarms; null: all.
   std::shared_ptr<const AlarmGate> alarms{};
+  /// Gives episodes their severity; without bands all are medium.
   std::shared_ptr<const SeverityCatalogue> severities{
       std::make_shared<const SeverityCatalogue>()};
 };
@@ -151,7 +151,7 @@ class Pipeline {
            (audits_ && audits_->failed());
   }
   ValveCensus census() const;                    ///< As of the last Poll().
-  std::vector<std::string> valve_names() const;  ///< Of all valves seen.
+  std::vector<std::string> valve_names() const;  ///< All valves seen.
   bool history_degraded() const { return journal_.degraded(); }
   Journal::Backlog journal_backlog() const { return journal_.backlog(); }
   /// Diagnosis and history.
@@ -163,7 +163,7 @@ class Pipeline {
   struct Valve {
     ValveMonitor monitor;
     bool known;             // Never evicted.
-    SignalMask missing{0};  // Of an accepted sample; said when it changes.
+    SignalMask missing{0};  // In an accepted sample; logged when it changes.
   };
   struct Hash {
     using is_transparent = void;
@@ -203,7 +203,7 @@ class Pipeline {
   std::unique_ptr<LookWorker> looks_;    // Null: no second looks.
   std::unique_ptr<AuditWorker> audits_;  // Null: no audits.
   std::vector<ValveListener*> listeners_;
-  std::vector<std::unique_ptr<ValveListener>> owned_;  // Of listeners_.
+  std::vector<std::unique_ptr<ValveListener>> owned_;  // Part of listeners_.
   EnginePlans plans_;
 
   std::vector<std::unique_ptr<Valve>> valves_;  // In order of first samples.
@@ -212,7 +212,7 @@ class Pipeline {
   std::unordered_set<std::string, Hash, std::equal_to<>> reserved_;
   std::vector<Valve*> idle_;  // Silent unknown valves, as of the last Poll().
   std::unordered_set<std::size_t> refused_;  // Hashes of ids.
-  // What is known of the episodes of valves without a slot.
+  // The known episodes of valves without a slot.
   std::unordered_map<std::string, EpisodeTracker> recovered_;
   std::unordered_map<std::string, Accumulator> accumulators_;
   std::optional<TimePoint> recovery_deadline_;  // Empty: none is left.

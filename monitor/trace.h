@@ -28,7 +28,7 @@ class Trace {
   void Push(const Sample& sample, const Verdict& verdict, int channels,
             int faults);
 
-  /// Whether source, signals, model sizes and isolated set are unchanged.
+  /// True if source, signals, model sizes and isolated set are unchanged.
   bool Continues(const Sample& sample, const Verdict& verdict, int channels,
                  int faults) const;
 

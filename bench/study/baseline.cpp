@@ -59,7 +59,7 @@ LinearModel FitLinear(std::string name, Signal output,
                     " samples of normal operation do not suffice for " +
                     std::to_string(data.x.cols()) + " regressors");
   }
-  // Of columns scaled to mean 0 and deviation 1,
+  // With columns scaled to mean 0 and deviation 1, the fit is
   //
   //     a' = (XᵀX/N + 1e-6 I)⁻¹ Xᵀy/N,   a_j = a'_j/σ_j,   b = ȳ − aᵀx̄.
   //

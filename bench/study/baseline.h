@@ -121,10 +121,10 @@ using Signature = std::vector<int>;
 /// signatures that each fault was seen with.
 struct Baseline {
   std::string name;
-  double period_s{1.0};  ///< Of the samples that it was fitted to.
+  double period_s{1.0};  ///< Period of the samples it was fitted to.
   BaselineOptions options;
   std::vector<LinearModel> models;
-  std::vector<double> limits;  ///< Of the tests, one per model.
+  std::vector<double> limits;  ///< Limits of the tests, one per model.
   /// Faults by signature, ascending; empty: the baseline detects only.
   std::map<Signature, std::vector<int>> table;
 };
@@ -171,8 +171,8 @@ class BaselineDetector {
   std::vector<LinearPredictor> predictors_;
   std::vector<Cusum> tests_;
   Signature signature_;
-  Signature standing_;  // Of the last samples.
-  int stands_{0};       // For so many samples.
+  Signature standing_;  // Signature of the last samples.
+  int stands_{0};       // Number of these samples.
   int samples_{0};
   int quiet_{0};
   bool detected_{false};

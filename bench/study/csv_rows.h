@@ -20,8 +20,8 @@ class CsvRows {
 
   std::size_t size() const { return rows_.size(); }
 
-  /// Of the columns in the order asked for, required ones first; empty for an
-  /// optional column that is not there.
+  /// The columns count in the order asked for, required ones first; the cell of
+  /// an optional column that is not there is empty.
   const std::string& Cell(std::size_t row, std::size_t column) const;
   /// @throws DataError unless the cell is a finite number.
   double Number(std::size_t row, std::size_t column) const;

@@ -82,8 +82,8 @@ std::vector<EvaluatedRun> RunsOf(const FaultGroup& group,
 ConfusionMatrix BuildConfusion(const std::vector<EvaluatedRun>& runs,
                                const std::vector<FaultGroup>& groups) {
   // Every group that was true has a row and a column, every other group that
-  // was named a column. Of the last two columns the first counts runs that were
-  // detected without a fault being named, the second those without an alarm.
+  // was named a column. The last two columns count runs that were detected
+  // without a fault being named, and those without an alarm.
   std::set<FaultGroup> rows;
   std::set<FaultGroup> columns;
   for (const EvaluatedRun& run : runs) {

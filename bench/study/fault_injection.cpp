@@ -64,8 +64,8 @@ SignalMask UnionOf(const FaultInjection& injection,
   return static_cast<SignalMask>(all);
 }
 
-// What the flow through the faulty trim is more than through the healthy one,
-// as the transmitter of `sample` would see it. The external leak stays out:
+// The flow through the faulty trim minus that through the healthy one, as the
+// transmitter of `sample` would see it. The external leak stays out:
 // ChangeReadings() takes it from the whole flow.
 double AddedFlow(ValveParameters valve, const Sample& sample,
                  const FaultEffects& effects) {
@@ -111,7 +111,7 @@ bool AllFinite(const Sample& sample, SignalMask signals) {
   return true;
 }
 
-// What of the faults is not in the result, for people.
+// Tells people which effects of the faults the result lacks.
 std::vector<std::string> LeftOut(const FaultInjection& injection) {
   std::vector<std::string> left_out;
   if ((ChangedSignals(injection) & kOfF) != 0) {

@@ -62,7 +62,7 @@ struct InjectedRun {
   std::vector<std::string> faults;
   std::vector<std::string> left_out;  ///< Effects that are missing, in words.
   std::int64_t faulty{0};             ///< Samples with a fault.
-  std::int64_t at_limit{0};  ///< Of them, with the flow at its range's end.
+  std::int64_t at_limit{0};  ///< Those with the flow at its range's end.
 };
 
 /// Puts the faults onto all samples of a stored run or stretch, which is not

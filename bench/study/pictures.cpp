@@ -31,7 +31,7 @@ namespace {
 
 constexpr std::size_t kFewResiduals = 20;  // As in the calibration.
 constexpr double kSameStrength = 1e-3;
-constexpr int kPoints = 561;  // Of a fuzzy set.
+constexpr int kPoints = 561;  // On the curve of a fuzzy set.
 constexpr int kBars = 56;
 
 // The runs of ModelSet::training_runs that can be read; `missing` tells why

@@ -459,13 +459,13 @@ class ReportPage::RunPicture {
   const ModelSet& models_;
   double duration_s_;
   std::optional<std::int64_t> first_stamp_ns_;  // t = 0
-  std::vector<double> time_s_;  // Of the accepted samples, as all that follow.
+  std::vector<double> time_s_;  // By accepted sample, like all that follow.
   std::vector<bool> settling_;
-  std::vector<std::vector<double>> signals_;    // Of kShown [its unit].
+  std::vector<std::vector<double>> signals_;    // By kShown [its unit].
   std::vector<std::vector<double>> residuals_;  // By channel [its unit].
   std::vector<double> normal_factor_;
   std::vector<std::vector<double>> fault_factors_;  // By fault index.
-  std::vector<double> peaks_;  // Of the factors while an episode was open.
+  std::vector<double> peaks_;  // Largest factors while an episode was open.
 };
 
 ReportPage::ReportPage(const ModelSet& models, report::FaultTexts texts,

@@ -27,10 +27,10 @@ struct ScoringOptions {
   bool assume_normal{false};
   int seeds{0};
   std::vector<std::string> verdicts;  // Files, one per run.
-  std::string baseline;               // Of BaselineNames().
+  std::string baseline;               // One of BaselineNames().
   BaselineOptions fit;
-  std::vector<std::string> train_runs;   // Of the baseline.
-  std::vector<std::string> train_files;  // Of the baseline.
+  std::vector<std::string> train_runs;   // For the baseline.
+  std::vector<std::string> train_files;  // For the baseline.
 };
 
 storage::ModelStore OpenModels(const report::Context& context,

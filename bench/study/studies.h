@@ -9,14 +9,14 @@
 /// Evaluations that repeat: with other seeds, or without each fault in turn.
 namespace fdi::trainer::study {
 
-/// How the runs of one fault ended for a set that does not know it.
+/// The ends of the runs of one fault for a set that does not know it.
 struct LeftOutFault {
   int fault{0};
   int runs{0};
   int detected{0};
   int unknown{0};        ///< Detected, and no fault named.
-  int wrongly_named{0};  ///< Whatever is named is wrong.
-  int as_look_alike{0};  ///< Of these, only faults of its group were named.
+  int wrongly_named{0};  ///< Every named fault is wrong.
+  int as_look_alike{0};  ///< Those that name only faults of its group.
   std::map<std::vector<int>, int> named;  ///< Final sets and their number.
 };
 

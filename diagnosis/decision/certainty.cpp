@@ -15,7 +15,7 @@ constexpr double kAgreeingFactor = 0.5;
 constexpr double kWeak = 0.06;
 constexpr int kExternalLeak = 5;
 
-// Whether KnownFaults() have `name`, with that sign if it is not 0.
+// True if KnownFaults() have `name`, with that sign if it is not 0.
 bool Knows(const std::vector<std::string>& known, const std::string& name,
            int sign) {
   return std::ranges::any_of(known, [&](std::string_view one) {

@@ -10,7 +10,7 @@
 
 namespace fdi {
 
-/// How certain the name of an episode is, in the words that every view shows
+/// The certainty of the name of an episode, in the words that every view shows
 /// instead of numbers.
 enum class Certainty : std::uint8_t {
   kNotYet,    ///< It is too early to say.

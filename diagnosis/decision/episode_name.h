@@ -27,7 +27,7 @@ enum class NameSource : std::uint8_t {
   kRestart,    ///< An earlier session; it still stands.
 };
 
-/// How strong one fault of a name is.
+/// One fault of a name, with its strength.
 struct NamedFault {
   std::size_t bit{0};  ///< Index in the model set.
   Estimate estimate{};
@@ -93,8 +93,8 @@ class EpisodeName {
   ///   long as the engine's and until the next call.
   const Verdict& Step(const Inputs& inputs);
 
-  /// How strong faults of the name are by now; others are ignored. It is this
-  /// that tells whether the name gets more severe: the transition is added to
+  /// Takes the strengths of the name's faults by now and ignores others. Only
+  /// this tells whether the name gets more severe: the transition is added to
   /// verdict(). Points of the first fault get the severity of the name.
   void Follow(std::span<StrengthPoint> points);
 

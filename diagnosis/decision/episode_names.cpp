@@ -127,7 +127,7 @@ void EpisodeNames::FollowStrengths(const Verdict& engine) {
   told_ = std::exchange(strength_points_, {});
 }
 
-// Whether a fault of the name is not as strong any more as it is said to be.
+// True if a fault of the name is no longer as strong as it is said to be.
 bool EpisodeNames::HasMoved(const std::vector<StrengthPoint>& points) const {
   return std::ranges::any_of(points, [this](const StrengthPoint& point) {
     const auto& named = name_.now().estimates;

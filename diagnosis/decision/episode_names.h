@@ -49,7 +49,7 @@ class EpisodeNames {
   /// See EpisodeName::beside().
   const NameBeside& beside() const { return name_.beside(); }
 
-  /// Whether the engine should have an episode: ValveEngine::Suspect().
+  /// True if the engine should have an episode: ValveEngine::Suspect().
   bool suspects() const { return looks_ && looks_->suspects() && !held_; }
 
   /// The name of the open episode as of the last Step().

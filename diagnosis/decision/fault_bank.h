@@ -62,7 +62,7 @@ class FaultBank {
   /// or does not fit it so far.
   FaultSet Unrefuted(double margin) const;
 
-  /// Whether P1, P2 or T1 has moved as each of these faults always moves it.
+  /// True if P1, P2 or T1 has moved as each of these faults always moves it.
   bool ShownByInputs(FaultSet faults) const;
 
   /// The faults that a taught observer explains, and within `margin` as well as

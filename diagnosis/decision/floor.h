@@ -52,9 +52,9 @@ double FlowShapeAt(const FloorLimits& floor, double x);
 /// F(X, P1 − P2) of the floor; `dp` may be negative.
 double FlowAt(const FloorLimits& floor, double x, double dp);
 
-/// What the opening passes at least, before the share of the floor: F(X +
-/// deviation/2, dp), but no more than the record has shown, with less pressure
-/// less. An opening beyond the record passes what the widest one there did.
+/// The least flow through the opening, before the share of the floor: F(X +
+/// deviation/2, dp), but no more than the record has shown, and less with less
+/// pressure. An opening beyond the record counts as the widest one there.
 double LeastFlowAt(const FloorLimits& floor, double x, double dp);
 /// Command and rod shut the valve.
 bool IsShut(double x, double cv);
@@ -89,11 +89,11 @@ class Floor {
 
   /// The current findings; always empty without a floor.
   FaultSet findings() const { return findings_; }
-  /// What is beyond its limit, but not for long enough yet.
+  /// Tests that are beyond their limit, but not for long enough yet.
   FaultSet beginning() const { return beginning_; }
   /// Stamp of the first sample of the earliest current finding.
   std::optional<std::int64_t> stamp_ns() const;
-  /// How far a finding is from its model, as a signed share of the span.
+  /// The distance of a finding from its model, as a signed share of the span.
   double size(std::size_t finding) const { return tests_[finding].size; }
   static constexpr std::size_t kTests = 6;
   /// The largest share of its limit that a test of the last sample has held for

@@ -27,18 +27,18 @@ struct LookWindow {
   std::vector<RecordRow> rows;  ///< At least 20, with X or F measured in 20.
   std::size_t detection{0};     ///< Row of the first abnormal sample; 0 if it
                                 ///< lies before the window.
-  SignalMask signals{0};        ///< That were measured.
+  SignalMask signals{0};        ///< The measured ones.
   /// A fault that acts all the time; the one sought comes on top of it. 0:
   /// none.
   int standing{0};
   double standing_strength{0.0};  ///< Signed [-].
   /// The command of the rows is the position that was read
-  /// (PositionAsCommand): faults of which only the rod's way to it tells are no
+  /// (PositionAsCommand): faults that only the rod's way to it shows are no
   /// hypotheses.
   bool at_position{false};
 };
 
-/// How one fault, at its best, explains the window.
+/// The best explanation of the window by one fault.
 struct Explanation {
   int fault{0};          ///< 0: none, but for a constant shift of X or F.
   double strength{0.0};  ///< Most likely; signed [-].
@@ -50,7 +50,7 @@ struct Explanation {
   double supply{1.0};    ///< Supply pressure, as a share of the onboarded one.
 };
 
-/// How each fault explains a window.
+/// The explanations of a window by all faults.
 struct SecondLook {
   /// All hypotheses, best first.
   std::vector<Explanation> ranked;
@@ -123,12 +123,12 @@ struct LookTask {
 /// period: this is the factor, at least 1.
 std::int64_t SlownessOf(double period_s);
 
-/// Whether one of `explanations` is by `fault`.
+/// True if one of `explanations` is by `fault`.
 inline bool Explains(const std::vector<Explanation>& explanations, int fault) {
   return std::ranges::count(explanations, fault, &Explanation::fault) > 0;
 }
 
-/// How a second look answers.
+/// The kinds of answer that a second look gives.
 enum class LookOutcome : std::uint8_t {
   kNamed,     ///< The set stands; inseparable faults are in it together.
   kUnclear,   ///< More than four faults explain the window: a shortlist.

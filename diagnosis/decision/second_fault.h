@@ -45,7 +45,7 @@ class SecondFaultWatch {
   /// The next judged sample of an open episode, before Episode::Step().
   void Judge(const Sample& sample, const ObserverBank& bank);
 
-  /// How Episode::Step() has to take this sample.
+  /// Tells how Episode::Step() has to take this sample.
   Episode::NameHold hold() const;
   /// The first fault is gone and the second one is left: the episode is over.
   bool outlived() const { return outlived_; }

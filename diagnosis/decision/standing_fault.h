@@ -14,7 +14,7 @@ struct StandingFault {
   double strength{0.0};               ///< |s|
 };
 
-/// How a standing fault changes the predictions for one sample, by channel.
+/// The effect of a standing fault on the predictions for one sample by channel.
 ///
 /// Effects on rod and flow multiply, those on every other output add up,
 ///

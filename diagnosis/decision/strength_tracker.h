@@ -51,7 +51,7 @@ class StrengthTracker {
   /// For the best explanation, tracked or trained.
   double strength(const ObserverEvidence& trained) const;
   double evidence(const ObserverEvidence& trained) const;
-  /// How far that explanation lies from a trained strength, 4 |h (1 − h)| at a
+  /// The distance of that explanation to a trained strength, 4 |h (1 − h)| at a
   /// share h of the way between two of them: 0 at either, 1 midway and at most.
   double Interpolation(const ObserverEvidence& trained) const;
   /// The same of the tracked strength, whichever explains better.

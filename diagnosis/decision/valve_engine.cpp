@@ -102,7 +102,7 @@ Checked CheckValues(const ModelSet& models, SignalMask required,
   return checked;
 }
 
-// What Save() writes and Restore() reads, little endian and without padding:
+// Save() writes and Restore() reads this, little endian and without padding:
 //
 //     snapshot = format:u32 content_hash:u64 coverage windows drift doubt
 //     coverage = stamped:u8 last_stamp_ns:i64 armed:u8
@@ -118,7 +118,7 @@ constexpr std::uint32_t kSnapshotFormat = 6;
 // Samples in a row, until nothing is known.
 constexpr int kMaxUncertainRun = 60;
 
-// Whether the limits are so wide that every known fault looks normal.
+// True if the limits are so wide that every known fault looks normal.
 bool SeesNoFault(const ModelSet& models) {
   const auto known = std::ssize(models.faults) - FindingCount(models);
   return known > 0 && std::ssize(models.undetectable) >= known;
@@ -126,7 +126,7 @@ bool SeesNoFault(const ModelSet& models) {
 
 }  // namespace
 
-// What depends on the model set; replaced as a whole by Adopt().
+// The part that depends on the model set; Adopt() replaces it as a whole.
 struct Diagnosis {
   explicit Diagnosis(EngineParts parts)
       : plan(std::move(parts.plan)),
@@ -339,8 +339,8 @@ SignalMask ValveEngine::Impl::Single(const Checked& checked) const {
   return static_cast<SignalMask>(unusable | wrong);
 }
 
-// What was known of another source says nothing about this one; a snapshot
-// restored before the first source does.
+// Knowledge about another source says nothing about this one and is dropped; a
+// snapshot restored before the first source is kept.
 void ValveEngine::Impl::TakeSource(const Sample& sample) {
   if (episode_open()) {
     verdict_.transitions[0] = diagnosis_->episode.Close(
@@ -415,7 +415,7 @@ Quality ValveEngine::Impl::Judge(const Sample& sample) {
 void ValveEngine::Impl::Decide(const Sample& sample) {
   Detection& detection = diagnosis_->detection;
   const Floor& floor = diagnosis_->floor;
-  // What the windows may hold dates from before the valve was disarmed.
+  // Anything that the windows hold dates from before the valve was disarmed.
   if (diagnosis_->coverage.armed_now()) {
     detection.Restart();
   }
@@ -492,8 +492,8 @@ void ValveEngine::Impl::FindDrift(Findings& findings) {
   findings.sizes.at(bit - first) = drift.drift()->now / kFullTravel;
 }
 
-// What comes on top of a fault is told apart before the episode takes the
-// sample, because its name then stays.
+// A fault on top of another one is told apart before the episode takes the
+// sample, because the name of the episode then stays.
 void ValveEngine::Impl::StepEpisode(const Sample& sample,
                                     const Findings& findings) {
   Episode& episode = diagnosis_->episode;
@@ -508,7 +508,7 @@ void ValveEngine::Impl::StepEpisode(const Sample& sample,
   episode.HoldName(second.hold());
   episode.Step(sample, diagnosis_->bank, findings, verdict_);
   if (episode_open() && second.outlived()) {
-    // What is left opens an episode of its own.
+    // The fault that is left opens an episode of its own.
     episode.End(verdict_);
   }
   if (watched && episode_open()) {

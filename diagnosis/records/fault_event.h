@@ -31,7 +31,7 @@ std::vector<FaultCandidate> CandidatesOf(const ModelSet& models,
 struct FaultEvent {
   std::string valve_id;
   std::uint64_t source_id{0};
-  std::uint64_t seq{0};  ///< Of the sample at the transition.
+  std::uint64_t seq{0};  ///< Number of the sample at the transition.
   std::uint64_t episode_id{0};
   Transition transition;
   /// The faults that may explain the episode, largest factor first. When an
@@ -42,7 +42,7 @@ struct FaultEvent {
   int model_version{0};
   std::uint64_t model_hash{0};
   bool persisted{false};  ///< Committed to the history before it was published.
-  bool resent{false};     ///< Of an earlier session. Neither stored nor sent.
+  bool resent{false};     ///< From an earlier session. Neither stored nor sent.
   /// The model set that made the transition; null if an earlier session made
   /// it. Neither stored nor sent.
   std::shared_ptr<const ModelSet> models{};
@@ -72,7 +72,7 @@ constexpr TransitionKind OnTheBus(TransitionKind kind, bool named = true) {
   }
 }
 
-/// How bad the episode is by `event`: as its transition says, or else as the
+/// The severity of the episode by `event`: that of its transition, or else the
 /// gravest of the faults that it is named after.
 Severity SeverityOf(const FaultEvent& event,
                     const SeverityCatalogue& catalogue);
@@ -87,9 +87,9 @@ struct OpenEpisode {
   FaultSet faults{0};                      ///< The last isolated set, if any.
   std::vector<FaultCandidate> candidates;  ///< Its members.
   bool isolated{false};
-  Layer layer{Layer::kObservers};    ///< What named them.
+  Layer layer{Layer::kObservers};    ///< Layer that named them.
   std::optional<Severity> severity;  ///< As last stored.
-  SecondFault second;                ///< What was on top of them.
+  SecondFault second;                ///< Fault on top of them.
   double share{0.0};                 ///< As last stored (Verdict::share).
   bool notice{false};
   std::string model_set;

@@ -8,7 +8,7 @@
 
 namespace fdi {
 
-/// How fast |strength| changes, with its 95 % interval [1/day].
+/// The rate at which |strength| changes, with its 95 % interval [1/day].
 struct GrowthRate {
   double per_day{0.0};
   double lowest{0.0};
@@ -25,14 +25,14 @@ struct TimeToFull {
   double highest{0.0};
 };
 
-/// How one fault of an episode develops.
+/// The development of one fault of an episode.
 struct Growth {
   StrengthPoint last;
   std::optional<GrowthRate> rate;  ///< Nothing: too few points, or too short.
   std::optional<TimeToFull> full;  ///< Only if it grows, and is not full yet.
 };
 
-/// A rate needs as many points, which no reading is common to,
+/// A rate needs this many points, which share no reading,
 inline constexpr int kMinPoints = 3;
 /// over so much time.
 inline constexpr std::int64_t kMinSpanNs = 1'200'000'000'000;

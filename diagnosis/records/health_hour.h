@@ -38,7 +38,7 @@ struct HealthChannel {
   bool operator==(const HealthChannel&) const = default;
 };
 
-/// What was estimated of a fault while it was isolated, alone or with others.
+/// The estimates of a fault while it was isolated, alone or with others.
 struct StrengthSums {
   int fault{0};  ///< 1..22
   std::int64_t samples{0};
@@ -52,20 +52,20 @@ struct StrengthSums {
 /// ms. Residuals, d_0 and strengths are of LIVE samples; the rest of all.
 struct HealthHour {
   static constexpr double kShare = 1e-3;   ///< Quantum of shares [-].
-  static constexpr double kTravel = 1e-3;  ///< Of the travel [% of stroke].
-  static constexpr double kFullStroke = 100.0;  ///< Of the travel [%].
+  static constexpr double kTravel = 1e-3;  ///< Quantum of travel [% of stroke].
+  static constexpr double kFullStroke = 100.0;  ///< The full travel [%].
 
   std::string valve_id;
   std::int64_t hour{0};         ///< UTC, since 1970-01-01.
   std::uint64_t model_hash{0};  ///< 0: none assigned.
   std::uint32_t epoch{0};
 
-  std::string host;  ///< Of the monitor; in the plant's history alone.
+  std::string host;  ///< Host of the monitor; plant history only.
   std::string monitor;
   FlowUnit flow_unit{FlowUnit::kM3PerHour};
   std::int64_t seen_ms{0};
   std::int64_t live_ms{0};
-  std::int64_t alarm_ms{0};  ///< Of these, with an open episode.
+  std::int64_t alarm_ms{0};  ///< Part of live_ms with an open episode.
   std::int64_t open_ms{0};   ///< X, else CV, at most kStopPercent,
   std::int64_t shut_ms{0};   ///< or at least 100 % − kStopPercent.
   std::int64_t live_samples{0};

@@ -7,7 +7,7 @@
 
 namespace fdi {
 
-/// How strong a fault was at one time of its episode.
+/// The strength of a fault at one time of its episode.
 struct StrengthPoint {
   std::uint64_t episode_id{0};
   std::int64_t stamp_ns{0};  ///< Middle of the readings that tell it.
@@ -16,7 +16,7 @@ struct StrengthPoint {
   double lowest{0.0};              ///< Ends of its 95 % interval [-].
   double highest{0.0};             ///<
   Layer layer{Layer::kObservers};  ///< Layer that estimated it.
-  /// How bad the episode is by now; set for the fault whose strength is that of
+  /// The episode's severity by now; set for the fault whose strength is that of
   /// the episode. Not part of the curve.
   std::optional<Severity> severity{};
 

@@ -10,7 +10,7 @@
 namespace fdi {
 namespace {
 
-// Whether the front of `glob`, which is no *, matches the first character of
+// True if the front of `glob`, which is no *, matches the first character of
 // `text`; removes both.
 bool TakeMatch(std::string_view& glob, std::string_view& text) {
   const std::string_view character = TakeCharacter(text);

@@ -6,7 +6,7 @@
 
 namespace fdi {
 
-/// Whether `text` matches the shell pattern `glob`: * ? [abc] [a-z] [!abc]
+/// True if `text` matches the shell pattern `glob`: * ? [abc] [a-z] [!abc]
 /// [^abc]; no escapes. ? and sets match a character of UTF-8. A ] that begins a
 /// set is a member of it; a set without an end matches nothing. The databases
 /// use this for GLOB, too.

@@ -88,7 +88,7 @@ class ModelNames {
   const idl::ModelSetInfoMessage* Find(std::uint64_t hash) const;
   /// KnownFaults() of a set; empty as Find() is null.
   std::vector<std::string> KnownTo(std::uint64_t hash) const;
-  /// Whether the factors of `message` can be named, or there are none.
+  /// True if the factors of `message` can be named, or there are none.
   bool Explains(const idl::DecisionMessage& message) const;
 
   /// {"X": r, ...} by channel; null where it abstains. Without ModelSetInfo the

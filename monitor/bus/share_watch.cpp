@@ -18,7 +18,7 @@ using std::chrono::milliseconds;
 constexpr milliseconds kPeerTimeout{3500};
 constexpr std::size_t kMaxMonitors = 64;
 
-// Whether a publisher can be in both partitions. For two patterns this is known
+// True if a publisher can be in both partitions. For two patterns this is known
 // only if one matches the other as text.
 bool Overlap(const std::string& a, const std::string& b) {
   if (a == b) {

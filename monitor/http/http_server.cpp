@@ -18,7 +18,7 @@
 namespace fdi::monitor {
 namespace {
 
-// How long a silent client may keep a thread. The end of the service waits for
+// A silent client may keep a thread this long. The end of the service waits for
 // it, and has 5 s in all (docs/operations.md).
 constexpr int kSilenceSeconds = 1;
 constexpr int kPatienceSeconds = 2;

@@ -32,7 +32,7 @@ HttpAddress ParseHttpAddress(const std::string& text,
 /// "127.0.0.1:9464", "[::1]:9464"
 std::string ToString(const HttpAddress& address);
 
-/// Whether the Host header of a request, with or without a port, names this
+/// True if the Host header of a request, with or without a port, names this
 /// machine as seen from itself. Any other name can be made to resolve to
 /// loopback by a web page that its user has open (DNS rebinding).
 bool IsLoopback(std::string_view host_header);

@@ -33,7 +33,7 @@ class AuditWorker {
 
   bool beside_models() const { return beside_models_; }
 
-  /// Whether a window would be taken now; one thread that asks and submits can
+  /// True if a window would be taken now; one thread that asks and submits can
   /// rely on it.
   bool has_room() const {
     const MutexLock lock(mutex_);

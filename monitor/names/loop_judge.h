@@ -24,7 +24,7 @@ class LoopJudge {
   const Verdict& Step(const Sample& sample, double period_s);
   const Verdict& Supersede() { return watch_.Supersede(); }
 
-  /// Whether a valve is judged that has a model set.
+  /// True if valves with a model set are judged, too.
   bool beside_models() const {
     return worker_ != nullptr && worker_->beside_models();
   }

@@ -1,4 +1,4 @@
-// How an event leaves the monitor: to a user's program.
+// Delivers the events of the monitor to a user's program.
 #include <algorithm>
 #include <cerrno>
 #include <csignal>

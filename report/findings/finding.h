@@ -26,7 +26,7 @@ using Identities = std::map<std::string, ValveIdentity>;  ///< By valve.
 /// The facts of a plant that weigh in the rank of an episode.
 struct RankFacts {
   Identities valves{};
-  /// How often labels called an answer right or wrong, by answer.
+  /// Counts of labels that called an answer right or wrong, by answer.
   std::map<std::string, storage::FaultAlarms> labels{};
 };
 
@@ -34,7 +34,7 @@ struct RankFacts {
 /// severity, certainty and rank from this record.
 struct Finding {
   std::string valve_id;
-  std::string host{};  ///< Of the monitor; plant history only.
+  std::string host{};  ///< Host of the monitor; plant history only.
   std::string monitor{};
   std::string kind;  ///< "episode", "audit", "limit", "drift", "figure", or
                      ///< "notice", an episode within the budget of alarms.
@@ -50,7 +50,7 @@ struct Finding {
   std::string witness{};             ///< storage::WitnessText()
   std::optional<double> strength{};  ///< Signed [-]; nothing before a name.
   ValveIdentity about{};             ///< RankFacts::valves.
-  double confidence{1.0};            ///< What certainty weighs, 0..1 [-].
+  double confidence{1.0};            ///< The weight of certainty, 0..1 [-].
 
   std::optional<std::int64_t> since_ns{};  ///< When it was detected.
   std::optional<std::int64_t> ended_ns{};  ///< Nothing: it stands.
@@ -74,8 +74,8 @@ struct Finding {
 
 /// low 1, medium 2, high 4, critical 8.
 double SeverityPoints(Severity severity);
-/// How often what is done about a finding is right: sure 1, likely 0.75, one of
-/// or not known 0.5, not yet 0.25. Conventions, as the points of severity are.
+/// The share of findings that are acted on rightly: sure 1, likely 0.75, one of
+/// or not known 0.5, not yet 0.25. Conventions, like the points of severity.
 double CertaintyFactor(Certainty certainty);
 /// 1 counts 2, 3 counts a half, and 2 or nothing 1: a plant that states no
 /// grades is ranked by severity and certainty.

@@ -39,15 +39,15 @@ struct Shelf {
 std::vector<Shelf> ReadShelves(Database& database,
                                std::optional<std::int64_t> not_over_at_ns = {});
 
-/// Whether it has ended, or somebody has ended it.
+/// True if it has ended, or somebody has ended it.
 bool IsOver(const Shelf& shelf, std::int64_t now_ns);
 
-/// In force: until it is over, and if it was planned, from its beginning on. Of
-/// any other it does not matter whether now is before its beginning: then a
+/// True while it is in force: until it is over, and if it was planned, from its
+/// beginning on. Any other one is in force even before its beginning: then a
 /// clock was set back, and what somebody has shelved stays shelved.
 bool IsActive(const Shelf& shelf, std::int64_t now_ns);
 
-/// Whether `shelf` applies to this valve and diagnosis. A shelved fault covers
+/// True if `shelf` applies to this valve and diagnosis. A shelved fault covers
 /// only episodes with exactly this diagnosis: not those that are not isolated,
 /// nor those with another fault set.
 bool Covers(const Shelf& shelf, const Episode& episode);
@@ -122,7 +122,7 @@ struct AlarmCriteria {
   double flood_window_s{600.0};  ///< Alarm rates are counted per 10 minutes.
 };
 
-/// What the statistics need of an episode.
+/// The facts of an episode that the statistics need.
 struct AlarmSpan {
   std::string valve_id;
   std::string fault;  ///< As in the view; "" while not isolated.

@@ -10,7 +10,7 @@
 
 namespace fdi::storage {
 
-/// How certain its name is; that of one that has ended, as it was.
+/// The certainty of its name; after its end, the last one that it had.
 Certainty CertaintyOf(const Episode& episode);
 
 /// Faults that may be the cause as well as the one that names `episode`

@@ -28,12 +28,12 @@ struct HistoryEntry {
   double factor{0.0};
   double strength{0.0};
   std::string reason;
-  std::string layer;  ///< LayerName() of what named the fault.
-  std::string value;  ///< Of LABEL.
+  std::string layer;  ///< LayerName() of the layer that named it.
+  std::string value;  ///< Value of LABEL.
   std::string who;
   std::string comment;
   std::string origin;  ///< Where an operator action came from.
-  std::optional<std::int64_t> priority;  ///< Of the alarm from then on.
+  std::optional<std::int64_t> priority;  ///< Priority from then on.
   std::uint64_t episode_id{0};
 };
 
@@ -51,7 +51,7 @@ struct Episode {
   std::optional<std::string> label;
   std::optional<std::string> acked_by;
 
-  std::string host;  ///< Of the monitor; plant history only.
+  std::string host;  ///< Host of the monitor; plant history only.
   std::string monitor;
   std::uint64_t id{0};
   std::uint64_t source_id{0};
@@ -69,8 +69,8 @@ struct Episode {
   std::optional<std::string> unknown_kind;
   std::optional<std::string> layer;  ///< LayerName(); null until isolated.
   FlowUnit flow_unit{FlowUnit::kM3PerHour};
-  std::vector<std::string> channels;  ///< Of the trace.
-  std::vector<std::string> faults;    ///< Of the trace, by index.
+  std::vector<std::string> channels;  ///< Channels of the trace.
+  std::vector<std::string> faults;    ///< Faults of the trace, by index.
   /// KnownFaults() of its set.
   std::vector<std::string> known;
   std::optional<double> lowest;  ///< Ends of the 95 % interval of strength.
@@ -85,7 +85,7 @@ struct Episode {
   /// or where no monitor has said so.
   std::optional<std::string> fault_name;
   std::optional<std::string> ack_comment;
-  /// What came on top of the fault: names joined by |, or "unknown".
+  /// Faults on top of the first one: names joined by |, or "unknown".
   std::optional<std::string> second;
   /// The finding of the audit of its loop that this episode took over.
   std::optional<std::string> audit;
@@ -104,7 +104,7 @@ struct Episode {
   bool notice{false};
 };
 
-/// Whether its faults have a name, and with it a strength.
+/// True if its faults have a name, and with it a strength.
 bool IsNamed(const Episode& episode);
 
 /// One run of the monitor process.

@@ -47,7 +47,7 @@ class History {
   /// @throws DataError
   virtual std::optional<EpisodeLook> Look(std::uint64_t episode_id) = 0;
 
-  /// How strong the faults of an episode were, by stamp. @throws DataError
+  /// The strengths of the faults of an episode, by stamp. @throws DataError
   virtual std::vector<StrengthPoint> Strengths(std::uint64_t episode_id) = 0;
 
   /// In order of arrival. @throws DataError if stored bytes are damaged.

@@ -62,7 +62,7 @@ void CheckPlan(std::int64_t from_ns, std::int64_t now_ns) {
   }
 }
 
-// Whether `shelf` takes the place of one that is there.
+// True if `shelf` takes the place of one that is there.
 bool Replaces(const Shelf& shelf, const Shelf& before, std::int64_t now_ns) {
   if (before.valve_id != shelf.valve_id || before.fault != shelf.fault) {
     return false;

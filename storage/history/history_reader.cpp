@@ -154,8 +154,8 @@ EpisodeCondition ConditionOf(const EpisodeFilter& filter) {
           FaultOf(filter)};
 }
 
-// Of an open end also what arrived since the beginning and is stamped far off:
-// the clock of a publisher may be wrong by years.
+// With an open end the list also has episodes that arrived since the beginning
+// and are stamped far off: the clock of a publisher may be wrong by years.
 //
 // The inner query walks an index, newest first, and stops at the limit; only
 // these episodes are read as a whole and put in order of time.

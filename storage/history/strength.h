@@ -12,12 +12,12 @@
 
 namespace fdi::storage {
 
-/// How strong and how bad an episode is now. Within a transaction.
+/// Stores strength and severity of an episode as of now. Within a transaction.
 void StoreStrengthNow(Database& database, const std::string& episode_id,
                       const Estimate& now, std::optional<Severity> severity);
 
-/// How the faults that name the episode develop, as far as `strengths` of it
-/// tell, in the order of its name.
+/// The development of the faults that name the episode, as far as its
+/// `strengths` tell, in the order of its name.
 std::vector<Growth> GrowthOf(const Episode& episode,
                              const std::vector<StrengthPoint>& strengths);
 
