@@ -125,10 +125,11 @@ INSERT INTO episode_fault
   (episode_id, fault, fault_bit, first_ns, held, detected_ns)
 SELECT episode_id, ?, ?, ?, 1, detected_ns FROM episode WHERE episode_id = ?
 ON CONFLICT (episode_id, fault) DO UPDATE SET held = 1
--- Parameters: share, return period, notice, episode.
+-- Parameters: share, return period, notice, episode. An end after a restart
+-- does not know the return period.
 -- name: set_share
-UPDATE episode SET share = max(coalesce(share, 0), ?1), return_hours = ?2,
-  notice = ?3
+UPDATE episode SET share = max(coalesce(share, 0), ?1),
+  return_hours = coalesce(?2, return_hours), notice = ?3
 WHERE episode_id = ?4
 -- name: set_unknown_kind
 UPDATE episode SET unknown_kind = ? WHERE episode_id = ?
@@ -487,11 +488,12 @@ WHERE excluded.stamp_ns > accumulator.stamp_ns
 INSERT OR IGNORE INTO episode (episode_id, valve_id, source_id, detected_ns,
   isolated_ns, cleared_ns, fault_bits, peak_factor, strength, model_set,
   model_hash, flow_unit, channels, faults, known, label, acked_by, acked_ns,
-  unknown_kind, fault, layer, lowest, highest, priority, worst_strength)
+  unknown_kind, fault, layer, lowest, highest, priority, worst_strength, share,
+  return_hours, notice)
 SELECT episode_id, valve_id, source_id, detected_ns, isolated_ns, cleared_ns,
   fault_bits, peak_factor, strength, model_set, model_hash, flow_unit,
   channels, faults, known, label, acked_by, acked_ns, unknown_kind, fault,
-  layer, lowest, highest, priority, worst_strength
+  layer, lowest, highest, priority, worst_strength, share, return_hours, notice
 FROM source.episode WHERE valve_id = ? AND ended_ns IS NULL
 -- name: copy_open_faults
 INSERT OR IGNORE INTO episode_fault

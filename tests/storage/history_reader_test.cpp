@@ -9,6 +9,7 @@
 #include "base/time_units.h"
 #include "storage/history/health.h"
 #include "storage/history/healthy_hours.h"
+#include "storage/history/valve_move.h"
 #include "tests/storage/history_fixture.h"
 
 namespace fdi::storage {
@@ -43,6 +44,17 @@ class HistoryReaderTest : public HistoryFixture {
       valves.push_back(episode.valve_id);
     }
     return valves;
+  }
+
+  // The detection of an episode of NV-1 that is too common to be an alarm.
+  FaultEvent RecordNotice() {
+    FaultEvent event =
+        Event(Kind::kDetected, 0, 0, 0.3, EndReason::kNone, "NV-1");
+    event.transition.share = 1.1;
+    event.transition.return_hours = 400.0;
+    event.transition.notice = true;
+    writer_.Record(event, kDetected);
+    return event;
   }
 
   HistoryWriter writer_;
@@ -93,12 +105,7 @@ TEST_F(HistoryReaderTest, StatesNarrowTheList) {
 
 // As every view takes it: nobody is alarmed by a notice until it is raised.
 TEST_F(HistoryReaderTest, ANoticeIsListedAndIsNoAlarm) {
-  FaultEvent event =
-      Event(Kind::kDetected, 0, 0, 0.3, EndReason::kNone, "NV-1");
-  event.transition.share = 1.1;
-  event.transition.return_hours = 400.0;
-  event.transition.notice = true;
-  writer_.Record(event, kDetected);
+  FaultEvent event = RecordNotice();
   const auto state = [this] {
     return Sql("SELECT alarm_state FROM fault_history WHERE valve_id = 'NV-1'");
   };
@@ -152,6 +159,31 @@ TEST_F(HistoryReaderTest, ANoticeIsListedAndIsNoAlarm) {
   EXPECT_THAT(Valves(notices), IsEmpty());
   EXPECT_THAT(alarms(), Contains("NV-1"));
   EXPECT_EQ(active(), 3U);
+}
+
+TEST_F(HistoryReaderTest, ANoticeThatMovesWithItsValveStaysOne) {
+  RecordNotice();
+  const auto there = directory_.path() / "there.db";
+  {
+    Database target(there, HistorySchema(), Access::kOccasionalWriter);
+    CopyProgress(target, path_, "NV-1", kDetected);
+  }
+  const std::vector<OpenEpisode> open = HistoryWriter(there).OpenEpisodes();
+  ASSERT_EQ(open.size(), 1U);
+  EXPECT_TRUE(open[0].notice);
+  EXPECT_EQ(open[0].share, 1.1);
+  EXPECT_EQ(HistoryReader(there).Show("last").return_hours, 400.0);
+}
+
+TEST_F(HistoryReaderTest, AnEndThatDoesNotKnowTheReturnPeriodKeepsIt) {
+  FaultEvent event = RecordNotice();
+  event.transition.kind = Kind::kClosed;
+  event.transition.reason = EndReason::kStaleTimeout;
+  event.transition.return_hours = std::nullopt;
+  writer_.Record(event, kDetected);
+  const Episode stored = HistoryReader(path_).Show(EpisodeIdText(Id("NV-1")));
+  EXPECT_TRUE(stored.ended_ns);
+  EXPECT_EQ(stored.return_hours, 400.0);
 }
 
 // One that is open does not make itself common.
