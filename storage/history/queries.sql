@@ -322,13 +322,14 @@ ORDER BY hour, epoch, model_hash
 -- name: newest_hours
 SELECT hour, model_hash, epoch, live_ms, bytes FROM health_hour
 WHERE valve_id = ? AND model_hash <> 0 ORDER BY hour DESC LIMIT ?
--- What was detected since then and has a share: its hour, and the whole hours
--- that it lasted; one that is open would make itself common.
+-- What was detected since then, has a share and is over: its hour, and the whole
+-- hours that it lasted. One that is open would make itself common.
 -- name: shares_of_episodes
 SELECT share, notice, coalesce(label, ''), detected_ns / 3600000000000,
-  coalesce((coalesce(cleared_ns, ended_ns) - detected_ns) / 3600000000000, 0)
+  (coalesce(cleared_ns, ended_ns) - detected_ns) / 3600000000000
 FROM episode
 WHERE valve_id = ? AND detected_ns >= ? AND share IS NOT NULL
+  AND ended_ns IS NOT NULL
 -- Skips from valve to valve along the key.
 -- name: next_health_valve
 SELECT min(valve_id) FROM health_hour WHERE valve_id > ?

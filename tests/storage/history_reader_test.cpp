@@ -202,22 +202,19 @@ TEST_F(HistoryReaderTest, AnEpisodeIsAnHourThatLastsOnceItIsOver) {
   const auto hours = [this] {
     return ReadHealthyHours(writer_.database()).at(0).hours;
   };
-  FaultEvent event =
-      Event(Kind::kDetected, 0, 0, 0.3, EndReason::kNone, "NV-1");
-  event.transition.share = 1.1;
-  event.transition.notice = true;
+  FaultEvent event = RecordNotice();
+  event.transition.kind = Kind::kCleared;
+  event.transition.stamp_ns += 2 * kNsPerHour + kNsPerMinute;
+  writer_.Record(event, kDetected);
+  EXPECT_EQ(hours().size(), 1U);
+
+  event.transition.kind = Kind::kClosed;
+  event.transition.reason = EndReason::kStaleTimeout;
   writer_.Record(event, kDetected);
   ASSERT_EQ(hours().size(), 2U);
   EXPECT_EQ(hours()[1].hour, kDetected / kNsPerHour);
   EXPECT_EQ(hours()[1].share, 1.0);
   EXPECT_TRUE(hours()[1].at_least);
-  EXPECT_EQ(hours()[1].lasted, 0);
-
-  event.transition.kind = Kind::kClosed;
-  event.transition.reason = EndReason::kStaleTimeout;
-  event.transition.stamp_ns += 2 * kNsPerHour + kNsPerMinute;
-  writer_.Record(event, kDetected);
-  ASSERT_EQ(hours().size(), 2U);
   EXPECT_EQ(hours()[1].lasted, 2);
 }
 
