@@ -174,10 +174,13 @@ std::optional<CauseChange> CommonCauseBook::Join(
       known.end()) {
     return std::nullopt;
   }
-  // Members are ordered by isolation. The search begins with the first, because
-  // a transition may be recorded later than others that followed it.
+  // Members are ordered by isolation. The search begins before the first,
+  // because a transition may be recorded later than others that followed it,
+  // and a notice may have had its name when it was raised.
   for (const CauseMember& member : Candidates(
-           group, known.empty() ? 0 : known.front().isolated_ns, kEver)) {
+           group,
+           known.empty() ? 0 : known.front().isolated_ns - group.within_ns,
+           kEver)) {
     if (member.episode_id == episode_id) {
       Insert(cause_id, member);
       return CauseChange{CauseChange::Kind::kGrown,

@@ -364,12 +364,19 @@ ORDER BY opened_ns DESC
 -- name: last_read_event
 SELECT coalesce((SELECT min(event_id) - 1 FROM event_outbox),
   (SELECT max(event_id) FROM episode_event), 0)
+-- A notice that is raised counts since it got each of its faults.
 -- name: cause_events
-SELECT v.event_id, v.kind = 'CLOSED', v.episode_id, e.valve_id, v.stamp_ns
-FROM episode_event v JOIN episode e USING (episode_id)
-WHERE v.event_id > ? AND e.notice = 0
-  AND v.kind IN ('ISOLATED', 'REISOLATED', 'RAISED', 'CLOSED')
-ORDER BY v.event_id LIMIT ?
+SELECT v.event_id, v.kind = 'CLOSED', v.episode_id, v.valve_id,
+  coalesce(f.first_ns, v.stamp_ns)
+FROM (
+  SELECT v.event_id, v.kind, v.episode_id, e.valve_id, v.stamp_ns
+  FROM episode_event v JOIN episode e USING (episode_id)
+  WHERE v.event_id > ? AND e.notice = 0
+    AND v.kind IN ('ISOLATED', 'REISOLATED', 'RAISED', 'CLOSED')
+  ORDER BY v.event_id LIMIT ?) v
+  LEFT JOIN episode_fault f
+    ON v.kind = 'RAISED' AND f.episode_id = v.episode_id AND f.held = 1
+ORDER BY v.event_id
 -- name: open_causes
 SELECT cause_id FROM common_cause WHERE ended_ns IS NULL
 -- name: causes
@@ -384,13 +391,13 @@ INSERT OR IGNORE INTO common_cause_member
 VALUES (?, ?, ?, ?, ?)
 -- name: end_cause
 UPDATE common_cause SET ended_ns = ? WHERE cause_id = ?
--- Episodes that hold a fault since a time within ?2..?3 and belong to no cause
+-- Alarms that hold a fault since a time within ?2..?3 and belong to no cause
 -- of the group ?5. ?4 is how long before its isolation one may be detected.
 -- name: cause_candidates
 SELECT e.episode_id, e.valve_id, e.fault, f.first_ns, e.ended_ns
 FROM episode_fault f JOIN episode e USING (episode_id)
 WHERE f.fault = ?1 AND f.held = 1 AND f.detected_ns >= ?2 - ?4
-  AND f.first_ns >= ?2 AND f.first_ns <= ?3
+  AND f.first_ns >= ?2 AND f.first_ns <= ?3 AND e.notice = 0
   AND NOT EXISTS (
     SELECT 1 FROM common_cause_member m JOIN common_cause c USING (cause_id)
     WHERE m.episode_id = e.episode_id AND c.group_name = ?5)

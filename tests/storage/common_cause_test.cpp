@@ -43,6 +43,26 @@ class CommonCauseTest : public HistoryFixture {
     });
     return book_->Read();
   }
+  // Likewise, but nobody is alarmed by it until it is raised.
+  std::vector<CauseChange> IsolateNotice(const std::string& valve, double at_s,
+                                         FaultSet faults = 4) {
+    for (const bool isolated : {false, true}) {
+      FaultEvent event = Event(
+          isolated ? TransitionKind::kIsolated : TransitionKind::kDetected,
+          isolated ? at_s : 0, isolated ? faults : 0, 0.8, EndReason::kNone,
+          valve);
+      event.transition.notice = true;
+      writer_->Record(event, kDetected);
+    }
+    return book_->Read();
+  }
+  std::vector<CauseChange> Raise(const std::string& valve, double at_s,
+                                 FaultSet faults = 4) {
+    writer_->Record(Event(TransitionKind::kRaised, at_s, faults, 0.8,
+                          EndReason::kNone, valve),
+                    kDetected);
+    return book_->Read();
+  }
   std::vector<CauseChange> Close(const std::string& valve, double at_s) {
     writer_->Record(Event(TransitionKind::kClosed, at_s, 4, 0.1,
                           EndReason::kCleared, valve),
@@ -100,6 +120,43 @@ TEST_F(CommonCauseTest, AnOpenCauseGrowsAndEndsWithItsLastEpisode) {
   EXPECT_EQ(ended[0].kind, Kind::kEnded);
   EXPECT_EQ(ended[0].cause.ended_ns, kDetected + 800 * kSecond);
   EXPECT_EQ(Causes().size(), 1u);
+}
+
+TEST_F(CommonCauseTest, ANoticeCountsOnceItIsRaisedAsOfItsIsolation) {
+  IsolateNotice("A-1", 10);
+  Isolate("A-2", 20);
+  EXPECT_TRUE(Isolate("A-3", 30).empty());
+
+  const auto changes = Raise("A-1", 3600);
+  ASSERT_EQ(changes.size(), 1u);
+  EXPECT_EQ(changes[0].kind, Kind::kOpened);
+  EXPECT_EQ(changes[0].cause.opened_ns, kDetected + 30 * kSecond);
+  EXPECT_EQ(changes[0].cause.members.size(), 3u);
+}
+
+TEST_F(CommonCauseTest, ANoticeThatIsRaisedJoinsAnOpenCause) {
+  IsolateNotice("A-1", 5);
+  Isolate("A-2", 10);
+  EXPECT_TRUE(Isolate("A-3", 11).empty());
+  EXPECT_EQ(Isolate("A-4", 12).size(), 1u);
+  IsolateNotice("A-5", 500);
+  EXPECT_EQ(Causes().at(0).members.size(), 3u);
+
+  EXPECT_EQ(Raise("A-1", 3600).at(0).kind, Kind::kGrown);
+  EXPECT_EQ(Raise("A-5", 3600).at(0).kind, Kind::kGrown);
+  EXPECT_EQ(Causes().at(0).members.size(), 5u);
+}
+
+// Of two faults that it holds, the group has the one that came later.
+TEST_F(CommonCauseTest, ANoticeMayHaveGotTheFaultOfTheGroupLater) {
+  IsolateNotice("A-1", 10, 1);
+  FaultEvent event =
+      Event(TransitionKind::kReisolated, 100, 5, 0.8, EndReason::kNone, "A-1");
+  event.transition.notice = true;
+  writer_->Record(event, kDetected);
+  Isolate("A-2", 110);
+  EXPECT_TRUE(Isolate("A-3", 120).empty());
+  EXPECT_EQ(Raise("A-1", 3600, 5).size(), 1u);
 }
 
 TEST_F(CommonCauseTest, ARestartBetweenTwoValvesChangesNothing) {
