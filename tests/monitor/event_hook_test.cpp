@@ -298,6 +298,10 @@ TEST_F(ProgramDeliveryTest, AnEventBecomesARequestOfMaximoAndARowOfSap) {
                                      "19700101,000000,"));
   event.transition.kind = TransitionKind::kChanged;  // It is ordered already.
   EXPECT_EQ(made("maximo"), "");
+  event.transition.kind = TransitionKind::kRaised;  // It got its name before.
+  EXPECT_EQ(report::Json::parse(made("maximo")), request);
+  event.transition.faults = 0;  // Its order comes with its name.
+  EXPECT_EQ(made("maximo"), "");
 }
 
 TEST(EventJsonTest, EventSpeaksTheLanguageOfTheCatalogue) {

@@ -7,7 +7,8 @@
 sap writes the fields of a PM notification (BAPI_ALM_NOTIF_CREATE), one a line of
 CSV; maximo writes service requests (object structure MXSR), one a line of JSON.
 The id of the episode is the external reference: import each of them once. Rows
-without an episode, such as a trend, are left out: they have no such id.
+without an episode, such as a trend, are left out: they have no such id. So are
+notices, until an alarm is made of one.
 """
 import csv
 import json
@@ -22,13 +23,15 @@ def findings(text):
         for row in csv.DictReader(text.splitlines()):
             # A row that is over or ordered already needs no further order.
             if (row["open"] == "true" and row["episode_id"]
-                    and not row["in_work_utc"]):
+                    and row["kind"] != "notice" and not row["in_work_utc"]):
                 yield {**row, "utc": row["detected_utc"],
                        "location": row["about_location"],
                        "reference": row["episode_id"]}
         return
     event = json.loads(text)
-    if event["kind"] != "ISOLATED" or event["shelved"]:
+    # RAISED: a notice became an alarm. It may have had its name before.
+    if (event["kind"] not in ("ISOLATED", "RAISED") or not event["name"]
+            or event["shelved"]):
         return
     about = event["about"] or {}
     yield {**event, "utc": event["stamp_utc"],

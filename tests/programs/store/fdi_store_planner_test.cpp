@@ -132,14 +132,24 @@ TEST_F(FdiStorePlannerTest, WorkListIsWrittenAsAPageAndCompared) {
               HasSubstr("\n1,LV-1,episode,f19,Flow transmitter wrong,high,4"));
 }
 
-// A row that stands becomes one order; one ordered, over or shelved none.
+// A row that stands becomes one order; one ordered, over or shelved none, nor a
+// notice.
 TEST_F(FdiStorePlannerTest, AWorkListBecomesRowsOfSapAndMaximo) {
   {
     HistoryWriter writer(path_);
     writer.Record(Event(TransitionKind::kDetected, 0, 0, 0.3), kDetected);
     writer.Record(Event(TransitionKind::kIsolated, 20, 0b100, 0.8), kDetected);
     RecordEpisode(writer, 0b100, "LV-2");
+    for (const FaultSet faults : {0b000, 0b100}) {
+      FaultEvent notice = Event(
+          faults == 0 ? TransitionKind::kDetected : TransitionKind::kIsolated,
+          20, faults, 0.8, EndReason::kNone, "LV-3");
+      notice.transition.notice = true;
+      writer.Record(notice, kDetected);
+    }
   }
+  EXPECT_THAT(Store("worklist --from 2026-11-01 --csv").out,
+              HasSubstr(",LV-3,notice,f19,"));
   const auto orders = [this](const std::string& form) {
     return Store(
         "worklist --from 2026-11-01 --csv --rows 0 2>/dev/null"
@@ -151,6 +161,7 @@ TEST_F(FdiStorePlannerTest, AWorkListBecomesRowsOfSapAndMaximo) {
   EXPECT_THAT(sap, HasSubstr("\nM2,LV-1,LV-1: Flow transmitter wrong,2,"
                              "20261120,145611,"));
   EXPECT_THAT(sap, testing::Not(HasSubstr("LV-2")));
+  EXPECT_THAT(sap, testing::Not(HasSubstr("LV-3")));
   const json maximo = json::parse(orders("maximo").out);
   EXPECT_EQ(maximo["assetnum"], "LV-1");
   EXPECT_EQ(maximo["reportedpriority"], 2);
