@@ -148,7 +148,8 @@ class PlantFixture : public HistoryFixture {
                "cleared_ns, ended_ns, end_reason, fault, fault_bits, "
                "peak_factor, strength, unknown_kind, layer, model_set, "
                "model_hash, flow_unit, channels, faults, known, certainty, "
-               "look_alikes, label, acked_by, acked_ns, session_id",
+               "look_alikes, return_hours, notice, label, acked_by, acked_ns, "
+               "session_id",
                "episode_id"},
           {"episode_fault",
            "episode_id, fault, fault_bit, first_ns, held, detected_ns",
@@ -225,7 +226,7 @@ class PlantFixture : public HistoryFixture {
                     utc("acked_utc") + ", ack_comment, alarm_state, " +
                     utc("shelved_until_utc") + ", " + utc("ended_utc") +
                     ", certainty, look_alikes, second, description" +
-                    " FROM fdi.fault_history WHERE "
+                    ", return_hours FROM fdi.fault_history WHERE "
                     "monitor = '" +
                     monitor + "' ORDER BY episode_id"));
   }

@@ -429,7 +429,7 @@ TEST_F(ShipTest, RefusalsHaveAReasonAndCode3) {
   EXPECT_EQ(Store("history list --db '" + Url("screen") + "'").code, 0);
   owner.Run("UPDATE fdi.plant SET version = version + 1");
   refused(Ship("a"),
-          "schema fdi has version 11, this program needs 10: update "
+          "schema fdi has version 12, this program needs 11: update "
           "this program");
   refused(Store("ship --data " + Folder("a").string() +
                 " --db 'postgresql://x:secret@/plant?host=/nowhere'"),
@@ -1010,11 +1010,11 @@ TEST_F(ShipTest, ABadRowHidesNoGoodOne) {
 // A schema that was never released is left as it is.
 TEST_F(ShipTest, ASchemaOfBeforeTheBaselineIsRefused) {
   Init();
-  PlantDatabase(Url()).RunScript("UPDATE fdi.plant SET version = 8");
+  PlantDatabase(Url()).RunScript("UPDATE fdi.plant SET version = 10");
   for (const char* command : {"ship --init --db '", "history list --db '"}) {
     const Outcome refused = Store(command + Url() + "'");
     EXPECT_EQ(refused.code, 3);
-    EXPECT_THAT(refused.err, HasSubstr("version 8, this program needs"));
+    EXPECT_THAT(refused.err, HasSubstr("version 10, this program needs"));
     EXPECT_THAT(refused.err, HasSubstr("make another database"));
   }
 }
