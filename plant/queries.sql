@@ -189,10 +189,12 @@ SELECT c.relname, string_agg(
 FROM pg_constraint k JOIN pg_class c ON c.oid = k.conrelid
 WHERE k.contype = 'c' AND k.connamespace = 'fdi'::regnamespace
 GROUP BY c.relname
--- Lists the open or unacknowledged episodes, which a restored history may not know.
+-- Lists the open episodes and unacknowledged alarms, which a restored history
+-- may not know.
 -- name: open_episodes
 SELECT episode_id FROM fdi.episode
-WHERE monitor_id = $1 AND (end_reason IS NULL OR acked_by IS NULL)
+WHERE monitor_id = $1 AND (end_reason IS NULL
+  OR acked_by IS NULL AND notice = 0)
 -- name: open_causes
 SELECT cause_id FROM fdi.common_cause
 WHERE monitor_id = $1 AND ended_ns IS NULL
@@ -229,7 +231,7 @@ UPDATE fdi.monitor SET shipped_ns = $2 WHERE monitor_id = $1
 -- ---- Retention, by the rules of history.db. $1: what ended before.
 -- name: protected_in_plant
 SELECT count(*) FROM fdi.episode
-WHERE ended_ns IS NULL OR acked_by IS NULL OR label IS NOT NULL
+WHERE ended_ns IS NULL OR acked_by IS NULL AND notice = 0 OR label IS NOT NULL
   OR unconfirmed_ns IS NOT NULL
 -- name: newest_in_plant
 SELECT coalesce(max(alive_ns), 0) FROM fdi.monitor_session
@@ -237,8 +239,8 @@ SELECT coalesce(max(alive_ns), 0) FROM fdi.monitor_session
 -- said; rows stamped two days after they arrived are as old as their arrival.
 -- name: old_in_plant
 SELECT count(*), min(detected_ns), max(detected_ns) FROM fdi.episode e
-WHERE ended_ns IS NOT NULL AND acked_by IS NOT NULL AND label IS NULL
-  AND unconfirmed_ns IS NULL AND (
+WHERE ended_ns IS NOT NULL AND (acked_by IS NOT NULL OR notice <> 0)
+  AND label IS NULL AND unconfirmed_ns IS NULL AND (
     SELECT CASE WHEN e.ended_ns > max(v.recorded_ns) + 172800000000000::numeric
       THEN max(v.recorded_ns) ELSE greatest(e.ended_ns, max(v.recorded_ns)) END
     FROM fdi.episode_event v
@@ -247,8 +249,8 @@ WHERE ended_ns IS NOT NULL AND acked_by IS NOT NULL AND label IS NULL
 WITH gone AS (
   DELETE FROM fdi.episode WHERE (episode_id, monitor_id) IN (
     SELECT episode_id, monitor_id FROM fdi.episode e
-    WHERE ended_ns IS NOT NULL AND acked_by IS NOT NULL AND label IS NULL
-      AND unconfirmed_ns IS NULL AND (
+    WHERE ended_ns IS NOT NULL AND (acked_by IS NOT NULL OR notice <> 0)
+      AND label IS NULL AND unconfirmed_ns IS NULL AND (
         SELECT CASE
           WHEN e.ended_ns > max(v.recorded_ns) + 172800000000000::numeric
           THEN max(v.recorded_ns)

@@ -341,9 +341,11 @@ CREATE INDEX ON fdi.episode (acked_by, fdi.utc(detected_ns));
 CREATE INDEX ON fdi.episode (label, fdi.utc(detected_ns))
   WHERE label IS NOT NULL;
 CREATE INDEX ON fdi.episode (fdi.utc(detected_ns)) WHERE end_reason IS NULL;
-CREATE INDEX ON fdi.episode (fdi.utc(detected_ns)) WHERE acked_by IS NULL;
+-- Nobody acknowledges a notice: without the condition these would grow.
+CREATE INDEX ON fdi.episode (fdi.utc(detected_ns))
+  WHERE acked_by IS NULL AND notice = 0;
 CREATE INDEX ON fdi.episode (fault, fdi.utc(detected_ns))
-  WHERE acked_by IS NULL;
+  WHERE acked_by IS NULL AND notice = 0;
 CREATE INDEX ON fdi.episode (fdi.utc(detected_ns))
   WHERE fdi.utc(isolated_ns) IS NULL;
 CREATE INDEX ON fdi.episode (fdi.utc(detected_ns))

@@ -108,9 +108,9 @@ std::string StateCondition(EpisodeState state) {
 
 // INDEXED BY is an error where the index cannot be used. The partial indexes
 // can be used only if the query repeats their condition: ended_ns IS NULL for
-// episode_open, acked_by IS NULL for episode_unacked, the first line of kActive
-// for episode_active. So the states of IsOpen(), IsUnacked() and IsActive()
-// must have that in StateCondition().
+// episode_open, kUnacked and kAlarm for episode_unacked, the first line of
+// kActive for episode_active. So the states of IsOpen(), IsUnacked() and
+// IsActive() must have that in StateCondition().
 const char* IndexFor(const EpisodeFilter& filter) {
   return IsExact(filter)            ? "episode_by_valve"
          : filter.fault == kUnknown ? "episode_by_fault"

@@ -425,7 +425,7 @@ SELECT rowid, detected_ns, (SELECT
   coalesce(sum(length(samples) + length(vectors)), 0)
   FROM episode_trace t WHERE t.episode_id = e.episode_id)
 FROM episode e
-WHERE detected_ns >= ?1 AND acked_by IS NOT NULL
+WHERE detected_ns >= ?1 AND (acked_by IS NOT NULL OR notice <> 0)
   AND (SELECT iif(e.ended_ns > max(v.recorded_ns) + 172800000000000,
       max(v.recorded_ns), max(e.ended_ns, coalesce(max(v.recorded_ns), 0)))
     FROM episode_event v WHERE v.episode_id = e.episode_id) < ?2
@@ -440,7 +440,8 @@ WHERE detected_ns >= ?1 AND acked_by IS NOT NULL
 ORDER BY detected_ns LIMIT ?3
 -- name: protected_episodes
 SELECT count(*) FROM episode e WHERE NOT (
-  ended_ns IS NOT NULL AND acked_by IS NOT NULL AND label IS NULL
+  ended_ns IS NOT NULL AND (acked_by IS NOT NULL OR notice <> 0)
+  AND label IS NULL
   AND unconfirmed_ns IS NULL
   AND NOT EXISTS (
     SELECT 1 FROM event_outbox JOIN episode_event v USING (event_id)

@@ -100,6 +100,11 @@ TEST_F(HistoryQueryTest, AlarmsAndTheirFiguresWalkIndexes) {
   const std::string plan = PlanOf(AlarmListQuery());
   EXPECT_THAT(plan, HasSubstr("episode_active"));
   EXPECT_THAT(plan, HasSubstr("episode_returned"));
+  // Notices, which nobody acknowledges, are not in them.
+  EXPECT_EQ(Sql("SELECT count(*) FROM sqlite_schema WHERE name IN "
+                "('episode_returned', 'episode_unacked') "
+                "AND sql LIKE '%AND notice = 0'"),
+            "2");
   EXPECT_THAT(plan, Not(HasSubstr("SCAN e\n")));
 }
 

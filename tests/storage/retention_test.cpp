@@ -67,6 +67,21 @@ TEST_F(HistoryRetentionTest, OnlyWhatIsClosedAcknowledgedAndUnlabelledGoes) {
   EXPECT_TRUE(writer_.database().Check().empty());
 }
 
+// Nobody acknowledges it.
+TEST_F(HistoryRetentionTest, ANoticeGoesOnceItIsOver) {
+  for (const auto kind : {TransitionKind::kDetected, TransitionKind::kClosed}) {
+    FaultEvent event = Event(kind, 90, 0, 0.3, EndReason::kCleared, "notice");
+    event.transition.notice = true;
+    writer_.Record(event, kDetected);
+    const bool over = kind == TransitionKind::kClosed;
+    RetentionLimits limits = Before(kEnded + 1);
+    limits.dry_run = true;
+    const PruneResult result = PruneHistory(path_, limits);
+    EXPECT_EQ(result.deleted, over ? 3 : 2);
+    EXPECT_EQ(result.kept, over ? 3 : 4);
+  }
+}
+
 TEST_F(HistoryRetentionTest, WhatEndedLaterStays) {
   EXPECT_EQ(PruneHistory(path_, Before(kEnded)).deleted, 0);
   EXPECT_EQ(Valves().size(), 5U);

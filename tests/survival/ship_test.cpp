@@ -556,6 +556,29 @@ TEST_F(ShipTest, RetentionOfBothSides) {
   EXPECT_THAT(years_ahead.err, HasSubstr("--trust-clock"));
 }
 
+// Nobody acknowledges a notice.
+TEST_F(ShipTest, ANoticeIsPrunedUnacknowledged) {
+  Init();
+  const auto path = Folder("a") / "history.db";
+  {
+    HistoryWriter writer(path);
+    for (const auto kind :
+         {TransitionKind::kDetected, TransitionKind::kClosed}) {
+      FaultEvent event = Event(kind, 90, 0, 0.3, EndReason::kCleared);
+      event.transition.notice = true;
+      writer.Record(event, kDetected);
+    }
+  }
+  ASSERT_EQ(Ship("a").code, 0);
+  PlantDatabase plant(Url());
+  for (const bool dry_run : {true, false}) {
+    const PlantPruned pruned =
+        PrunePlantEpisodes(plant, kDetected + 86400 * kSecond, dry_run);
+    EXPECT_EQ(pruned.deleted, 1);
+    EXPECT_EQ(pruned.kept, 0);
+  }
+}
+
 // The verbs say of the plant what they say of the history.
 TEST_F(ShipTest, TheVerbsReadThePlant) {
   Init();

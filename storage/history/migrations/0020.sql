@@ -10,6 +10,18 @@ ALTER TABLE episode ADD COLUMN notice INTEGER NOT NULL DEFAULT 0;
 DROP INDEX episode_statistics;
 CREATE INDEX episode_statistics ON episode (valve_id, fault, detected_ns,
   isolated_ns, ended_ns, acked_by, label, peak_factor, episode_id, notice);
+-- Nobody acknowledges a notice: without the condition these would grow.
+DROP INDEX episode_unacked;
+CREATE INDEX episode_unacked ON episode (detected_ns, valve_id)
+  WHERE acked_by IS NULL AND notice = 0;
+DROP INDEX episode_returned;
+CREATE INDEX episode_returned ON episode (detected_ns, valve_id)
+  WHERE acked_by IS NULL AND ended_ns IS NOT NULL AND unconfirmed_ns IS NULL
+    AND (cleared_ns IS NOT NULL OR
+         (end_reason NOT IN ('stream_ended', 'stale_timeout', 'unknown')
+          AND NOT (end_reason = 'superseded'
+                   AND coalesce(layer, '') = 'audit')))
+    AND notice = 0;
 
 DROP VIEW IF EXISTS fault_history;
 CREATE VIEW fault_history AS
