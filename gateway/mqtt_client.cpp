@@ -276,6 +276,7 @@ void MqttClient::OnConnect(int code) {
     return;
   }
   said_.clear();
+  ++connections_;
   connected_ = true;
   log_(LogLevel::kInfo,
        EventLine("broker_connected", {{"broker", address_.host}}));
@@ -295,6 +296,8 @@ void MqttClient::OnMessage(const mosquitto_message& message) {
 void MqttClient::Take(std::vector<MqttEvent>& events,
                       std::chrono::milliseconds timeout) {
   events_.PopAll(events, timeout);
+  taken_ += static_cast<std::uint64_t>(std::ranges::count(
+      events, MqttEvent::Kind::kConnected, &MqttEvent::kind));
 }
 
 void MqttClient::Subscribe(const std::vector<std::string>& topics) {
@@ -318,7 +321,7 @@ void MqttClient::Unsubscribe(const std::vector<std::string>& topics) {
 }
 
 bool MqttClient::Publish(const Outgoing& message) {
-  return connected_ &&
+  return connected() &&
          mosquitto_publish(library_, nullptr, message.topic.c_str(),
                            static_cast<int>(message.payload.size()),
                            message.payload.data(), message.qos,

@@ -22,8 +22,8 @@ class App;
 
 namespace fdi::gateway {
 
-/// How a broker is reached. Secrets come by files or by the environment, for
-/// the arguments of a program are seen by everybody.
+/// The address of a broker and the keys to it. Secrets come by files or by the
+/// environment, because everybody can see the arguments of a program.
 struct MqttOptions {
   std::string url;           ///< mqtt[s]://[USER@]HOST[:PORT]
   std::filesystem::path ca;  ///< PEM; empty: the authorities of the system.
@@ -58,9 +58,9 @@ struct MqttEvent {
 /// a bounded queue, and are dropped and counted beyond it.
 class MqttClient {
  public:
-  /// @param will makes what the broker publishes when this client is gone. It
-  /// is
-  ///   called before each connection, by the thread of the client; empty: none.
+  /// @param will makes the message that the broker publishes when this client
+  ///   is gone. The thread of the client calls it before each connection;
+  ///   empty: none.
   /// @throws ConfigError for an URL, a file of keys or a password that cannot
   ///   be used; NotFoundError.
   MqttClient(const MqttOptions& options, std::function<Outgoing()> will,
@@ -78,11 +78,12 @@ class MqttClient {
   /// Subscribes with QoS 0; call it at each kConnected.
   void Subscribe(const std::vector<std::string>& topics);
   void Unsubscribe(const std::vector<std::string>& topics);
-  /// @returns false if there is no connection, or the message does not fit: it
-  ///   is not kept for later.
+  /// @returns false if the message does not fit, or if there is no connection
+  ///   whose kConnected was taken: it is not kept for later. Call it, as
+  ///   connected(), by the thread that takes.
   bool Publish(const Outgoing& message);
 
-  bool connected() const { return connected_; }
+  bool connected() const { return connected_ && taken_ == connections_; }
   std::uint64_t dropped() const { return dropped_; }
 
  private:
@@ -106,6 +107,8 @@ class MqttClient {
   mosquitto* library_{nullptr};
   BoundedQueue<MqttEvent> events_;
   std::atomic<bool> connected_{false};
+  std::atomic<std::uint64_t> connections_{0};
+  std::uint64_t taken_{0};  // Connections; of the thread that takes.
   std::atomic<std::uint64_t> dropped_{0};
   std::string refused_;  // Why the broker refused; of the thread.
   std::string said_;     // Last line logged; of the thread.

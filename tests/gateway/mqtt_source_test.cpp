@@ -1,8 +1,15 @@
-// Payloads and URLs of a broker.
+// Payloads, URLs and connections of a broker.
 #include "gateway/mqtt_source.h"
 
+#include <array>
+#include <semaphore>
+#include <vector>
+
+#include <arpa/inet.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
 #include "base/error.h"
 #include "base/time_units.h"
@@ -77,6 +84,71 @@ TEST(MqttUrl, IsThatOfABrokerWithoutASecret) {
   EXPECT_THAT(error("mqtt://fdi:secret@a"), HasSubstr("--password-file"));
   EXPECT_THAT(error("mqtt://fdi:secret@a"),
               ::testing::Not(HasSubstr("secret@")));
+}
+
+// A broker that accepts connections, and says nothing else.
+class Broker {
+ public:
+  Broker() {
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    socklen_t size = sizeof(address);
+    auto* const any = reinterpret_cast<sockaddr*>(&address);
+    EXPECT_EQ(bind(listener_, any, size), 0);
+    EXPECT_EQ(listen(listener_, 1), 0);
+    EXPECT_EQ(getsockname(listener_, any, &size), 0);
+    port_ = ntohs(address.sin_port);
+  }
+  ~Broker() {
+    Drop();
+    close(listener_);
+  }
+  Broker(const Broker&) = delete;
+  Broker& operator=(const Broker&) = delete;
+  void Accept() {
+    client_ = accept(listener_, nullptr, nullptr);
+    std::array<char, 256> connect{};
+    EXPECT_GT(recv(client_, connect.data(), connect.size(), 0), 0);
+    constexpr std::array<char, 4> kConnack{0x20, 2, 0, 0};
+    EXPECT_EQ(send(client_, kConnack.data(), kConnack.size(), 0), 4);
+  }
+  void Drop() { close(std::exchange(client_, -1)); }
+  std::string url() const {
+    return "mqtt://127.0.0.1:" + std::to_string(port_);
+  }
+
+ private:
+  int listener_{socket(AF_INET, SOCK_STREAM, 0)};
+  int client_{-1};
+  int port_{0};
+};
+
+// A birth has to be the first message on each connection.
+TEST(MqttClient, NothingIsPublishedOnAConnectionBeforeItIsTaken) {
+  Broker broker;
+  MqttOptions options;
+  options.url = broker.url();
+  std::counting_semaphore<> said(0);  // A line at each connection and loss.
+  MqttClient client(options, {},
+                    [&](LogLevel, std::string_view) { said.release(); });
+  client.Start();
+  const Outgoing message{"t", "x", false, 0};
+  std::vector<MqttEvent> events;
+  broker.Accept();
+  said.acquire();
+  EXPECT_FALSE(client.connected());
+  EXPECT_FALSE(client.Publish(message));
+  client.Take(events, std::chrono::seconds(60));
+  ASSERT_EQ(events.size(), 1U);
+  EXPECT_TRUE(client.connected());
+  EXPECT_TRUE(client.Publish(message));
+  broker.Drop();
+  said.acquire();
+  broker.Accept();
+  said.acquire();
+  EXPECT_FALSE(client.connected());
+  EXPECT_FALSE(client.Publish(message));
 }
 
 }  // namespace
