@@ -17,8 +17,11 @@ constexpr std::chrono::seconds kAskAgain(10);
 constexpr std::chrono::milliseconds kBeat(200);
 // A birth of 10 000 metrics has 0.6 MB.
 constexpr std::size_t kMaxBirth = 1U << 20U;
-// Bounds the memory of names that somebody makes up.
+// These three bound the memory that made-up names and aliases take: 200 bytes a
+// metric are 100 MB.
+constexpr std::size_t kMaxTopic = 1024;
 constexpr std::size_t kMaxSources = 10'000;
+constexpr std::size_t kMaxMetrics = 500'000;
 // By the specification; 0 is bad, 500 stale.
 constexpr std::uint64_t kGoodQuality = 192;
 // 2200-01-01 [ms]: stamps beyond it are that, which leaves room for sums.
@@ -78,6 +81,12 @@ std::optional<double> NumberOf(const sparkplug::Metric& metric,
                                     : static_cast<double>(bits);
 }
 
+std::string NameOf(const sparkplug::Metric& metric) {
+  return metric.has_name()    ? metric.name()
+         : metric.has_alias() ? "alias " + std::to_string(metric.alias())
+                              : "a metric with no name and no alias";
+}
+
 // @returns why the metric is no reading.
 std::string Convert(const sparkplug::Metric& metric, std::uint32_t type,
                     importer::TagReading& reading) {
@@ -116,13 +125,15 @@ void SparkplugHost::Use(std::set<std::string, std::less<>> tags) {
 
 void SparkplugHost::Greet(Clock::time_point now) {
   for (auto& [name, node] : nodes_) {
+    node.asked.reset();
     Ask(name, node, now);
   }
 }
 
-// A node that does not answer is asked again at a later message.
+// Beat() asks a node again that does not answer.
 void SparkplugHost::Ask(const std::string& name, Node& node,
                         Clock::time_point now) {
+  node.wanted = true;
   if (node.asked && now - *node.asked < kAskAgain) {
     return;
   }
@@ -181,9 +192,9 @@ std::string SparkplugHost::Read(const MqttEvent& event,
                                 Message& message) const {
   message.node = message.source.substr(0, message.source.find('/'));
   const auto slashes = std::ranges::count(message.source, '/');
-  if (message.node.empty() ||
+  if (message.node.empty() || event.topic.size() > kMaxTopic ||
       slashes != (message.type.front() == 'D' ? 1 : 0)) {
-    return "no topic of Sparkplug B";
+    return "no topic of Sparkplug B of up to 1 KiB";
   }
   if (event.retained) {
     return "the broker had kept it, and nobody knows whether it stands";
@@ -210,6 +221,7 @@ std::string SparkplugHost::Follow(const Message& message, Node& node,
              std::to_string(*node.bd_seq) + ": another connection died";
     }
     EndNode(message.node, node, handlers.ended);
+    node.wanted = false;  // Nobody is there to answer.
     return {};
   }
   std::string why;
@@ -219,6 +231,7 @@ std::string SparkplugHost::Follow(const Message& message, Node& node,
       return source.first.starts_with(message.node + "/");
     });
     node.born = true;
+    node.wanted = false;
     node.bd_seq = BdSeqOf(payload);
   } else if (!node.born) {
     why = "no NBIRTH has come";
@@ -228,17 +241,18 @@ std::string SparkplugHost::Follow(const Message& message, Node& node,
   } else if (message.type == "DDATA" && !sources_.contains(message.source)) {
     why = "no DBIRTH has come";
   }
+  if (why.empty() && message.type.ends_with("BIRTH") && !Learn(message)) {
+    why = "the group has more than 500 000 metrics";
+  }
   if (!why.empty()) {
-    // What was missed may be a change: its births count no more. Without new
+    // A change may have been missed: its births count no more. Without new
     // ones its sources fall silent.
     EndNode(message.node, node, {});
     return why + kAsked;
   }
   node.next_seq =
       ((payload.has_seq() ? payload.seq() : node.next_seq) + 1) % 256;
-  if (message.type.ends_with("BIRTH")) {
-    Learn(message);
-  } else if (message.type == "DDEATH") {
+  if (message.type == "DDEATH") {
     sources_.erase(message.source);
     handlers.ended(message.source);
   }
@@ -277,16 +291,23 @@ std::string SparkplugHost::TagOf(const std::string& source,
   return tag;
 }
 
-void SparkplugHost::Learn(const Message& message) {
+// @returns false if there are too many metrics with it.
+bool SparkplugHost::Learn(const Message& message) {
   Source& source = sources_[message.source] = {};
   for (const sparkplug::Metric& metric : message.payload.metrics()) {
     const std::string tag = TagOf(message.source, metric.name());
-    source.has_tags = source.has_tags || !tag.empty();
-    source.metrics[metric.name()] = {tag, metric.type()};
+    if (!tag.empty()) {
+      source.metrics[metric.name()] = {tag, metric.type()};
+    }
     if (metric.has_alias()) {
-      source.names[metric.alias()] = metric.name();
+      source.names[metric.alias()] = tag.empty() ? "" : metric.name();
     }
   }
+  std::size_t kept = 0;
+  for (const auto& [name, each] : sources_) {
+    kept += each.metrics.size() + each.names.size();
+  }
+  return kept <= kMaxMetrics;
 }
 
 // False if another source that lives has the tag.
@@ -298,35 +319,37 @@ bool SparkplugHost::Owns(const std::string& source, const std::string& tag) {
   return owner == source;
 }
 
-// @returns false if a metric is none of the birth.
+// @returns false if a metric with a tag or an alias is none of the birth.
 bool SparkplugHost::Tell(const Message& message, const Source& source,
                          const ReadingHandlers& handlers) {
   bool known = true;
   const sparkplug::Payload& payload = message.payload;
+  const bool birth = message.type.ends_with("BIRTH");
   for (const sparkplug::Metric& metric : payload.metrics()) {
-    const auto alias = source.names.find(metric.alias());
+    const auto alias = metric.has_alias() ? source.names.find(metric.alias())
+                                          : source.names.end();
+    const bool has_alias = alias != source.names.end();
     const auto found = source.metrics.find(
-        metric.has_name() || alias == source.names.end() ? metric.name()
-                                                         : alias->second);
+        metric.has_name() || !has_alias ? metric.name() : alias->second);
     if (found == source.metrics.end()) {
-      handlers.wrong(
-          message.source,
-          (metric.has_name() ? metric.name()
-                             : "alias " + std::to_string(metric.alias())) +
-              " is none of its birth" + kAsked);
-      known = false;
+      // A metric without a tag is kept by its alias only.
+      const bool skip =
+          birth ||
+          (metric.has_name() ? TagOf(message.source, metric.name()).empty()
+                             : has_alias);
+      if (!skip) {
+        handlers.wrong(message.source,
+                       NameOf(metric) + " is none of its birth" + kAsked);
+        known = false;
+      }
       continue;
     }
     const auto& [tag, type] = found->second;
-    if (tag.empty()) {
-      continue;
-    }
     importer::TagReading reading;
     reading.tag = tag;
     reading.source = message.source;
     // A birth says what stands now, whenever it last changed.
     if (payload.has_stamp() || metric.has_stamp()) {
-      const bool birth = message.type.ends_with("BIRTH");
       reading.stamp_ns =
           StampOf((birth && payload.has_stamp()) || !metric.has_stamp()
                       ? payload.stamp()
@@ -352,8 +375,13 @@ void SparkplugHost::Beat(Clock::time_point now,
     return;
   }
   beat_ = now;
+  for (auto& [name, node] : nodes_) {
+    if (node.wanted) {
+      Ask(name, node, now);
+    }
+  }
   for (const auto& [name, source] : sources_) {
-    if (source.has_tags) {
+    if (!source.metrics.empty()) {
       const nanoseconds since = now - source.heard - lag_;
       handlers.alive(name, source.stamp_ns + since.count());
     }
@@ -369,7 +397,7 @@ SparkplugSource::SparkplugSource(const MqttOptions& options,
   client_.Start();
 }
 
-// What was not in the table so far is said by a birth.
+// A birth says the values of tags that are new in the table.
 void SparkplugSource::Use(const LiveTable& table) {
   host_.Use(TagsOf(table));
   host_.Greet(SparkplugHost::Clock::now());

@@ -25,7 +25,7 @@ namespace fdi::gateway {
 /// first of them that the table has. Metrics without a tag are skipped.
 ///
 /// A node of which a message is missing is not believed before its next birth,
-/// which is asked for. One thread.
+/// which is asked for until it comes. One thread.
 class SparkplugHost {
  public:
   using Clock = std::chrono::steady_clock;
@@ -40,11 +40,12 @@ class SparkplugHost {
   void Use(std::set<std::string, std::less<>> tags);
   void Take(const MqttEvent& message, Clock::time_point now,
             const ReadingHandlers& handlers);
-  /// Tells which sources live. Call it often.
+  /// Tells which sources live, and asks for births that have not come. Call it
+  /// often.
   void Beat(Clock::time_point now, const ReadingHandlers& handlers);
   /// The connection to the broker is lost: so is what all nodes said.
   void Lose(const ReadingHandlers& handlers);
-  /// Asks all nodes for a birth.
+  /// Asks all nodes for a birth, at once.
   void Greet(Clock::time_point now);
 
   std::string topics() const { return prefix_ + "#"; }
@@ -55,15 +56,16 @@ class SparkplugHost {
     std::optional<std::uint64_t> bd_seq;
     std::uint64_t next_seq{0};
     std::optional<Clock::time_point> asked;
+    bool wanted{false};  // From asking for a birth to its coming.
   };
   struct Metric {
     std::string tag;
     std::uint32_t type{0};
   };
   struct Source {
-    std::unordered_map<std::string, Metric> metrics;
-    std::unordered_map<std::uint64_t, std::string> names;  // By alias.
-    bool has_tags{false};
+    std::unordered_map<std::string, Metric> metrics;  // With a tag, by name.
+    // All of the birth, by alias; empty without a tag.
+    std::unordered_map<std::uint64_t, std::string> names;
     std::int64_t stamp_ns{0};  // Its clock when it was heard last.
     Clock::time_point heard;
   };
@@ -76,7 +78,7 @@ class SparkplugHost {
   std::string Read(const MqttEvent& event, Message& message) const;
   std::string Follow(const Message& message, Node& node,
                      const ReadingHandlers& handlers);
-  void Learn(const Message& message);
+  bool Learn(const Message& message);
   bool Tell(const Message& message, const Source& source,
             const ReadingHandlers& handlers);
   std::string TagOf(const std::string& source, const std::string& name) const;
@@ -90,7 +92,7 @@ class SparkplugHost {
   std::function<void(const Outgoing&)> send_;
   std::set<std::string, std::less<>> tags_;
   std::map<std::string, Node> nodes_;
-  std::map<std::string, Source> sources_;  // Of nodes and devices that live.
+  std::map<std::string, Source> sources_;  // Nodes and devices that live.
   std::unordered_map<std::string, std::string> owners_;  // Sources, by tag.
   Clock::time_point beat_;
 };

@@ -242,6 +242,75 @@ TEST_F(SparkplugHostTest, ADeviceOrAnAliasThatIsNoneOfTheBirth) {
   EXPECT_THAT(wrong_.back(), HasSubstr("N: N/E: no DBIRTH has come"));
 }
 
+TEST_F(SparkplugHostTest, AMetricWithoutATagIsSkipped) {
+  Take("NBIRTH/N", NodeBirth(3));
+  Payload birth = DeviceBirth(1);
+  Add(birth, "other", 8, sparkplug::DOUBLE).set_double_value(1.0);
+  Take("DBIRTH/N/D", birth);
+  Take("DDATA/N/D", Data(2, 8, 2.0));
+  Payload named = Sent(3);
+  Add(named, "other", 0, sparkplug::DOUBLE).set_double_value(3.0);
+  Take("DDATA/N/D", named);
+  EXPECT_THAT(tags_, ElementsAre("FV1.OP"));
+  EXPECT_THAT(wrong_, IsEmpty());
+  named.set_seq(4);
+  named.mutable_metrics(0)->set_name("FV1.MODE");
+  Take("DDATA/N/D", named);
+  EXPECT_THAT(wrong_, ElementsAre(HasSubstr("N/D: FV1.MODE is none")));
+}
+
+TEST_F(SparkplugHostTest, NeitherNameNorAliasIsNotAliasZero) {
+  Take("NBIRTH/N", NodeBirth(3));
+  Payload birth = DeviceBirth(1);
+  birth.mutable_metrics(0)->set_alias(0);
+  Take("DBIRTH/N/D", birth);
+  readings_.clear();
+  Payload data = Sent(2);
+  data.add_metrics()->set_double_value(99.0);
+  Take("DDATA/N/D", data);
+  EXPECT_THAT(readings_, IsEmpty());
+  EXPECT_THAT(wrong_, ElementsAre(HasSubstr("no name and no alias")));
+  Take("DDATA/N/D", Data(3, 0, 5.0));
+  EXPECT_EQ(Only().value, 5.0);
+}
+
+TEST_F(SparkplugHostTest, ABirthThatDoesNotComeIsAskedForAgain) {
+  Bear();
+  Take("DDATA/N/D", Data(3, 7, 1.0));
+  now_ += seconds(5);
+  host_.Beat(now_, handlers_);
+  EXPECT_EQ(commands_.size(), 1U);
+  now_ += seconds(6);
+  host_.Beat(now_, handlers_);
+  EXPECT_EQ(commands_.size(), 2U);
+  Bear();
+  now_ += seconds(11);
+  host_.Beat(now_, handlers_);
+  EXPECT_EQ(commands_.size(), 2U);
+  Take("DDATA/N/D", Data(3, 7, 1.0));
+  EXPECT_EQ(commands_.size(), 3U);
+  Take("NDEATH/N", NodeDeath(3));  // Nobody is there to answer.
+  now_ += seconds(11);
+  host_.Beat(now_, handlers_);
+  EXPECT_EQ(commands_.size(), 3U);
+}
+
+// An answer to an earlier question, or none, is not enough.
+TEST_F(SparkplugHostTest, ANewTableOrConnectionAsksAtOnceAndUntilTheBirth) {
+  Bear();
+  Take("DDATA/N/D", Data(3, 7, 1.0));
+  Bear();
+  host_.Use({"FV1.OP", "FV1.P1"});
+  host_.Greet(now_);
+  EXPECT_EQ(commands_.size(), 2U);
+  host_.Lose(handlers_);
+  host_.Greet(now_);
+  EXPECT_EQ(commands_.size(), 3U);
+  now_ += seconds(11);
+  host_.Beat(now_, handlers_);
+  EXPECT_EQ(commands_.size(), 4U);
+}
+
 TEST_F(SparkplugHostTest, AfterAMissingMessageNothingCountsUntilABirth) {
   Bear();
   Take("DDATA/N/D", Data(3, 7, 1.0));
@@ -338,6 +407,8 @@ TEST_F(SparkplugHostTest, WhatIsNoMessageOfANodeChangesNothing) {
   host_.Take({MqttEvent::Kind::kMessage, "spBv1.0/G", "", false}, now_,
              handlers_);
   EXPECT_EQ(wrong_.size(), 5U);
+  Take("DDATA/N/" + std::string(1024, 'x'), Data(2, 7, 6.0));
+  EXPECT_THAT(wrong_.back(), HasSubstr("no topic of Sparkplug B"));
   Take("DDATA/N/D", Data(2, 7, 6.0));
   EXPECT_EQ(Only().value, 6.0);
 }
@@ -362,6 +433,29 @@ TEST_F(SparkplugHostTest, NamesThatSomebodyMakesUpEndNoNode) {
   for (int i = 0; i < 10'001; ++i) {
     Take("NDATA/ghost" + std::to_string(i), Sent(0));
   }
+  Take("DDATA/N/D", Data(2, 7, 6.0));
+  EXPECT_EQ(Only().value, 6.0);
+}
+
+TEST_F(SparkplugHostTest, MetricsThatSomebodyMakesUpEndNoNode) {
+  Bear();
+  Payload names = Sent(0);
+  Payload aliases = Sent(0);
+  for (std::uint64_t i = 0; i < 50'000; ++i) {
+    names.add_metrics()->set_name("x" + std::to_string(i));
+    aliases.add_metrics()->set_alias(i);
+    aliases.add_metrics()->set_alias(50'000 + i);
+  }
+  for (int i = 0; i < 11; ++i) {  // A name without a tag is not kept.
+    Take("NBIRTH/named" + std::to_string(i), names);
+  }
+  for (int i = 0; i < 5; ++i) {
+    Take("NBIRTH/ghost" + std::to_string(i), aliases);
+  }
+  EXPECT_THAT(wrong_, ElementsAre(HasSubstr("ghost4: ghost4: the group has "
+                                            "more than 500 000 metrics")));
+  Take("NBIRTH/ghost0", aliases);  // In place of what it had.
+  EXPECT_EQ(wrong_.size(), 1U);
   Take("DDATA/N/D", Data(2, 7, 6.0));
   EXPECT_EQ(Only().value, 6.0);
 }
