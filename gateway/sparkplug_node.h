@@ -28,9 +28,9 @@ class SparkplugNode {
   Outgoing Birth();
   /// The topic of commands to this node.
   std::string commands() const { return Topic("NCMD", ""); }
-  /// Whether the payload of a command asks for a rebirth.
+  /// True if the payload of a command asks for a rebirth.
   static bool AsksForBirth(const std::string& payload);
-  /// What is new of a state or of the monitor, by a message of ValveStates.
+  /// Tells the news of a valve or of the monitor in a message of ValveStates.
   std::vector<Outgoing> Tell(const Outgoing& message);
 
  private:

@@ -18,7 +18,7 @@ const {followStates} = await import('./programs.mjs');
 const {Users} = await import('./users.mjs');
 const {Valves} = await import('./valves.mjs');
 
-const uri = `urn:${hostname()}:fdi`;  // Of this server; that of the valves is the same everywhere.
+const uri = `urn:${hostname()}:fdi`;  // Names this server; the valves have the same URI everywhere.
 const {MessageSecurityMode, SecurityPolicy} = opcua;
 const say = text => console.error(`opcua_server: ${text}`);
 const clientsAtOnce = 100;
