@@ -171,6 +171,7 @@ kill -9 $broker
 wait $broker 2>/dev/null || true
 await 20 grep -q broker_lost in.log
 await 20 grep -q broker_lost out.log
+kill $host
 : >told.txt
 start_broker
 start_host
