@@ -105,7 +105,7 @@ ShareTails::ShareTails(const std::vector<HealthyHours>& valves) {
       excesses.push_back((hour.share - level) / mean +
                          (hour.at_least ? 1.0 : 0.0));
     }
-    known[valve.valve_id] = {level, mean};
+    known[valve.valve_id] = {level, mean, valve.model_hash, valve.epoch};
     hours[valve.valve_id] = HoursOf(valve);
     pooled_hours_ += HoursOf(valve);
     runs.Add(valve, level);
@@ -135,6 +135,13 @@ double ShareTails::longest_hours() const {
 
 double ShareTails::LongestHours(double share) const {
   return share > 1.0 ? longest_hours() : longest_other_hours_;
+}
+
+bool ShareTails::Covers(std::string_view valve_id, std::uint64_t model_hash,
+                        std::uint32_t epoch) const {
+  const auto found = places_.find(valve_id);
+  return found != places_.end() && found->second.model_hash == model_hash &&
+         found->second.epoch == epoch;
 }
 
 std::optional<double> ShareTails::ReturnHours(std::string_view valve_id,

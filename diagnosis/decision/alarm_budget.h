@@ -24,10 +24,13 @@ struct HealthyHours {
   };
 
   std::string valve_id;
-  std::vector<Hour> hours;
+  std::uint64_t model_hash{0};  ///< Of the present model set,
+  std::uint32_t epoch{0};       ///< and the present equipment.
+  std::vector<Hour> hours{};
   int days{0};  ///< UTC days that the hours are of.
-  /// Episodes beyond no limit (looks, stuck transmitters, ...), and the whole
-  /// hours that they lasted. No label calls them a fault, nor the alarms.
+  /// Episodes that began beyond no limit (looks, stuck transmitters, ...), and
+  /// the whole hours that they lasted. No label calls them a fault, nor the
+  /// alarms.
   int others{0};
   int others_lasted{0};
   int alarms{0};  ///< Episodes that were alarms.
@@ -68,6 +71,9 @@ class ShareTails {
   /// @returns [h]; nothing: the valve has none yet.
   std::optional<double> ReturnHours(std::string_view valve_id, double share,
                                     int lasted = 0) const;
+  /// Whether it has return periods with these models and this equipment.
+  bool Covers(std::string_view valve_id, std::uint64_t model_hash,
+              std::uint32_t epoch) const;
   /// Hours of all valves that have return periods.
   double pooled_hours() const { return pooled_hours_; }
   /// The longest return period of an episode beyond a limit; 0: there is none.
@@ -82,6 +88,8 @@ class ShareTails {
   struct Place {
     double level;
     double scale;
+    std::uint64_t model_hash;
+    std::uint32_t epoch;
   };
 
   std::map<std::string, Place, std::less<>> places_;
@@ -112,6 +120,12 @@ class AlarmBudget {
     bool notice{false};  ///< Never where the return period is not known.
   };
   Weight Weigh(std::string_view valve_id, double share, int lasted = 0) const;
+  /// The hours that Weigh() goes by are of these models and this equipment. If
+  /// not, every episode is an alarm.
+  bool Covers(std::string_view valve_id, std::uint64_t model_hash,
+              std::uint32_t epoch) const {
+    return tails_.Covers(valve_id, model_hash, epoch);
+  }
 
   /// What can be said of the budget now.
   struct Promise {

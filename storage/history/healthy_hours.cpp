@@ -1,6 +1,7 @@
 #include "storage/history/healthy_hours.h"
 
 #include <algorithm>
+#include <map>
 #include <set>
 #include <string>
 
@@ -13,13 +14,32 @@ namespace sql = history_sql;
 namespace {
 
 constexpr std::int64_t kMaxHours = 200'000;
-constexpr double kJudged = 0.9;  // of an hour
+constexpr std::int64_t kLeastPerValve = 200;  // Tails take 72 healthy ones.
+constexpr std::int64_t kRecent = 168;         // Hours: a standstill of a week.
+constexpr double kJudged = 0.9;               // of an hour
 constexpr std::int64_t kMsPerHour = 3'600'000;
 constexpr std::int64_t kHoursPerDay = 24;
 
 bool IsHealthy(const HealthHour& hour) {
   return hour.share > 0 && static_cast<double>(hour.live_ms - hour.alarm_ms) >=
                                kJudged * static_cast<double>(kMsPerHour);
+}
+
+bool IsOfSet(const HealthHour& hour, const HealthHour& set) {
+  return hour.model_hash == set.model_hash && hour.epoch == set.epoch;
+}
+
+// The present set, of hours with the newest first. In the hour of a swap there
+// are two, of which the hours before have the old one.
+const HealthHour& PresentSet(const std::vector<HealthHour>& hours) {
+  const std::int64_t newest = hours.front().hour;
+  const auto found = std::ranges::find_if(hours, [&](const HealthHour& set) {
+    return set.hour == newest &&
+           std::ranges::none_of(hours, [&](const auto& h) {
+             return h.hour < newest && IsOfSet(h, set);
+           });
+  });
+  return found != hours.end() ? *found : hours.front();
 }
 
 // What a label calls a fault says nothing of a healthy valve.
@@ -53,34 +73,53 @@ void AddEpisodes(Database& database, std::int64_t since_ns,
 
 std::vector<HealthyHours> ReadHealthyHours(Database& database) {
   const std::vector<std::string> ids = HealthValves(database, "*");
-  const std::int64_t each =
-      kMaxHours / std::max<std::int64_t>(std::ssize(ids), 1);
+  const std::int64_t each = std::max(
+      kLeastPerValve, kMaxHours / std::max<std::int64_t>(std::ssize(ids), 1));
   std::vector<HealthyHours> valves;
+  std::map<std::string, std::int64_t> last;
+  std::int64_t newest = 0;
   for (const std::string& id : ids) {
     const std::vector<HealthHour> hours = NewestHealth(database, id, each);
     if (hours.empty()) {
       continue;  // Nothing judges it.
     }
+    const HealthHour& set = PresentSet(hours);
     HealthyHours valve;
     valve.valve_id = id;
+    valve.model_hash = set.model_hash;
+    valve.epoch = set.epoch;
+    bool observed = false;  // Not by the audit of its loop alone.
     std::set<std::int64_t> days;
-    std::int64_t first = hours.front().hour;
+    std::int64_t first = set.hour;
+    std::int64_t others = set.hour;  // Hour of another set.
     for (const HealthHour& hour : hours) {
-      if (hour.model_hash != hours.front().model_hash ||
-          hour.epoch != hours.front().epoch) {
-        break;
+      if (!IsOfSet(hour, set)) {
+        others = hour.hour;
+        continue;
+      }
+      if (hour.hour < others && others < first) {
+        break;  // What the set was before another one.
       }
       first = hour.hour;
+      observed = observed || hour.share > 0;
       if (IsHealthy(hour)) {
         valve.hours.push_back(
             {hour.hour, HealthHour::kShare * static_cast<double>(hour.share)});
         days.insert(hour.hour / kHoursPerDay);
       }
     }
+    if (!observed) {
+      continue;
+    }
     valve.days = static_cast<int>(days.size());
     AddEpisodes(database, first * kNsPerHour, valve);
+    last[id] = set.hour;
+    newest = std::max(newest, set.hour);
     valves.push_back(std::move(valve));
   }
+  std::erase_if(valves, [&](const HealthyHours& valve) {
+    return last[valve.valve_id] < newest - kRecent;
+  });
   return valves;
 }
 

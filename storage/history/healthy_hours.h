@@ -10,8 +10,10 @@ namespace fdi::storage {
 /// The healthy hours of all valves that are judged, each with the model set and
 /// the equipment that it has now: hours of which at least nine tenths were
 /// judged without an open episode. Of all valves together the newest 200 000
-/// are read, which takes a second and supports return periods of two million
-/// hours.
+/// are read, but 200 of each at least; 200 000 take 0.2 s and support return
+/// periods of two million hours. Left out are valves that no observers judge,
+/// and those whose last hour is more than a week older than the newest one of
+/// all valves.
 /// @throws SqliteError, DataError
 std::vector<HealthyHours> ReadHealthyHours(Database& database);
 

@@ -251,5 +251,76 @@ TEST_F(HealthRowsTest, HealthyHoursAreJudgedAndWithoutAnEpisode) {
   EXPECT_EQ(valves[0].days, 2);
 }
 
+// Which of two is the newer one is not said by their hashes.
+TEST_F(HealthRowsTest, InTheHourOfASwapTheNewSetCounts) {
+  for (const bool greater : {false, true}) {
+    const std::string id = greater ? "V2" : "V1";
+    const std::uint64_t was = greater ? 7 : 8;
+    std::vector<HealthHour> hours;
+    for (const auto& [hour, hash] : {std::pair{1, 15 - was},
+                                     {2, 15 - was},
+                                     {3, was},
+                                     {4, was},
+                                     {5, was},
+                                     {5, 15 - was}}) {
+      hours.push_back(Typical(id, 400'000 + hour, 1, random_));
+      hours.back().model_hash = hash;
+    }
+    const auto store = [&] {
+      Transaction transaction(writer_.database());
+      StoreHealth(writer_.database(), hours);
+      transaction.Commit();
+      return ReadHealthyHours(writer_.database()).back();
+    };
+    hours.erase(hours.begin(), hours.begin() + 2);
+    EXPECT_EQ(store().model_hash, 15 - was);
+    EXPECT_EQ(store().hours.size(), 1U);
+    // An hour on, the part of the swap's hour counts, too; not the time before.
+    hours = {Typical(id, 400'001, 1, random_),
+             Typical(id, 400'006, 1, random_)};
+    hours[0].model_hash = hours[1].model_hash = 15 - was;
+    const HealthyHours valve = store();
+    EXPECT_EQ(valve.model_hash, 15 - was);
+    EXPECT_EQ(valve.epoch, 2U);
+    EXPECT_EQ(valve.hours.size(), 2U);
+  }
+}
+
+// V1 has 150 hours; of 2000 valves a tail takes 72 each.
+TEST_F(HealthRowsTest, ManyValvesHaveHoursEnoughForTails) {
+  std::vector<HealthHour> hours;
+  for (int i = 0; i < 150; ++i) {
+    hours.push_back(Typical("V1", 400'000 + i, 1, random_));
+  }
+  for (int v = 2; v <= 2000; ++v) {
+    hours.push_back(Typical("V" + std::to_string(v), 400'149, 1, random_));
+  }
+  Transaction transaction(writer_.database());
+  StoreHealth(writer_.database(), hours);
+  transaction.Commit();
+
+  EXPECT_EQ(ReadHealthyHours(writer_.database()).at(0).hours.size(), 150U);
+}
+
+// Each would raise what the budget needs, and have no part in it.
+TEST_F(HealthRowsTest, ValvesThatAreGoneOrAuditedAloneAreLeftOut) {
+  std::vector<HealthHour> hours = {Typical("V1", 400'168, 1, random_),
+                                   Typical("V2", 400'000, 1, random_),
+                                   Typical("V3", 399'999, 1, random_)};
+  for (const int hour : {400'167, 400'168}) {
+    hours.push_back(Typical("V4", hour, 1, random_));
+  }
+  hours.back().model_hash = 1;
+  hours.back().share = 0;
+  Transaction transaction(writer_.database());
+  StoreHealth(writer_.database(), hours);
+  transaction.Commit();
+
+  const std::vector<HealthyHours> valves = ReadHealthyHours(writer_.database());
+  ASSERT_EQ(valves.size(), 2U);
+  EXPECT_EQ(valves[0].valve_id, "V1");
+  EXPECT_EQ(valves[1].valve_id, "V2");
+}
+
 }  // namespace
 }  // namespace fdi::storage

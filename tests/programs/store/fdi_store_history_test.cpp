@@ -640,7 +640,7 @@ TEST_F(FdiStoreHistoryTest, DoctorTellsWhichBudgetsOfAlarmsAreKept) {
     for (int i = 0; i < (v < 4 ? 300 : 1); ++i) {
       HealthHour& hour = hours.emplace_back();
       hour.valve_id = "TV-" + std::to_string(v);
-      hour.hour = 490'000 + i;
+      hour.hour = 490'300 - i;
       hour.model_hash = 7;
       hour.seen_ms = hour.live_ms = 3'600'000;
       hour.share = 400 + std::llround(-100.0 * std::log((i + 0.5) / 300.0));
