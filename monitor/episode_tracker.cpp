@@ -62,6 +62,8 @@ void EpisodeTracker::Advance(const Sample& sample, const Verdict& verdict,
     TryRecovery(sample, models, outlet);
     source_id_ = sample.source_id;
     seq_ = sample.seq;
+    model_hash_ = models.content_hash;
+    epoch_ = sample.epoch;
   }
 }
 
@@ -89,15 +91,9 @@ void EpisodeTracker::Step(const Sample& sample, const Verdict& verdict,
   for (const Transition& transition : verdict.Transitions()) {
     Take(transition, verdict, models, outlet);
   }
-  if (open_ && !EndsEpisode(open_->last)) {
-    const bool was_notice = open_->notice;
-    Weigh(verdict);
-    if (was_notice && !open_->notice) {
-      Transition raised = open_->last;
-      raised.kind = TransitionKind::kRaised;
-      raised.stamp_ns = verdict.stamp_ns;
-      Emit(raised, models, outlet);
-    }
+  // The observers go on beside an episode of the audit.
+  if (open_ && open_->models->content_hash == models->content_hash) {
+    Reweigh(verdict, outlet);
   }
   FollowUnknown(verdict, *models);
   if (tracing()) {
@@ -106,6 +102,20 @@ void EpisodeTracker::Step(const Sample& sample, const Verdict& verdict,
         trace_.size() >= static_cast<std::size_t>(options_.points_per_write)) {
       WriteTrace(complete, outlet);
     }
+  }
+}
+
+void EpisodeTracker::Reweigh(const Verdict& verdict, EpisodeOutlet& outlet) {
+  if (!open_ || EndsEpisode(open_->last)) {
+    return;
+  }
+  const bool was_notice = open_->notice;
+  Weigh(verdict);
+  if (was_notice && !open_->notice) {
+    Transition raised = open_->last;
+    raised.kind = TransitionKind::kRaised;
+    raised.stamp_ns = verdict.stamp_ns;
+    Emit(raised, open_->models, outlet);
   }
 }
 
@@ -228,17 +238,19 @@ FaultEvent EpisodeTracker::EndOf(const OpenEpisode& episode, EndReason reason,
 }
 
 bool EpisodeTracker::Begin(const Transition& transition, const Verdict& verdict,
-                           const ModelSet& models, EpisodeOutlet& outlet) {
+                           const std::shared_ptr<const ModelSet>& models,
+                           EpisodeOutlet& outlet) {
   open_ = Open{};
+  open_->models = models;
   open_->trace_until_ns = transition.stamp_ns + Ns(options_.after_detection_s);
-  if (Resumes(verdict.source_id, models)) {
+  if (Resumes(verdict.source_id, *models)) {
     const OpenEpisode episode = *std::exchange(recovered_, std::nullopt);
     open_->episode_id = episode.episode_id;
     open_->source_id = episode.source_id;
     open_->detection_stamp_ns = episode.detection_stamp_ns;
     open_->faults = episode.faults;
     open_->candidates = episode.candidates;
-    open_->share = episode.share;
+    open_->first_share = open_->share = episode.share;
     open_->notice = episode.notice;
     open_->last = transition;
     open_->last.faults = episode.faults;
@@ -248,6 +260,9 @@ bool EpisodeTracker::Begin(const Transition& transition, const Verdict& verdict,
     return true;
   }
   open_->source_id = verdict.source_id;
+  open_->first_share = verdict.share;
+  // An alarm that it takes the place of goes on in it.
+  open_->notice = !std::exchange(replaces_alarm_, false);
   open_->detection_stamp_ns = transition.detection_stamp_ns;
   open_->episode_id =
       EpisodeId(valve_id_, verdict.source_id, transition.detection_stamp_ns);
@@ -259,7 +274,7 @@ void EpisodeTracker::Take(const Transition& transition, const Verdict& verdict,
                           EpisodeOutlet& outlet) {
   // The earlier session has reported the detection of what goes on.
   if (transition.kind == TransitionKind::kDetected &&
-      Begin(transition, verdict, *models, outlet)) {
+      Begin(transition, verdict, models, outlet)) {
     return;
   }
   if (!open_) {
@@ -296,7 +311,7 @@ void EpisodeTracker::Weigh(const Verdict& verdict) {
         std::max(open_->lasted, static_cast<int>(open_ns / kNsPerHour));
   }
   const auto budget = gate_ ? gate_->Get() : nullptr;
-  if (!budget) {
+  if (!budget || !budget->Covers(valve_id_, model_hash_, epoch_)) {
     open_->notice = false;
     return;
   }
@@ -330,7 +345,9 @@ void EpisodeTracker::Emit(Transition transition,
   const bool closed = transition.kind == TransitionKind::kClosed;
   const bool superseded = transition.reason == EndReason::kSuperseded;
   transition.detection_stamp_ns = open_->detection_stamp_ns;
-  transition.share = open_->share;
+  // What began beyond no limit counts as such, whatever comes.
+  transition.share =
+      open_->first_share > 1.0 ? open_->share : open_->first_share;
   transition.return_hours = open_->return_hours;
   transition.notice = open_->notice;
   open_->last = transition;
@@ -355,6 +372,8 @@ void EpisodeTracker::Emit(Transition transition,
                        true});
   }
   if (closed) {
+    replaces_alarm_ =
+        superseded && transition.layer == Layer::kAudit && !transition.notice;
     open_.reset();
   }
 }

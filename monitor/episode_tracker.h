@@ -67,6 +67,10 @@ class EpisodeTracker {
             const std::shared_ptr<const ModelSet>& models,
             EpisodeOutlet& outlet);
 
+  /// Weighs the open episode by `verdict`, which is of its own models: a notice
+  /// that is rare by now is told as an alarm. Step() does it, too.
+  void Reweigh(const Verdict& verdict, EpisodeOutlet& outlet);
+
   /// Instants of before the first Step(), oldest first, for the evidence alone.
   void Remember(const std::vector<Sample>& samples, const ModelSet& models);
 
@@ -109,13 +113,15 @@ class EpisodeTracker {
   struct Open {
     std::uint64_t episode_id{0};
     std::uint64_t source_id{0};
+    std::shared_ptr<const ModelSet> models;
     std::int64_t detection_stamp_ns{0};  // As recorded.
     std::int64_t trace_until_ns{0};
     bool tracing{true};
     FaultSet faults{0};  // Its name.
     std::vector<FaultCandidate> candidates;
-    double share{0.0};  // The largest so far.
-    int lasted{0};      // Whole hours.
+    double first_share{0.0};  // At its detection.
+    double share{0.0};        // The largest so far.
+    int lasted{0};            // Whole hours.
     std::optional<double> return_hours;
     bool notice{true};  // Until it is weighed, which is at once.
     Transition last{};  // The last one that was told.
@@ -137,7 +143,8 @@ class EpisodeTracker {
             EpisodeOutlet& outlet);
   // @returns whether it resumes an episode.
   bool Begin(const Transition& transition, const Verdict& verdict,
-             const ModelSet& models, EpisodeOutlet& outlet);
+             const std::shared_ptr<const ModelSet>& models,
+             EpisodeOutlet& outlet);
   void Weigh(const Verdict& verdict);
   void FollowUnknown(const Verdict& verdict, const ModelSet& models);
   void Emit(Transition transition,
@@ -157,6 +164,9 @@ class EpisodeTracker {
   std::int64_t accepted_stamp_ns_{0};  // 0: none of this source yet
   std::uint64_t source_id_{0};
   std::uint64_t seq_{0};
+  std::uint64_t model_hash_{0};  // Of the valve, whatever its episode is of.
+  std::uint32_t epoch_{0};
+  bool replaces_alarm_{false};  // The observers' next episode, of the audit's.
 };
 
 }  // namespace fdi::monitor

@@ -245,6 +245,9 @@ void ValveMonitor::TellOfLoop(const Sample& sample, EpisodeOutlet& outlet) {
       (watch.episode_open() && watch.at_point() && tracker_.tracing())) {
     tracker_.Step(LoopWatch::Reduced(sample), verdict, watch.models(), outlet);
   }
+  if (watch.episode_open() && watch.at_point()) {
+    tracker_.Reweigh(verdict, outlet);  // Its evidence may be complete by now.
+  }
   if (watch.found_normal() && tracker_.recovering() == nullptr) {
     normal_by_audit_ = false;
     found_normal_ = true;

@@ -312,7 +312,8 @@ std::vector<HealthyHours> HoursBefore(const std::vector<ValveRows>& valves,
         continue;
       }
       const int lasted = WholeHours(episode, episode.close_s);
-      if (const double share = episode.shares.back().second; share > 1.0) {
+      if (episode.shares.front().second > 1.0) {
+        const double share = episode.shares.back().second;
         valve.hours.push_back(
             {static_cast<std::int64_t>(episode.open_s / kSecondsPerHour),
              labelled ? share : 1.0, lasted, !labelled});

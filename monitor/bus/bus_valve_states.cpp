@@ -71,7 +71,7 @@ void BusValveStates::OnEvent(const FaultEvent& event) {
   const bool over = episode.cleared_ns || episode.ended_ns;
   // The valve may have been found normal before its events were stored.
   if (episode.notice) {
-    valve.alarm.reset();
+    // An alarm that its data left unconfirmed stands beside it.
   } else if (over && (!episode.unconfirmed_ns ||
                       valve.normal_ns > *episode.unconfirmed_ns)) {
     valve.alarm.reset();
@@ -121,6 +121,7 @@ void BusValveStates::OnVerdict(const std::string& valve_id,
   if (OutOfOrder(verdict.intake)) {
     return;
   }
+  const bool alarm = verdict.detected && !outcome.notice;
   const bool partly = verdict.confidence < 1.0 || outcome.contested;
   const State state = outcome.notice ? State::kNormal : verdict.state;
   const MutexLock lock(mutex_);
@@ -129,7 +130,7 @@ void BusValveStates::OnVerdict(const std::string& valve_id,
                     valve.state != state || valve.partly != partly ||
                     valve.models != outcome.models || outcome.model_swapped ||
                     valve.unjudged_ns != outcome.unjudged_ns ||
-                    (valve.left && (verdict.detected || outcome.found_normal));
+                    (valve.left && (alarm || outcome.found_normal));
   valve.silent = false;
   valve.quality = verdict.quality;
   valve.state = state;
@@ -149,7 +150,7 @@ void BusValveStates::OnVerdict(const std::string& valve_id,
       valve.alarm.reset();
     }
   }
-  valve.left = valve.left && valve.alarm && !verdict.detected;
+  valve.left = valve.left && valve.alarm && !alarm;
   if (news || !IsFresh(valve.as_of_ns, valve.told.as_of_ns)) {
     Tell(valve_id, valve);
   }

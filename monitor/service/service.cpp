@@ -311,7 +311,7 @@ void Service::Start() {
   StartParts();
   ResendEvents();
   RecoverAlarms();
-  RefreshBudget();
+  Guarded(counters_, log_, "alarm_budget", [this] { RefreshBudget(); });
   if (recorder_) {
     recorder_->Start();
   }

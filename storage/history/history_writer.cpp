@@ -490,7 +490,10 @@ bool HistoryWriter::Record(const FaultEvent& event, std::int64_t now_ns) {
                       : EndOfStored(database_, event);
     entry.recorded_ns = now_ns;
     is_new = StoreEvent(database_, entry, event);
-    if (is_new && t.kind == TransitionKind::kDetected) {
+    // A notice takes the place of no alarm.
+    if (is_new && !t.notice &&
+        (t.kind == TransitionKind::kDetected ||
+         t.kind == TransitionKind::kRaised)) {
       database_.Cached(sql::end_unconfirmed)
           .Bind(event.valve_id, entry.id)
           .Run();

@@ -13,6 +13,7 @@
 #include "monitor/valve_monitor.h"
 #include "storage/history/history_reader.h"
 #include "storage/history/history_writer.h"
+#include "tests/monitor/budget.h"
 #include "tests/monitor/fake_sinks.h"
 #include "tests/monitor/linear_models.h"
 #include "tests/monitor/test_support.h"
@@ -76,12 +77,14 @@ class LoopJudgeTest : public testing::Test {
   AuditWorker worker_{true};
   ValveMonitor::TimePoint now_{};
   LoopOutlet outlet_;
+  std::shared_ptr<AlarmGate> gate_ = std::make_shared<AlarmGate>();
   ValveMonitor valve_{"V1",
                       std::nullopt,
                       {},
                       nullptr,
                       std::make_shared<const SeverityCatalogue>(),
-                      &worker_};
+                      &worker_,
+                      gate_};
   Verdict last_;
   const ModelSet* models_{nullptr};
 };
@@ -137,6 +140,18 @@ TEST_F(LoopJudgeTest, ItsEpisodeEndsWithTheStreamAndWithAModelSet) {
   EXPECT_FALSE(valve_.episode_open());
 }
 
+// Its evidence is complete after ten minutes, and it lasts for hours.
+TEST_F(LoopJudgeTest, ANoticeIsRaisedOnceItHasLasted) {
+  const auto audit = AuditModels(LoopWatch::kInterval_s);
+  gate_->Set(Budget(8766.0, audit->content_hash, 0, 1));
+  Feed(1, 1100, 0.0);
+  EXPECT_THAT(outlet_.kinds, ElementsAre(TransitionKind::kDetected,
+                                         TransitionKind::kIsolated));
+  EXPECT_TRUE(outlet_.events.back().transition.notice);
+  Feed(1100, 3500, 0.0);
+  EXPECT_EQ(outlet_.kinds.back(), TransitionKind::kRaised);
+}
+
 // Beside the observers of a valve whose X is CV.
 class AuditBesideModelsTest : public LoopJudgeTest {
  protected:
@@ -186,6 +201,37 @@ TEST_F(AuditBesideModelsTest, TellsWhatTheObserversDoNotSee) {
   EXPECT_EQ(outlet_.kinds[3], TransitionKind::kDetected);
   EXPECT_EQ(outlet_.events[3].model_set, "linear");
   EXPECT_EQ(outlet_.kinds[4], TransitionKind::kIsolated);
+}
+
+// The observers go on beside it, and their models are not those of its name.
+TEST_F(AuditBesideModelsTest, ANoticeIsRaisedAsWhatTheAuditFound) {
+  gate_->Set(Budget(8766.0, 0x1234, 0, 1));
+  FeedSticky(1, 3500);
+  ASSERT_THAT(outlet_.kinds,
+              ElementsAre(TransitionKind::kDetected, TransitionKind::kIsolated,
+                          TransitionKind::kRaised));
+  EXPECT_TRUE(outlet_.events[1].transition.notice);
+  const FaultEvent& raised = outlet_.events[2];
+  EXPECT_FALSE(raised.transition.notice);
+  EXPECT_EQ(raised.model_set, "audit");
+  EXPECT_EQ(raised.model_hash, outlet_.events[1].model_hash);
+  EXPECT_EQ(raised.models->faults, outlet_.events[1].models->faults);
+  EXPECT_EQ(raised.transition.share, 0.0);
+}
+
+TEST_F(AuditBesideModelsTest, WhatTakesThePlaceOfAnAlarmIsOne) {
+  FeedSticky(1, 1100);  // Without a budget yet.
+  gate_->Set(Budget(8766.0));
+  FeedSticky(1100, 1110, -7.0);
+  ASSERT_GE(outlet_.kinds.size(), 4U);
+  EXPECT_EQ(outlet_.events[2].transition.reason, EndReason::kSuperseded);
+  EXPECT_EQ(outlet_.kinds[3], TransitionKind::kDetected);
+  EXPECT_FALSE(outlet_.events[3].transition.notice);
+  FeedSticky(1110, 1414);
+  ASSERT_EQ(outlet_.kinds.back(), TransitionKind::kClosed);
+  FeedSticky(1414, 1424, -7.0);  // CV falls, as at 1100.
+  EXPECT_NE(outlet_.kinds.back(), TransitionKind::kClosed);
+  EXPECT_TRUE(outlet_.events.back().transition.notice);
 }
 
 // The observers know what is normal for the valve, the audit does not.

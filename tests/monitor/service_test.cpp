@@ -31,7 +31,9 @@ namespace fdi::monitor {
 namespace {
 
 using testing::Contains;
+using testing::ElementsAre;
 using testing::HasSubstr;
+using testing::IsEmpty;
 using testing::Not;
 using testing::StartsWith;
 
@@ -257,6 +259,61 @@ TEST_F(ServiceTest, AReloadThatFailedIsTriedAgain) {
   EXPECT_EQ(Count("reload_failed id=M112"), 1U);
   // At the start, by the reload and by the second retry.
   EXPECT_EQ(Count("models_loaded model_set=first@1"), 3U);
+}
+
+// A damaged hour must not end the monitor at each start.
+TEST_F(ServiceTest, WithoutItsHoursABudgetMakesEveryEpisodeAnAlarm) {
+  std::filesystem::create_directories(global_.data_dir);
+  Execute(global_.data_dir / "history.db", storage::HistorySchema(),
+          "INSERT INTO health_hour VALUES ('V1', 1, 1, 0, 0, x'FF')");
+  const report::Context context = Context();
+  report::StopSignals signals(report::StopSignals::HangUp::kReload);
+  ServiceOptions options;
+  options.alarm_budget = "1/day";
+  options.on_ready = [] { kill(getpid(), SIGTERM); };
+
+  EXPECT_EQ(Service(options, context).Run(signals), 0);
+
+  EXPECT_EQ(Count("part_failed id=M155 part=alarm_budget"), 1U);
+}
+
+// An alarm whose data ended stands beside a notice, and ends once the valve is
+// normal.
+TEST(BusValveStatesTest, ANoticeTakesThePlaceOfNoAlarm) {
+  const idl::TestDomain domain;
+  idl::DdsOptions dds;
+  dds.domain = domain.id();
+  idl::Participant participant(dds);
+  BusValveStates states(participant, "monitor",
+                        report::FaultTexts(report::SharedFile("faults.toml")));
+  FaultEvent event;
+  event.valve_id = "V1";
+  event.episode_id = 1;
+  event.transition.kind = TransitionKind::kClosed;
+  event.transition.reason = EndReason::kStreamEnded;
+  event.transition.stamp_ns = 1;
+  states.OnEvent(event);
+  ASSERT_THAT(states.Unconfirmed(), ElementsAre(1U));
+
+  FaultEvent notice = event;
+  notice.episode_id = 2;
+  notice.transition.kind = TransitionKind::kDetected;
+  notice.transition.notice = true;
+  notice.transition.stamp_ns = 2;
+  Verdict verdict;
+  verdict.detected = true;
+  verdict.stamp_ns = 2;
+  ValveOutcome outcome{verdict, nullptr, false};
+  outcome.notice = true;
+  states.OnVerdict("V1", {}, outcome);
+  states.OnEvent(notice);
+  EXPECT_THAT(states.Unconfirmed(), ElementsAre(1U));
+
+  verdict.detected = outcome.notice = false;
+  verdict.stamp_ns = 3;
+  outcome.found_normal = true;
+  states.OnVerdict("V1", {}, outcome);
+  EXPECT_THAT(states.Unconfirmed(), IsEmpty());
 }
 
 // The audit found that the rod sticks; the episode that took over from it

@@ -10,6 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "monitor/episode_tracker.h"
+#include "tests/monitor/budget.h"
 #include "tests/monitor/linear_models.h"
 
 namespace fdi::monitor {
@@ -107,21 +108,6 @@ TEST_F(ValveMonitorTest, AFaultIsDetectedIsolatedAndClearedAsOneEpisode) {
   EXPECT_EQ(notebook_.events.at(1).candidates.front().fault, 7);
   EXPECT_TRUE(notebook_.events.at(1).candidates.front().isolated);
   EXPECT_EQ(notebook_.events[3].transition.reason, EndReason::kCleared);
-}
-
-// Four valves whose hours exceed z with exp(-(z - 0.4)/0.1).
-std::shared_ptr<const AlarmBudget> Budget(double between_hours) {
-  std::vector<HealthyHours> fleet(4);
-  for (std::size_t v = 0; v < fleet.size(); ++v) {
-    fleet[v].valve_id = "V" + std::to_string(v);
-    fleet[v].days = 30;
-    for (int i = 0; i < 300; ++i) {
-      // 7 of the highest 60 follow one another.
-      const int rank = 53 * i % 300;
-      fleet[v].hours.push_back({i, 0.4 - 0.1 * std::log((rank + 0.5) / 300.0)});
-    }
-  }
-  return std::make_shared<const AlarmBudget>(between_hours, fleet);
 }
 
 class AlarmGateTest : public ValveMonitorTest {
@@ -224,7 +210,8 @@ TEST_F(AlarmGateTest, WithoutABudgetOrItsHoursEveryEpisodeIsAnAlarm) {
   Gated(104, 150, 0.0);
   notebook_.events.clear();
   gate_->Set(std::make_shared<const AlarmBudget>(
-      8766.0, std::vector<HealthyHours>{{.valve_id = "V1"}}));
+      8766.0,
+      std::vector<HealthyHours>{{.valve_id = "V1", .model_hash = 0x1234}}));
   EXPECT_FALSE(Gated(150, 154, -6.0).notice);
   EXPECT_THAT(notebook_.Kinds(), ElementsAre(TransitionKind::kDetected));
   EXPECT_THAT(Notices(), ElementsAre(false));
@@ -245,6 +232,49 @@ TEST_F(AlarmGateTest, AResumedNoticeStaysOne) {
   EXPECT_THAT(notebook_.Kinds(), Contains(TransitionKind::kRaised));
   for (const FaultEvent& event : notebook_.events) {
     EXPECT_EQ(event.episode_id, left.episode_id);
+  }
+}
+
+// After a swap the hours are of the old set until they are read anew.
+TEST_F(AlarmGateTest, TheHoursOfOtherModelsOrEquipmentMakeNoNotice) {
+  gate_->Set(Budget(8766.0, 0x4321));
+  Gated(0, 100, 0.0);
+  EXPECT_FALSE(Gated(100, 104, -6.0).notice);
+  Gated(104, 150, 0.0);
+  gate_->Set(Budget(8766.0, 0x1234, 1));
+  EXPECT_FALSE(Gated(150, 154, -6.0).notice);
+  for (const FaultEvent& event : notebook_.events) {
+    EXPECT_FALSE(event.transition.notice);
+    EXPECT_FALSE(event.transition.return_hours);
+  }
+}
+
+// A look began it, so it counts among the looks, whose number makes the next
+// one common; weighed it is by all that it shows.
+TEST_F(AlarmGateTest, AnEpisodeCountsAsWhatItBeganAs) {
+  EpisodeTracker tracker("V1", {}, gate_);
+  const auto models = SharedLinearModels();
+  gate_->Set(Budget(8766.0, 0x1234, 0, 2));
+  Verdict verdict;
+  const auto step = [&](std::uint64_t k, double share) {
+    const Sample sample = PlantSample(k);
+    verdict.stamp_ns = sample.stamp_ns;
+    verdict.source_id = sample.source_id;
+    verdict.share = share;
+    tracker.Advance(sample, verdict, *models, notebook_);
+    tracker.Step(sample, verdict, models, notebook_);
+  };
+  verdict.transitions[0].kind = TransitionKind::kDetected;
+  verdict.transitions[0].detection_stamp_ns = PlantSample(0).stamp_ns;
+  verdict.transition_count = 1;
+  step(0, 0.7);
+  EXPECT_TRUE(tracker.notice());
+  verdict.transition_count = 0;
+  step(1, 4.0);
+  EXPECT_THAT(notebook_.Kinds(),
+              ElementsAre(TransitionKind::kDetected, TransitionKind::kRaised));
+  for (const FaultEvent& event : notebook_.events) {
+    EXPECT_EQ(event.transition.share, 0.7);
   }
 }
 

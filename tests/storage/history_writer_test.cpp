@@ -191,6 +191,27 @@ TEST_F(HistoryWriterTest, FaultIsNullUntilIsolatedAndUnknownIfItNeverWas) {
   EXPECT_EQ(Sql("SELECT cleared_utc FROM fault_history"), "NULL");
 }
 
+// An alarm whose data ended stands until the valve is normal or has another.
+TEST_F(HistoryWriterTest, ANoticeTakesThePlaceOfNoAlarmUntilItIsRaised) {
+  HistoryWriter writer(path_);
+  const auto standing = [this] {
+    return Sql("SELECT count(*) FROM episode WHERE unconfirmed_ns IS NOT NULL");
+  };
+  writer.Record(Event(Kind::kDetected, 0, 0, 0.3), kDetected);
+  writer.Record(Event(Kind::kClosed, 50, 0, 0.3, EndReason::kStreamEnded),
+                kDetected);
+  EXPECT_EQ(standing(), "1");
+  FaultEvent event = Event(Kind::kDetected, 0, 0, 0.3);
+  ++event.episode_id;
+  event.transition.notice = true;
+  writer.Record(event, kDetected);
+  EXPECT_EQ(standing(), "1");
+  event.transition.kind = Kind::kRaised;
+  event.transition.notice = false;
+  writer.Record(event, kDetected);
+  EXPECT_EQ(standing(), "0");
+}
+
 TEST_F(HistoryWriterTest, ReisolationReplacesTheAnswerAndKeepsTheFirstTime) {
   HistoryWriter writer(path_);
   writer.Record(Event(Kind::kDetected, 0, 0, 0.3), kDetected);
