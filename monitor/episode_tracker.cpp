@@ -345,7 +345,7 @@ void EpisodeTracker::Emit(Transition transition,
   const bool closed = transition.kind == TransitionKind::kClosed;
   const bool superseded = transition.reason == EndReason::kSuperseded;
   transition.detection_stamp_ns = open_->detection_stamp_ns;
-  // What began beyond no limit counts as such, whatever comes.
+  // An episode that began beyond no limit counts as such, whatever comes.
   transition.share =
       open_->first_share > 1.0 ? open_->share : open_->first_share;
   transition.return_hours = open_->return_hours;

@@ -298,7 +298,7 @@ std::optional<std::int64_t> ValveMonitor::unjudged_since_ns() const {
 
 // An alarm whose data ended stays until the valve is seen to be normal: for as
 // many samples as end an episode, once after each start or end of the stream.
-// What the audit found, the audit alone finds normal.
+// The audit alone finds normal again what the audit found.
 void ValveMonitor::ConfirmNormal(const Verdict& verdict,
                                  EpisodeOutlet& outlet) {
   if (verdict.detected || tracker_.recovering() != nullptr ||

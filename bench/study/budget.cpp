@@ -404,7 +404,7 @@ report::Report Budget(const BudgetOptions& options) {
     end_s =
         std::max(end_s, valve.hours.empty() ? 0.0 : valve.hours.back().first);
   }
-  // What the real number of valves would need of each of these.
+  // The real number of valves would need this of each of these.
   const double between_h = ParseAlarmBudget(options.budget) * options.valves /
                            static_cast<double>(valves.size());
   report::Report report;

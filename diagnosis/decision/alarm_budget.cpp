@@ -27,7 +27,7 @@ bool IsKnown(const HealthyHours& valve) {
   return HoursOf(valve) >= kLeastHours && valve.days >= kLeastDays;
 }
 
-// Of hours above a level, those whose next hour is known, and of these the ones
+// Hours above a level whose next hour is known, and among these the ones
 // that it followed likewise. An episode that nobody calls a fault was above it
 // in each of its hours.
 struct Runs {

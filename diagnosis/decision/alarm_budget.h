@@ -11,7 +11,7 @@
 
 namespace fdi {
 
-/// What is known of one valve without a fault, with its present model set.
+/// The hours of one valve without a fault, with its present model set.
 struct HealthyHours {
   struct Hour {
     std::int64_t hour{0};  ///< Since the epoch, of any one clock.
@@ -71,7 +71,7 @@ class ShareTails {
   /// @returns [h]; nothing: the valve has none yet.
   std::optional<double> ReturnHours(std::string_view valve_id, double share,
                                     int lasted = 0) const;
-  /// Whether it has return periods with these models and this equipment.
+  /// True if it has return periods with these models and this equipment.
   bool Covers(std::string_view valve_id, std::uint64_t model_hash,
               std::uint32_t epoch) const;
   /// Hours of all valves that have return periods.
@@ -114,7 +114,7 @@ class AlarmBudget {
   /// @param valves those that are judged, each of them once.
   AlarmBudget(double between_hours, const std::vector<HealthyHours>& valves);
 
-  /// What an episode is, by its largest share and its whole hours so far.
+  /// Weighs an episode by its largest share and its whole hours so far.
   struct Weight {
     std::optional<double> return_hours;
     bool notice{false};  ///< Never where the return period is not known.
@@ -127,7 +127,7 @@ class AlarmBudget {
     return tails_.Covers(valve_id, model_hash, epoch);
   }
 
-  /// What can be said of the budget now.
+  /// The promise that the hours so far support.
   struct Promise {
     double needed_hours{0.0};   ///< Return period that the budget takes.
     double longest_hours{0.0};  ///< ShareTails::longest_hours()

@@ -54,7 +54,7 @@ struct ServiceOptions {
   std::function<void()> on_ready{[] {}};
   /// Optional parts, which follow valves and events in this order.
   std::vector<std::shared_ptr<ServicePart>> parts{};
-  /// Of false alarms for all valves, ParseAlarmBudget(); empty: every episode
+  /// The false alarms of all valves, ParseAlarmBudget(); empty: every episode
   /// is an alarm.
   std::string alarm_budget{};
 };
@@ -126,7 +126,7 @@ class Service {
   storage::DataDirectory data_;
   storage::ExclusiveLock lock_;
   std::unique_ptr<EventHook> hook_;  // Null: no event hook.
-  // Of the step "on_event", one event at a time; null: not open.
+  // For the step "on_event", one event at a time; null: not open.
   std::unique_ptr<storage::HistoryReader> shelf_reader_;
   std::unique_ptr<storage::ModelStore> identity_reader_;
   // The thread of Run() alone uses it; null: not open.

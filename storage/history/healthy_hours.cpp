@@ -42,7 +42,7 @@ const HealthHour& PresentSet(const std::vector<HealthHour>& hours) {
   return found != hours.end() ? *found : hours.front();
 }
 
-// What a label calls a fault says nothing of a healthy valve.
+// An episode labelled a fault says nothing of a healthy valve.
 void AddEpisodes(Database& database, std::int64_t since_ns,
                  HealthyHours& valve) {
   Statement& row = database.Cached(sql::shares_of_episodes);

@@ -100,7 +100,7 @@ echo gap >&3
 says 'instead of [0-9]*: a message is missing' in.log
 says rebirth edge.txt
 
-# What does not belong there is said by topic or tag, and the others go on.
+# Nonsense is said by topic or tag, and the others go on.
 publish DDATA/line1/V1 -m 41.5
 says 'spBv1.0/plant/DDATA/line1/V1.*no payload of Sparkplug B' in.log
 publish DDATA/ghost/V9 -n

@@ -10,7 +10,7 @@
 
 namespace fdi::monitor {
 
-/// Of four valves, V0 to V3, with 300 hours each that exceed z with
+/// A budget of four valves, V0 to V3, with 300 hours each that exceed z with
 /// exp(-(z - 0.4)/0.1). @param others episodes beyond no limit, of each.
 inline std::shared_ptr<const AlarmBudget> Budget(
     double between_hours, std::uint64_t model_hash = 0x1234,
