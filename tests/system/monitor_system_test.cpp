@@ -55,7 +55,8 @@ TEST_F(MonitorSystemTest, AFaultOnTheBusIsOnTheBusAndInTheHistory) {
 }
 
 // Three valves that show four times a limit in every fifth of their hours.
-void StoreCommonHours(const std::filesystem::path& history) {
+void StoreCommonHours(const std::filesystem::path& history,
+                      std::uint64_t model_hash) {
   std::vector<HealthHour> hours;
   const std::int64_t newest = NowNs() / 3'600'000'000'000;
   for (const char* valve : {"V1", "V2", "V3"}) {
@@ -63,7 +64,7 @@ void StoreCommonHours(const std::filesystem::path& history) {
       HealthHour& hour = hours.emplace_back();
       hour.valve_id = valve;
       hour.hour = newest - 300 + i;
-      hour.model_hash = LinearModels().content_hash;
+      hour.model_hash = model_hash;
       hour.seen_ms = hour.live_ms = 3'600'000;
       hour.share = std::llround(3680.0 - 200.0 * std::log((i + 0.5) / 300.0));
     }
@@ -76,9 +77,11 @@ void StoreCommonHours(const std::filesystem::path& history) {
 }
 
 TEST_F(MonitorSystemTest, WhatIsCommonIsANoticeUntilItIsRare) {
-  StoreModels(directory_.path(), LinearModels());
-  std::filesystem::create_directories(data_);
-  StoreCommonHours(data_ / "history.db");
+  const ModelSet models =
+      storage::ModelStore(data_ / "models.db",
+                          storage::Access::kOccasionalWriter)
+          .Save(LinearModels(), storage::Activation::kAlways);
+  StoreCommonHours(data_ / "history.db", models.content_hash);
   std::ofstream(data_ / "hook") << "#!/bin/sh\ncat >>" << data_ / "told";
   std::filesystem::permissions(data_ / "hook",
                                std::filesystem::perms::owner_all);

@@ -279,6 +279,7 @@ class JsonDocumentsTest : public FdiStoreTest {
       hour.hour = 480'000 + 24 * i;
       hour.model_hash = 1;
       hour.seen_ms = hour.live_ms = 3'600'000;
+      hour.share = 400;
       hour.channels = {{Signal::kX, -10}};
       hour.bins[7] = {{3600, 3600LL * 51 * i, 0, 3600LL * 71'000}};
       hour.strengths = {{1, 3600, 3600LL * 100}};
