@@ -9,8 +9,8 @@
 set -euo pipefail
 campaigns=$(realpath "${1:?folder of the campaigns}")
 file=${2:+$(realpath "$2")} valve=${3:-FV-201}
-folder=$(mktemp -d) monitor=
-trap 'kill $monitor 2>/dev/null; wait; rm -rf "$folder"' EXIT
+folder=$(mktemp -d) monitor= feed=
+trap 'kill $monitor $feed 2>/dev/null; wait; rm -rf "$folder"' EXIT
 cd "$folder"
 export FDI_DATA=$folder/data
 
@@ -60,6 +60,7 @@ fdi-trainer onboard --valve "$valve" --file "$file" --map tags.toml \
   >onboard.log 2>&1
 fdi-simulator replay --valve "$valve" --file "$file" --map tags.toml \
   --speed 20 >replay.log 2>&1 &
+feed=$!
 until_page /api/v1/valves \
   "\"id\":\"$valve\",\"state\":\"[A-Z]*\",\"quality\":\"LIVE\""
 took "a file of one's own to its first judged sample" "$start"
