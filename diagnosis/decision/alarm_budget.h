@@ -49,20 +49,19 @@ struct HealthyHours {
 /// A share of which only "this or more" is known counts for m as in an
 /// exponential tail: m is the sum of all excesses by the number of those that
 /// are known, and what is missing of the others is m in the mean.
-/// Assumed is that hours are alike and that what comes is like what was.
+/// This assumes that hours are alike and that what comes is like what was.
 ///
 /// It grows with each hour that a deviation lasts. Of the hours above u, q is
 /// the upper 95 % bound of the part that the next hour followed likewise, again
 /// of all valves; of k whole hours the return period is 1/(P q^k). So what q
-/// measures is how dependent hours are. Assumed is that it is the same after
+/// measures is how dependent hours are. This assumes that q is the same after
 /// one hour as after ten, and for large shares as for small ones.
 ///
 /// A valve has return periods once it has 72 hours on 3 days, and at least two
-/// others with as many have 500 hours together: with less, alarms came up to 73
-/// times as often as expected in 1008 healthy hours of three simulated valves.
-/// None is longer than ten times the hours of all. Episodes beyond no limit are
-/// counted: the hours by the 95 % bound of their number, at most by that of
-/// none. Their q is that of the whole hours that they lasted.
+/// others with as many have 500 hours together. None is longer than ten times
+/// the hours of all. Episodes beyond no limit are counted: the hours by the 95
+/// % bound of their number, at most by that of none. Their q is that of the
+/// whole hours that they lasted.
 class ShareTails {
  public:
   explicit ShareTails(const std::vector<HealthyHours>& valves);

@@ -159,8 +159,8 @@ void AddRunVerb(report::Program& program) {
   AddGroupsOption(program, run, arguments.groups);
   AddOnEventOptions(run, service);
   run.add_option("--alarm-budget", service.alarm_budget,
-                 "False alarms that all valves together may cost, as 1/day: "
-                 "what is less rare on a healthy valve is a notice")
+                 "False alarms that all valves together may raise, for example "
+                 "1/day: what healthy valves show more often is a notice")
       ->check(CheckBudget)
       ->type_name("N/PERIOD");
   AddHttpOption(run, "--http", arguments.http, "127.0.0.1:9464",

@@ -246,9 +246,8 @@ void AddBudgets(const DataDirectory& data, Report& report) {
   for (const Json& valve : document["tails"]) {
     if (!valve["tail"].get<bool>()) {
       report.Line("  " + valve["valve_id"].get<std::string>() +
-                  ": alarms as its limits are set; it has " +
-                  valve["hours"].dump() + " healthy hours on " +
-                  valve["days"].dump() + " days");
+                  ": alarms as its limits are set; healthy hours: " +
+                  valve["hours"].dump() + ", days: " + valve["days"].dump());
     }
   }
   for (const Json& valve : document["alarm_budgets"][1]["spenders"]) {

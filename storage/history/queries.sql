@@ -322,7 +322,7 @@ ORDER BY hour, epoch, model_hash
 -- name: newest_hours
 SELECT hour, model_hash, epoch, live_ms, bytes FROM health_hour
 WHERE valve_id = ? AND model_hash <> 0 ORDER BY hour DESC LIMIT ?
--- What was detected since then, has a share and is over: its hour, and the whole
+-- Episodes detected since then that have a share and are over: the hour, the whole
 -- hours that it lasted. One that is open would make itself common.
 -- name: shares_of_episodes
 SELECT share, notice, coalesce(label, ''), detected_ns / 3600000000000,

@@ -108,7 +108,7 @@ TEST(ShareTailsTest, HoursThatAreAllTheSameHaveNoTail) {
   EXPECT_EQ(ShareTails(fleet).longest_hours(), 0.0);
 }
 
-// Of 13 % of these hours it is known only that they reached a limit. Taken as
+// It is known only that 13 % of these hours reached a limit. Taken as
 // if they had been no higher, they would make a share of 2 seem ten times as
 // rare.
 TEST(ShareTailsTest, EpisodesThatNobodyHasJudgedReachedALimitOrMore) {
@@ -139,7 +139,7 @@ TEST(ShareTailsTest, EpisodesBeyondNoLimitAreCounted) {
   EXPECT_NEAR(*ShareTails(fleet).ReturnHours("V1", 0.3), 1200 / 6.296, 1.0);
 }
 
-// Of independent hours a fifth follows one of the highest fifth: 0.2 of 20 x
+// A fifth of independent hours follows one of the highest fifth: 0.2 of 20 x
 // 60, whose 95 % bound is 0.22.
 TEST(ShareTailsTest, AReturnPeriodGrowsWithTheHoursThatItLasts) {
   const ShareTails tails(Fleet(20, 300));
@@ -228,7 +228,7 @@ TEST(AlarmBudgetTest, ABudgetThatCannotBeMetKeepsWhatItCan) {
   EXPECT_EQ(budget.Now().longest_hours, 60'000.0);
   ASSERT_TRUE(budget.Now().wait_hours);
   EXPECT_NEAR(*budget.Now().wait_hours, (17'532.0 - 6000.0) / 20.0, 1.0);
-  EXPECT_THAT(PromiseText(budget.Now()), HasSubstr("577 h"));
+  EXPECT_THAT(PromiseText(budget.Now()), HasSubstr("577 more hours"));
   EXPECT_FALSE(budget.Weigh("V3", 10.0).notice);
   EXPECT_TRUE(budget.Weigh("V3", 1.1).notice);
 }

@@ -21,17 +21,7 @@ for valve in $valves; do
     --parameters paper-operating-point -o "$valve.csv" --log-level error \
     >/dev/null
 done
-cat >plant.toml <<'END'
-[defaults]
-op = "{loop}.OP"
-x = "{loop}.ZT"
-f = "{loop}.FT"
-f_unit = "m3/h"
-p1 = "{loop}.P1"
-p1_unit = "kPa"
-p2 = "{loop}.P2"
-p2_unit = "kPa"
-t1 = "{loop}.T1"
+cat "$tests/gateway/defaults.toml" - >plant.toml <<'END'
 [[loop]]
 name = "V1"
 [[loop]]

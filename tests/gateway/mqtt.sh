@@ -50,17 +50,7 @@ mosquitto_sub() { command mosquitto_sub -u fdi -P s3cret "$@"; }
   >/dev/null 2>train.log
 "$bin/fdi-simulator" run --no-publish --duration 300 --seed 1 -o V1.csv \
   --parameters paper-operating-point --log-level error >/dev/null
-cat >plant.toml <<'END'
-[defaults]
-op = "{loop}.OP"
-x = "{loop}.ZT"
-f = "{loop}.FT"
-f_unit = "m3/h"
-p1 = "{loop}.P1"
-p1_unit = "kPa"
-p2 = "{loop}.P2"
-p2_unit = "kPa"
-t1 = "{loop}.T1"
+cat "$tests/gateway/defaults.toml" - >plant.toml <<'END'
 topic = "plant/{loop}"
 value = "{signal}"
 [[loop]]

@@ -62,17 +62,7 @@ publish() { mosquitto_pub -p $port -t "spBv1.0/plant/$1" "${@:2}"; }  # TOPIC OP
   --parameters paper-operating-point --log-level error >/dev/null
 head -1 V1.csv | grep -q '^t_s,CV_pct,P1_kPa,P2_kPa,T1_degC,X_pct,F_m3_h' ||
   fail "columns: $(head -1 V1.csv)"
-cat >plant.toml <<'END'
-[defaults]
-op = "{loop}.OP"
-x = "{loop}.ZT"
-f = "{loop}.FT"
-f_unit = "m3/h"
-p1 = "{loop}.P1"
-p1_unit = "kPa"
-p2 = "{loop}.P2"
-p2_unit = "kPa"
-t1 = "{loop}.T1"
+cat "$tests/gateway/defaults.toml" - >plant.toml <<'END'
 [[loop]]
 name = "V1"
 [[loop]]

@@ -147,7 +147,7 @@ TEST_F(CommonCauseTest, ANoticeThatIsRaisedJoinsAnOpenCause) {
   EXPECT_EQ(Causes().at(0).members.size(), 5u);
 }
 
-// Of two faults that it holds, the group has the one that came later.
+// The group holds two faults and has the one that came later.
 TEST_F(CommonCauseTest, ANoticeMayHaveGotTheFaultOfTheGroupLater) {
   IsolateNotice("A-1", 10, 1);
   FaultEvent event =

@@ -673,8 +673,8 @@ TEST_F(FdiStoreHistoryTest, DoctorTellsWhichBudgetsOfAlarmsAreKept) {
                               "from 1200 healthy hours"));
   EXPECT_THAT(text, HasSubstr("1/day: needs 120 h, kept: yes"));
   EXPECT_THAT(text, HasSubstr("1/year: needs 43830 h, kept: not yet: about"));
-  EXPECT_THAT(text, HasSubstr("TV-4: alarms as its limits are set; it has 1 "
-                              "healthy hours on 1 days"));
+  EXPECT_THAT(text, HasSubstr("TV-4: alarms as its limits are set; "
+                              "healthy hours: 1, days: 1"));
 }
 
 // Read-only media, or a member of the group after the service was stopped: root
