@@ -14,11 +14,16 @@ constexpr double kGravity = 9.81;          // m/s2.
 constexpr double kGasConstant = 287.0;     // J/(kg K), air.
 constexpr double kMinSupplyGauge = 120e3;  // Below, the relay gives no air.
 
+// At a stop: this close and moving towards it [stroke].
+constexpr double kStopReach = 1e-7;
+
 }  // namespace
 
 ValveDynamics::ValveDynamics(const ValveParameters& parameters)
     : parameters_(parameters),
-      has_integral_(std::isfinite(parameters.positioner.integral_time_s)),
+      is_electric_(parameters.actuator.drive == ActuatorDrive::kElectric),
+      has_integral_(!is_electric_ &&
+                    std::isfinite(parameters.positioner.integral_time_s)),
       air_closes_(parameters.actuator.spring == SpringAction::kToOpen) {
   SetEffects({});
 }
@@ -98,7 +103,7 @@ double ValveDynamics::Rod(double z) const {
 // The positioner sees the angle of the lever. The play of f15 is in series with
 // that of the rod and has a memory of its own.
 double ValveDynamics::Feedback(double rod) const {
-  const double reading = LeverAngle(Reading(rod));
+  const double reading = FeedbackOf(Reading(rod));
   const double half = 0.5 * effects_.feedback_play;
   return half > 0.0 ? std::clamp(feedback_, reading - half, reading + half)
                     : reading;
@@ -111,7 +116,25 @@ void ValveDynamics::Commit(const double* x) {
 
 void ValveDynamics::Align(double z) {
   rod_ = std::clamp(z, rod_low_, rod_high_);
-  feedback_ = LeverAngle(Reading(rod_));
+  feedback_ = FeedbackOf(Reading(rod_));
+}
+
+// A margin, so that an error that a root has found counts as reached.
+Motion ValveDynamics::MotorMotion(const double* x) const {
+  constexpr double kMargin = 1e-9;
+  const double error = Error(x);
+  const double start = parameters_.actuator.dead_band - kMargin;
+  const double stop = StopError() + kMargin;
+  const double z = x[kActuatorState];
+  if (error > (motion_ == Motion::kRising ? stop : start) &&
+      z < HighStop() - kStopReach) {
+    return Motion::kRising;
+  }
+  if (-error > (motion_ == Motion::kFalling ? stop : start) &&
+      z > LowStop() + kStopReach) {
+    return Motion::kFalling;
+  }
+  return Motion::kHeld;
 }
 
 double ValveDynamics::ChamberPressureOf(const double* x) const {
@@ -192,9 +215,13 @@ double ValveDynamics::Signal(const double* x) const {
   if (held_signal_) {
     return *held_signal_;
   }
+  if (is_electric_) {
+    return motion_ == Motion::kRising    ? 1.0
+           : motion_ == Motion::kFalling ? -1.0
+                                         : 0.0;
+  }
   const PositionerParameters& p = parameters_.positioner;
-  double signal =
-      p.gain * (x[kSecondLagState] - Feedback(Rod(x[kActuatorState])));
+  double signal = p.gain * Error(x);
   if (has_integral_) {
     signal += x[kIntegralState];
   }
@@ -234,6 +261,14 @@ void ValveDynamics::Derivatives(double t, const double* x,
   const double tau = parameters_.positioner.filter_time_s;
   const double signal = Signal(x);
   const ProcessInputs inputs = InputsAt(t);
+  dx[kFirstLagState] =
+      (inputs.command + command_noise_ - x[kFirstLagState]) / tau;
+  dx[kSecondLagState] = (x[kFirstLagState] - x[kSecondLagState]) / tau;
+  if (is_electric_) {
+    dx[kActuatorState] = signal / a.stroke_time_s;
+    dx[kVelocityState] = dx[kChargeState] = 0.0;
+    return;
+  }
   if (motion_ == Motion::kHeld || motion_ == Motion::kResting) {
     dx[kActuatorState] = 0.0;
     dx[kVelocityState] = 0.0;
@@ -251,11 +286,8 @@ void ValveDynamics::Derivatives(double t, const double* x,
   dx[kChargeState] = AirMassRate(ChamberPressureOf(x), signal) * kGasConstant *
                      a.air_temperature_k /
                      (a.ambient_pressure_pa * a.chamber_volume_m3);
-  dx[kFirstLagState] =
-      (inputs.command + command_noise_ - x[kFirstLagState]) / tau;
-  dx[kSecondLagState] = (x[kFirstLagState] - x[kSecondLagState]) / tau;
   if (has_integral_) {
-    const double error = x[kSecondLagState] - Feedback(Rod(x[kActuatorState]));
+    const double error = Error(x);
     // Without this the integral would grow as long as a stop or a weak supply
     // keeps the error up, and hold the rod there for as long again.
     const bool winds_up = std::abs(signal) >= 1.0 && error * signal > 0.0;
@@ -272,6 +304,20 @@ void ValveDynamics::Derivatives(double t, const double* x,
 // the state, too. At a stop without friction the limit is 0: the valve leaves
 // the stop when the net force changes its sign.
 void ValveDynamics::Roots(double t, const double* x, double* g) const noexcept {
+  if (is_electric_) {
+    const double error = Error(x);
+    const double start = parameters_.actuator.dead_band;
+    const double z = x[kActuatorState];
+    const bool rises = motion_ == Motion::kRising;
+    if (rises || motion_ == Motion::kFalling) {
+      g[0] = rises ? HighStop() - z : z - LowStop();
+      g[1] = (rises ? error : -error) - StopError();
+    } else {
+      g[0] = z < HighStop() - kStopReach ? start - error : 1.0;
+      g[1] = z > LowStop() + kStopReach ? start + error : 1.0;
+    }
+    return;
+  }
   const double friction = BreakAwayForce();
   switch (motion_) {
     case Motion::kFree:
@@ -342,9 +388,6 @@ double FlowOf(const ValveParameters& valve, const FaultEffects& effects,
 }
 
 namespace {
-
-// At a stop: this close and moving towards it [stroke].
-constexpr double kStopReach = 1e-7;
 
 CvodeOptions OptionsFor(const ValveDynamics& dynamics, double scale) {
   CvodeOptions options;
@@ -426,8 +469,8 @@ void ControlValve::Impl::Settle(const ProcessInputs& inputs) {
   const double angle = std::clamp(command - rest_signal / p.gain, 0.0, 1.0);
   double gauge_pa = 0.0;
   // That force depends on the rod, and so on the play: align first.
-  double z = LeverPosition(angle);
-  for (int i = 0; i < 3; ++i) {
+  double z = dynamics_.is_electric() ? command : LeverPosition(angle);
+  for (int i = 0; i < 3 && !dynamics_.is_electric(); ++i) {
     dynamics_.Align(z);
     z = RestingPosition(LeverPosition(angle), gauge_pa);
   }
@@ -447,6 +490,10 @@ void ControlValve::Impl::Settle(const ProcessInputs& inputs) {
 // Held while friction or a stop balances the net force, else moving with it.
 void ControlValve::Impl::SelectMotion() {
   const std::span<double> state = x();
+  if (dynamics_.is_electric()) {
+    dynamics_.set_motion(dynamics_.MotorMotion(state.data()));
+    return;
+  }
   const double friction = dynamics_.BreakAwayForce();
   const double force = dynamics_.NetForce(time_s_, state.data());
   const double z = state[kActuatorState];
@@ -477,6 +524,10 @@ bool ControlValve::Impl::AfterStep(StepResult result) {
   double& z = state[kActuatorState];
   double& v = state[kVelocityState];
   const Motion before = dynamics_.motion();
+  if (dynamics_.is_electric()) {
+    SelectMotion();
+    return result == StepResult::kRoot || dynamics_.motion() != before;
+  }
   const bool hits_high = z > dynamics_.HighStop() - kStopReach && v > 0.0;
   const bool hits_low = z < dynamics_.LowStop() + kStopReach && v < 0.0;
   const bool reverses = (before == Motion::kRising && v <= 0.0) ||

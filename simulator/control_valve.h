@@ -44,6 +44,10 @@ enum class Motion { kFree, kRising, kFalling, kHeld, kResting };
 ///
 /// Spring and play act on the actuator's position; the chamber volume (15), the
 /// plug and the feedback follow the rod, behind the play and the stops.
+///
+/// An electric actuator runs at constant speed or is held: z' = +-1/stroke time
+/// from |c2 - feedback| >= dead band until half of that, or until a stop of the
+/// rod, where its torque switch opens. Its velocity and charge stay 0.
 class ValveDynamics final : public OdeSystem {
  public:
   explicit ValveDynamics(const ValveParameters& parameters);
@@ -74,8 +78,17 @@ class ValveDynamics final : public OdeSystem {
   /// Backlash width / stroke.
   double PlayWidth() const;
   /// Ends of the actuator's travel; those of the rod may be narrower.
-  double LowStop() const { return parameters_.actuator.lowest_travel; }
-  double HighStop() const { return parameters_.actuator.highest_travel; }
+  double LowStop() const {
+    return is_electric_ ? rod_low_ - 0.5 * PlayWidth()
+                        : parameters_.actuator.lowest_travel;
+  }
+  double HighStop() const {
+    return is_electric_ ? rod_high_ + 0.5 * PlayWidth()
+                        : parameters_.actuator.highest_travel;
+  }
+  bool is_electric() const { return is_electric_; }
+  /// What the motor of an electric actuator does next.
+  Motion MotorMotion(const double* x) const;
   /// Rod position behind the play for an actuator position z, along the
   /// travel that the air causes.
   double Rod(double z) const;
@@ -111,6 +124,15 @@ class ValveDynamics final : public OdeSystem {
   double Reading(double rod) const {
     return Closing(Closing(rod) * effects_.position_reading_factor);
   }
+  // The positioner sees the angle of a lever; that of an electric actuator has
+  // a gear.
+  double FeedbackOf(double reading) const {
+    return is_electric_ ? reading : LeverAngle(reading);
+  }
+  double Error(const double* x) const {
+    return x[kSecondLagState] - Feedback(Rod(x[kActuatorState]));
+  }
+  double StopError() const { return 0.5 * parameters_.actuator.dead_band; }
   // Command, along the travel that the air causes, and pressures at time t,
   // with fault effects.
   ProcessInputs InputsAt(double t) const;
@@ -121,6 +143,7 @@ class ValveDynamics final : public OdeSystem {
   double ErrorRate(const double* x) const;
 
   ValveParameters parameters_;
+  bool is_electric_;
   bool has_integral_;
   bool air_closes_;
   FaultEffects effects_;

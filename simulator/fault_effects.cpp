@@ -51,7 +51,9 @@ bool ShowsInRodAlone(int fault) {
 }
 
 bool Exists(int fault, const ValveParameters& valve) {
-  return !FaultFactsOf(fault).of_water || valve.medium.fluid == Fluid::kWater;
+  const FaultFacts& facts = FaultFactsOf(fault);
+  return (!facts.of_water || valve.medium.fluid == Fluid::kWater) &&
+         (!facts.of_air || valve.actuator.drive == ActuatorDrive::kPneumatic);
 }
 
 }  // namespace fdi::simulator

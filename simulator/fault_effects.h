@@ -183,8 +183,8 @@ bool LeavesRod(int fault);
 /// @throws std::invalid_argument if `fault` is not in the catalogue.
 bool ShowsInRodAlone(int fault);
 
-/// False for a fault that cannot be simulated with this medium: of water alone
-/// it is known when it evaporates.
+/// False for a fault that this valve cannot have: an electric actuator has
+/// neither air nor spring, and of water alone it is known when it evaporates.
 bool Exists(int fault, const ValveParameters& valve);
 
 }  // namespace fdi::simulator

@@ -198,10 +198,14 @@ double EffectiveKv(const RecordRow& row, const ValveParameters& valve) {
 // 2, one of equal percentage and large rangeability that of 5.
 constexpr double kExponentFactor = 8.0;
 
+bool IsElectric(const ValveParameters& valve) {
+  return valve.actuator.drive == ActuatorDrive::kElectric;
+}
+
 // The unknowns of `nominal` with its air relay, best determined first: Kv and
 // exponent (only with flow), coefficients of the air relay, filter time of the
 // positioner; then the stated ones: gain of the positioner, play, supply
-// pressure.
+// pressure. An electric actuator has its stroke time, then its dead band.
 std::vector<ValveUnknown> UnknownsOf(const ValveParameters& nominal,
                                      bool has_flow) {
   // The order counts: KeepIdentified() gives up the last ones first.
@@ -221,7 +225,12 @@ std::vector<ValveUnknown> UnknownsOf(const ValveParameters& nominal,
           kExponentFactor, 0.1, 20.0);
     }
   }
-  if (nominal.positioner.relay == AirRelay::kOrifice) {
+  if (IsElectric(nominal)) {
+    add(
+        "actuator.stroke_time_s",
+        [](V& v) -> double& { return v.actuator.stroke_time_s; }, 5.0, 0.5,
+        600.0);
+  } else if (nominal.positioner.relay == AirRelay::kOrifice) {
     add(
         "positioner.orifice_coefficient",
         [](V& v) -> double& { return v.positioner.orifice_coefficient; }, 5.0,
@@ -241,16 +250,24 @@ std::vector<ValveUnknown> UnknownsOf(const ValveParameters& nominal,
       [](V& v) -> double& { return v.positioner.filter_time_s; }, 5.0, 1e-2,
       100.0);
   const std::size_t first_stated = unknowns.size();
-  add(
-      "positioner.gain", [](V& v) -> double& { return v.positioner.gain; }, 5.0,
-      0.1, 1e4);
+  if (IsElectric(nominal)) {
+    add(
+        "actuator.dead_band",
+        [](V& v) -> double& { return v.actuator.dead_band; }, 5.0, 1e-3, 0.2);
+  } else {
+    add(
+        "positioner.gain", [](V& v) -> double& { return v.positioner.gain; },
+        5.0, 0.1, 1e4);
+  }
   add(
       "actuator.play_fraction",
       [](V& v) -> double& { return v.actuator.play_fraction; }, 5.0, 2e-3, 0.2);
-  add(
-      "actuator.supply_pressure_gauge_pa",
-      [](V& v) -> double& { return v.actuator.supply_pressure_gauge_pa; }, 2.0,
-      1.3e5, 2e6);
+  if (!IsElectric(nominal)) {
+    add(
+        "actuator.supply_pressure_gauge_pa",
+        [](V& v) -> double& { return v.actuator.supply_pressure_gauge_pa; },
+        2.0, 1.3e5, 2e6);
+  }
   for (std::size_t i = first_stated; i < unknowns.size(); ++i) {
     unknowns[i].stated = true;
   }
@@ -642,11 +659,13 @@ Hypothesis Identification::Start(const ValveParameters& variant,
   return h;
 }
 
-// Chooses first how and when the command acts, then the relay. If fits are
+// Chooses first how and when the command acts, then the relay, unless a motor
+// takes the place of air and friction. If fits are
 // equally good, keeps the first: the nominal relay, a held command without
 // delay. That takes 8 + 1 fits, all combinations would take 16.
 Hypothesis Identification::BestStart() const {
-  const bool friction = nominal_.actuator.coulomb_friction_n > 0.0;
+  const bool friction =
+      nominal_.actuator.coulomb_friction_n > 0.0 && !IsElectric(nominal_);
   std::vector<Hypothesis> drives;
   for (const int delay : {0, -1, 1, 2}) {
     for (const bool interpolated : {false, true}) {
@@ -659,6 +678,9 @@ Hypothesis Identification::BestStart() const {
 
 // @param fitted by Best(), with the nominal relay.
 Hypothesis Identification::BestRelay(const Hypothesis& fitted) const {
+  if (IsElectric(nominal_)) {
+    return fitted;
+  }
   return Best({fitted, Start(OtherRelay(nominal_), fitted.base.drive,
                              HasFriction(fitted))});
 }
@@ -668,6 +690,9 @@ Hypothesis Identification::BestRelay(const Hypothesis& fitted) const {
 // found: the delay is chosen again, from this and the one before.
 std::optional<Hypothesis> Identification::WithFriction(
     const Hypothesis& without) const {
+  if (IsElectric(nominal_)) {
+    return std::nullopt;
+  }
   const int latest = without.base.drive.command_delay;
   std::vector<Hypothesis> rods{without};
   rods.front().error.reset();  // Is fitted once more, as the others are.

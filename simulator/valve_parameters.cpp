@@ -97,6 +97,8 @@ void ValidateActuator(const ActuatorParameters& a) {
   RequireRange("actuator.lowest_travel", a.lowest_travel, -1.0, 0.0);
   RequireRange("actuator.highest_travel", a.highest_travel, 1.0, 2.0);
   RequireRange("actuator.coulomb_friction_n", a.coulomb_friction_n, 0.0, 1e5);
+  RequireRange("actuator.stroke_time_s", a.stroke_time_s, 0.5, 600.0);
+  RequireRange("actuator.dead_band", a.dead_band, 1e-4, 0.2);
 }
 
 void ValidateTrim(const Trim& t) {
@@ -192,9 +194,12 @@ std::string Describe(const ValveParameters& valve) {
   };
   const Instrumentation& i = valve.instruments;
   return name(valve.medium.fluid) + ", " + name(valve.trim.characteristic) +
-         ", Kv " + NumberText(valve.trim.kv_m3_h) + " m3/h, spring " +
-         name(valve.actuator.spring) + ", F " + NumberText(i.flow.low) + ".." +
-         NumberText(i.flow.high) + ' ' + std::string(FlowUnitName(i.flow_unit));
+         ", Kv " + NumberText(valve.trim.kv_m3_h) + " m3/h, " +
+         (valve.actuator.drive == ActuatorDrive::kElectric
+              ? "electric"
+              : "spring " + name(valve.actuator.spring)) +
+         ", F " + NumberText(i.flow.low) + ".." + NumberText(i.flow.high) +
+         ' ' + std::string(FlowUnitName(i.flow_unit));
 }
 
 ValveParameters ParameterSet(std::string_view name) {

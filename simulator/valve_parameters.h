@@ -40,8 +40,15 @@ enum class SpringAction {
   kToClose  ///< Air opens.
 };
 
+/// Force that moves the rod.
+enum class ActuatorDrive {
+  kPneumatic,  ///< Air against a spring, equations (13)-(16).
+  kElectric    ///< A motor of constant speed with a switching positioner.
+};
+
 /// Spring-and-diaphragm actuator, equations (13)-(15). Pressure in the chamber
-/// moves the rod against the spring, from 0 to the stroke.
+/// moves the rod against the spring, from 0 to the stroke. An electric one has
+/// the play and the last two fields alone.
 struct ActuatorParameters {
   double moving_mass_kg{2.0};              ///< m.
   double damping_n_s_m{1500.0};            ///< b.
@@ -61,6 +68,10 @@ struct ActuatorParameters {
   double highest_travel{1.25};
   double coulomb_friction_n{0.0};  ///< F_f of (13), 0 = none.
   SpringAction spring{SpringAction::kToOpen};
+  ActuatorDrive drive{ActuatorDrive::kPneumatic};
+  double stroke_time_s{60.0};  ///< Of the running motor, for the stroke.
+  /// |CV - X| / stroke at which the motor starts; it stops at half of it.
+  double dead_band{0.01};
 };
 
 /// Law of air flow between two pressures.
@@ -147,6 +158,9 @@ template <>
 inline constexpr auto kEnumNames<SpringAction> =
     std::to_array<std::string_view>({"to-open", "to-close"});
 template <>
+inline constexpr auto kEnumNames<ActuatorDrive> =
+    std::to_array<std::string_view>({"pneumatic", "electric"});
+template <>
 inline constexpr auto kEnumNames<AirRelay> =
     std::to_array<std::string_view>({"compressible", "orifice"});
 template <>
@@ -166,7 +180,8 @@ FDI_VISITABLE(ActuatorParameters, moving_mass_kg, damping_n_s_m,
               spring_rate_n_m, spring_preload_m, diaphragm_area_m2, stroke_m,
               chamber_volume_m3, air_temperature_k, ambient_pressure_pa,
               supply_pressure_gauge_pa, plug_area_m2, play_fraction,
-              lowest_travel, highest_travel, coulomb_friction_n, spring)
+              lowest_travel, highest_travel, coulomb_friction_n, spring, drive,
+              stroke_time_s, dead_band)
 FDI_VISITABLE(PositionerParameters, gain, integral_time_s, derivative_time_s,
               filter_time_s, sampling_period_s, relay, filling_cv, venting_cv,
               orifice_coefficient, transducer_dead_zone)

@@ -61,6 +61,8 @@ struct FaultFacts {
   /// A negative strength has no effect that can be seen: a valve has little
   /// play to lose.
   bool negative_hidden{false};
+  /// Of a part that only a pneumatic actuator has: air, spring, transducer.
+  bool of_air{false};
   /// Needs water: of no other medium is it known when it evaporates.
   bool of_water{false};
   /// The signal whose reading is not what acts on the valve.
@@ -102,30 +104,37 @@ inline constexpr FaultFacts kFaultCatalogue[] = {
      .of_water = true,
      .hides = Signal::kT1},
     {.name = "f8", .description = "twisted piston rod", .weak = true},
-    {.name = "f9", .description = "housing or terminals leak air"},
+    {.name = "f9",
+     .description = "housing or terminals leak air",
+     .of_air = true},
     {.name = "f10",
      .description = "diaphragm perforation",
      .onset = Onset::kThreshold,
+     .of_air = true,
      .look_alikes = {{{1, Alike::kUnfit},
                       {16, Alike::kUnfit},
                       {12, Alike::kUntaught, 1}}}},
     {.name = "f11",
      .description = "spring fault",
+     .of_air = true,
      .look_alikes = {{{12, Alike::kUntaught, 1}}}},
     {.name = "f12",
      .description = "electro-pneumatic transducer fault",
-     .is_signed = true},
+     .is_signed = true,
+     .of_air = true},
     {.name = "f13",
      .description = "rod displacement sensor fault",
      .is_signed = true},
     {.name = "f14",
      .description = "positioner pressure sensor fault",
      .is_signed = true,
-     .visible_in = 0},
+     .visible_in = 0,
+     .of_air = true},
     {.name = "f15", .description = "positioner feedback fault"},
     {.name = "f16",
      .description = "supply pressure drop",
      .onset = Onset::kThreshold,
+     .of_air = true,
      .look_alikes = {{{1, Alike::kUnfit}, {10, Alike::kUnfit}}}},
     {.name = "f17",
      .description = "unexpected pressure change across the valve",

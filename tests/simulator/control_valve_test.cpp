@@ -283,6 +283,59 @@ TEST(ControlValveTest, IntegralDoesNotWindUpAtAStop) {
   EXPECT_NEAR(valve.state().rod, LeverPosition(0.4), 5e-3);
 }
 
+// 60 s for the stroke; starts at an error of 1 %, stops at half of it.
+ValveParameters Electric() {
+  ValveParameters valve = Exact();
+  valve.actuator.drive = ActuatorDrive::kElectric;
+  valve.positioner.filter_time_s = 0.01;
+  return valve;
+}
+
+TEST(ControlValveTest, AMotorRunsAtConstantSpeedOutsideItsDeadBand) {
+  ControlValve valve(Electric(), 1.0);
+  valve.Settle(InputsAt(0.5));
+  Hold(valve, 0.509, 60);
+  EXPECT_DOUBLE_EQ(valve.state().rod, 0.5);
+  Hold(valve, 0.8, 10);
+  EXPECT_NEAR(valve.state().rod, 0.5 + 10.0 / 60.0, 1e-3);
+  Hold(valve, 0.8, 60);
+  EXPECT_NEAR(valve.state().rod, 0.795, 1e-6);
+  Hold(valve, 0.789, 60);
+  EXPECT_NEAR(valve.state().rod, 0.795, 1e-6);
+  Hold(valve, 0.7, 3);
+  EXPECT_NEAR(valve.state().rod, 0.795 - 3.0 / 60.0, 1e-3);
+  EXPECT_EQ(valve.state().signal, -1.0);
+}
+
+// Its torque switch opens there, so that it need not come back through travel
+// that the rod never had.
+TEST(ControlValveTest, AMotorStopsWhereTheRodIsBlocked) {
+  ValveParameters parameters = Electric();
+  parameters.actuator.play_fraction = 0.02;
+  ControlValve valve(parameters, 1.0);
+  valve.Settle(InputsAt(0.5));
+  FaultEffects clogged;
+  clogged.upper_stop_factor = 0.6;
+  valve.SetEffects(clogged);
+  Hold(valve, 0.9, 100);
+  EXPECT_DOUBLE_EQ(valve.state().rod, 0.6);
+  EXPECT_NEAR(valve.state().actuator, 0.61, 1e-6);
+  EXPECT_EQ(valve.state().signal, 0.0);
+  Hold(valve, 0.4, 6);
+  EXPECT_NEAR(valve.state().rod, 0.62 - 6.0 / 60.0, 2e-3);
+}
+
+// With the spring that closes and air that opens, the travel is mirrored; a
+// motor has neither.
+TEST(ControlValveTest, AMotorHasNoSpringSide) {
+  ValveParameters parameters = Electric();
+  parameters.actuator.spring = SpringAction::kToClose;
+  ControlValve valve(parameters, 1.0);
+  valve.Settle(InputsAt(0.5));
+  Hold(valve, 0.2, 6);
+  EXPECT_NEAR(valve.state().rod, 0.4, 1e-3);
+}
+
 TEST(ControlValveTest, BypassAddsItsOwnFlow) {
   ControlValve valve(Exact(), 1.0);
   const ProcessInputs inputs = InputsAt(0.7);

@@ -126,6 +126,20 @@ TEST_P(RecoveryTest, RecoversTheParametersOfASimulatedValve) {
 INSTANTIATE_TEST_SUITE_P(ValveIdentification, RecoveryTest,
                          ::testing::Values(-1, 1));
 
+TEST(ValveIdentificationTest, FindsTheSpeedOfAMotor) {
+  ValveParameters nominal = ParameterSet("lublin-actuator-3-refit");
+  nominal.actuator.drive = ActuatorDrive::kElectric;
+  ValveParameters truth = nominal;
+  truth.actuator.stroke_time_s = 90.0;
+  truth.trim.kv_m3_h *= 1.2;
+  const ValveFit fit = FitValve({Recording(truth, 800, 3)}, nominal);
+  ExpectRecovered(fit, "actuator.stroke_time_s", 90.0, 0.05);
+  ExpectRecovered(fit, "trim.kv_m3_h", truth.trim.kv_m3_h, 0.05);
+  EXPECT_EQ(fit.parameters.actuator.coulomb_friction_n, 0.0);
+  EXPECT_EQ(fit.parameters.positioner.filling_cv,
+            nominal.positioner.filling_cv);
+}
+
 // As much flow where the record is, from a much smaller valve.
 TEST(ValveIdentificationTest, FindsAFlatTrim) {
   const ValveParameters nominal = ParameterSet("lublin-actuator-3-refit");

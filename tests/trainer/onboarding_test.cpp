@@ -8,6 +8,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <set>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -191,6 +192,18 @@ TEST(OnboardingFaultsTest, WhatTheMediumExcludesIsLeftOut) {
   }
   EXPECT_LT(OnboardingFaults(kBasicSignals, gas).size(),
             OnboardingFaults(kBasicSignals, {}).size());
+}
+
+TEST(OnboardingFaultsTest, AnElectricActuatorHasNoFaultsOfAir) {
+  simulator::ValveParameters electric;
+  electric.actuator.drive = simulator::ActuatorDrive::kElectric;
+  std::set<int> faults;
+  for (const FaultCondition& condition :
+       OnboardingFaults(kBasicSignals, electric)) {
+    faults.insert(condition.fault);
+  }
+  EXPECT_EQ(faults,
+            (std::set{1, 2, 3, 4, 5, 6, 7, 8, 13, 15, 17, 18, 19, 20, 21, 22}));
 }
 
 TEST(OnboardingFaultsTest, WhereThereIsNoRoomForAllTheWeakestAreLeftOut) {
