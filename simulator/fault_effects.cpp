@@ -33,6 +33,15 @@ void ApplyFault(int fault, double strength, FaultEffects& effects) {
   }
 }
 
+double RodAt(const FaultEffects& effects, double x) {
+  const double factor = effects.position_reading_factor;
+  const double step = effects.position_reading_step;
+  if (factor == 1.0 && step == 0.0) {
+    return x;
+  }
+  return factor > 0.0 ? std::clamp((x - step) / factor, 0.0, 1.0) : 0.0;
+}
+
 double TemperatureWith(const FaultEffects& effects, double temperature_c) {
   // Steam may be hotter than the limit already.
   return effects.temperature_rise_c > 0.0

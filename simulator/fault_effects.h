@@ -38,6 +38,8 @@ struct FaultEffects {
   double temperature_reading_step{0.0};
   double inlet_reading_step{0.0};
   double outlet_reading_step{0.0};
+  /// The same in X, which the positioner does not read.
+  double position_reading_step{0.0};
 
   friend bool operator==(const FaultEffects&, const FaultEffects&) = default;
 };
@@ -86,6 +88,8 @@ inline constexpr EffectField kEffectFields[] = {
      "P1 reading, share of span, +"},
     {&FaultEffects::outlet_reading_step, SeenIn::kBehind,
      "P2 reading, share of span, +"},
+    {&FaultEffects::position_reading_step, SeenIn::kBoth,
+     "X reading, share of span, +"},
 };
 static_assert(sizeof(FaultEffects) == std::size(kEffectFields) * sizeof(double),
               "a field of FaultEffects has no line in kEffectFields");
@@ -152,6 +156,7 @@ inline constexpr Effect kEffects[] = {
     [](double s, FaultEffects& e) { e.temperature_reading_step += s; },
     /* p1 */ [](double s, FaultEffects& e) { e.inlet_reading_step += s; },
     /* p2 */ [](double s, FaultEffects& e) { e.outlet_reading_step += s; },
+    /* x1 */ [](double s, FaultEffects& e) { e.position_reading_step += s; },
 };
 static_assert(std::size(kEffects) == kLastFault,
               "each fault of the catalogue has one effect");
@@ -169,6 +174,10 @@ void ApplyFault(int fault, double strength, FaultEffects& effects);
 constexpr double FlowReadingWith(const FaultEffects& effects, double flow) {
   return flow * effects.flow_reading_factor;
 }
+
+/// Position of the rod where its transmitter reads `x`, both as shares of the
+/// stroke.
+double RodAt(const FaultEffects& effects, double x);
 
 /// Temperature of the medium that has `temperature_c` without the fault.
 double TemperatureWith(const FaultEffects& effects, double temperature_c);

@@ -57,17 +57,12 @@ double FlowReading(const ValveParameters& parameters,
                    const FaultEffects& effects, const InputRow& input,
                    double x_pct) {
   const Instrumentation& i = parameters.instruments;
-  const double factor = effects.position_reading_factor;
-  const double rod = factor == 1.0 ? 0.01 * x_pct
-                     : factor > 0.0
-                         ? std::clamp(0.01 * x_pct / factor, 0.0, 1.0)
-                         : 0.0;
   const double flow =
       FlowOf(parameters, effects,
              {0.01 * input.cv_pct, 1e3 * input.p1_kpa * effects.inlet_factor,
               1e3 * input.p2_kpa * effects.outlet_factor,
               TemperatureWith(effects, input.t1_degc)},
-             rod, 0.0);
+             RodAt(effects, 0.01 * x_pct), 0.0);
   return std::clamp(FlowReadingWith(effects, flow), i.flow.low, i.flow.high);
 }
 

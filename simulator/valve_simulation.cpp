@@ -443,8 +443,10 @@ Sample ValveSimulation::Impl::ReadAll(std::uint64_t k) {
                                effects.outlet_reading_step));
   sample.Set(Signal::kT1, Read(i.temperature, seen.temperature_c,
                                effects.temperature_reading_step));
-  sample.Set(Signal::kX, Read(i.position, 100.0 * valve_.state().rod *
-                                              effects.position_reading_factor));
+  sample.Set(Signal::kX,
+             Read(i.position,
+                  100.0 * valve_.state().rod * effects.position_reading_factor,
+                  effects.position_reading_step));
   sample.Set(Signal::kF, Read(i.flow, FlowReadingWith(effects, flow)));
   HoldFlatlines(TimeOf(k), sample);
   return sample;

@@ -341,6 +341,15 @@ ModelSet Describe(const std::vector<TrainingRun>& healthy,
   for (const FaultCondition& fault : faults) {
     AddObserver(fault.fault, fault.strength, models);
   }
+  SignalMask predicted = 0;
+  for (const ChannelSpec& channel : models.channels) {
+    predicted = static_cast<SignalMask>(predicted | MaskOf(channel.output));
+  }
+  for (int fault = 1; fault <= kLastFault && !faults.empty(); ++fault) {
+    if (FaultFactsOf(fault).simulation_only && IsVisibleIn(fault, predicted)) {
+      models.faults.push_back(fault);
+    }
+  }
   AddFindings(models);
   return models;
 }

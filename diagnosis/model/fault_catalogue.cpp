@@ -108,7 +108,8 @@ bool HasNegative(int fault) {
 }
 
 bool IsVisibleIn(int fault, SignalMask signals) {
-  return (FaultFactsOf(fault).visible_in & signals) != 0;
+  const FaultFacts& facts = FaultFactsOf(fault);
+  return (facts.visible_in & signals) != 0 && (facts.told_by & ~signals) == 0;
 }
 
 int RequireFault(std::string_view name) {

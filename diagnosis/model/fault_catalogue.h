@@ -55,6 +55,10 @@ struct FaultFacts {
   ActsOn acts_on{ActsOn::kRod};
   /// Basic signals of which one has to be measured to see the fault.
   SignalMask visible_in{kRodSignals};
+  /// Signals that have to be measured, too, to tell it from other faults.
+  SignalMask told_by{0};
+  /// Named by the simulation of an episode alone: no observer is taught it.
+  bool simulation_only{false};
   Onset onset{Onset::kGradual};
   /// Weaker than a simulation of X and F errs.
   bool weak{false};
@@ -172,6 +176,12 @@ inline constexpr FaultFacts kFaultCatalogue[] = {
      .acts_on = ActsOn::kInputs,
      .visible_in = MaskOf(Signal::kP2),
      .hides = Signal::kP2},
+    {.name = "x1",
+     .description = "position transmitter beside the positioner",
+     .is_signed = true,
+     .visible_in = MaskOf(Signal::kX),
+     .told_by = MaskOf(Signal::kF),
+     .simulation_only = true},
 };
 
 /// Findings of the floor (diagnosis/decision/floor.h), which are implausible
@@ -289,7 +299,7 @@ std::optional<Signal> TransmitterOf(int fault);
 /// A negative strength of `fault` exists and can be seen.
 bool HasNegative(int fault);
 
-/// `fault` can be seen in one of `signals`.
+/// `fault` can be seen in one of `signals`, and told by those that it takes.
 bool IsVisibleIn(int fault, SignalMask signals);
 
 /// For messages: " (did you mean 'f19'?)", or "" if `name` is not close to the

@@ -272,7 +272,7 @@ bool Looker::IsSeenInInputs(const Hypothesis& h) const {
 
 Trajectory Looker::Simulate(int fault, double strength, Course course,
                             double supply) {
-  const bool reads_rod = !stands_ || standing_.position_reading_factor == 1.0;
+  const bool reads_rod = !stands_ || RodAt(standing_, 0.5) == 0.5;
   if ((ActsOnFlowAlone(fault) && (reads_rod || fault == kLowFlow)) ||
       (window_.at_position && fault != 0)) {
     return FlowOnly(fault, strength, course);
@@ -578,8 +578,7 @@ std::optional<double> Looker::ObservedStop() const {
   }
   const auto most = x.begin() + static_cast<std::ptrdiff_t>(x.size() * 49 / 50);
   std::nth_element(x.begin(), most, x.end());
-  const double read = 0.01 * *most / standing_.position_reading_factor;
-  return std::clamp(1.0 - read, 0.0, 1.0);
+  return std::clamp(1.0 - RodAt(standing_, 0.01 * *most), 0.0, 1.0);
 }
 
 void Looker::Try(Hypothesis& h, double strength) {

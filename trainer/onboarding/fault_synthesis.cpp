@@ -37,7 +37,8 @@ std::vector<FaultCondition> OnboardingFaults(
     std::size_t most) {
   std::vector<FaultCondition> faults;
   for (int fault = 1; fault <= kLastFault; ++fault) {
-    if (!IsVisibleIn(fault, signals) || !Exists(fault, valve)) {
+    if (!IsVisibleIn(fault, signals) || !Exists(fault, valve) ||
+        FaultFactsOf(fault).simulation_only) {
       continue;
     }
     if (TransmitterOf(fault)) {
