@@ -12,6 +12,7 @@
 
 #include "base/csv_cells.h"
 #include "base/error.h"
+#include "base/text.h"
 
 namespace fdi {
 namespace {
@@ -366,8 +367,151 @@ TextLines::TextLines(std::string_view text, std::string source)
   count_ += !text.empty() && text.back() != '\n' ? 1U : 0U;
 }
 
+namespace {
+
+// The tables of a folder by name; a map or a note beside them is none.
+std::vector<std::filesystem::path> TablesIn(
+    const std::filesystem::path& folder) {
+  std::vector<std::filesystem::path> files;
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    const std::filesystem::path& path = entry.path();
+    const bool gz = path.extension() == ".gz";
+    const std::string kind = (gz ? path.stem() : path).extension().string();
+    if (entry.is_regular_file() &&
+        (kind == ".csv" || kind == ".txt" || kind == ".tsv")) {
+      files.push_back(path);
+    }
+  }
+  std::ranges::sort(files);
+  return files;
+}
+
+struct Header {
+  char separator{','};
+  std::string line;
+  std::string before_last;  // Up to the last separator, with it.
+  std::string last;
+};
+
+Header HeaderOf(const TextLines& lines) {
+  Header header;
+  lines.ForEach([&](std::string_view line, std::size_t) {
+    header.line = line.substr(0, line.find_last_not_of(" \r") + 1);
+    return header.line.empty();
+  });
+  const std::string_view line = header.line;
+  header.separator = FindSeparator({&line, 1});
+  const std::size_t at = header.line.rfind(header.separator) + 1;
+  header.before_last = header.line.substr(0, at);
+  header.last = header.line.substr(at);
+  return header;
+}
+
+// A cell that may hold any text.
+std::string InQuotes(std::string_view text) {
+  std::string cell = "\"";
+  for (const char c : text) {
+    cell += c == '"' ? "\"\"" : std::string(1, c);
+  }
+  return cell + '"';
+}
+
+std::string StemOf(const std::filesystem::path& file) {
+  return (file.extension() == ".gz" ? file.stem() : file).stem().string();
+}
+
+}  // namespace
+
+// Each file is read twice, so that a folder of many does not take their memory.
+TextLines TextLines::OfFolder(const std::filesystem::path& folder) {
+  TextLines joined;
+  joined.source_ = SourceOf(folder);
+  joined.file_ = TemporaryFile(joined.source_);
+  std::vector<Header> headers;
+  const std::vector<std::filesystem::path> files = TablesIn(folder);
+  for (const std::filesystem::path& file : files) {
+    headers.push_back(HeaderOf(OfFile(file)));
+    if (headers.back().before_last != headers.front().before_last) {
+      throw DataError(file.string() + ":1: its header is " +
+                      Quoted(headers.back().line) + ", that of " +
+                      files.front().filename().string() + " is " +
+                      Quoted(headers.front().line) +
+                      ": expected one header in all files of a folder");
+    }
+  }
+  if (files.empty()) {
+    throw DataError(joined.source_ +
+                    ": is a folder without a table: expected a .csv, .tsv or "
+                    ".txt file for each tag");
+  }
+  const bool by_file = std::ranges::all_of(headers, [&](const Header& header) {
+    return header.last == headers.front().last;
+  });
+  const char sign = headers.front().separator;
+  std::string text = std::string("tag") + sign + headers.front().before_last +
+                     (by_file ? headers.front().last : "value") + '\n';
+  const auto flush = [&] {
+    Append(text, *joined.file_, joined.source_);
+    joined.end_ += text.size();
+    text.clear();
+  };
+  std::size_t count = 1;
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    const TextLines table = OfFile(files[i]);
+    joined.packed_ = joined.packed_ || table.packed();
+    const std::string tag =
+        InQuotes(by_file ? StemOf(files[i]) : headers[i].last) + sign;
+    CsvCells record(sign);
+    bool named = false;
+    table.ForEach([&](std::string_view line, std::size_t number) {
+      const bool begins = !record.open();
+      record.TakeLine(line);
+      if (!named) {
+        named = !record.blank();
+        joined.parts_.resize(i);
+        joined.parts_.push_back({files[i].string(), count + 1, number + 1});
+        return true;
+      }
+      text += begins && !record.blank() ? tag : "";
+      text += line;
+      text += '\n';
+      ++count;
+      if (text.size() > kBlock) {
+        flush();
+      }
+      return true;
+    });
+  }
+  flush();
+  joined.CountLines();
+  return joined;
+}
+
+std::string TextLines::WithPlace(std::string message) const {
+  const std::string begins = source_ + ":";
+  if (!message.starts_with(begins)) {
+    return message;
+  }
+  const std::size_t end = std::min(
+      message.find_first_not_of("0123456789", begins.size()), message.size());
+  const auto line = ParseWhole<std::size_t>(
+      std::string_view(message).substr(0, end).substr(begins.size()));
+  const auto part = std::find_if(
+      parts_.rbegin(), parts_.rend(),
+      [&](const Part& each) { return line && each.first <= *line; });
+  return part == parts_.rend()
+             ? message
+             : part->file + ":" +
+                   std::to_string(*line - part->first + part->line) +
+                   message.substr(end);
+}
+
 TextLines TextLines::OfFile(const std::filesystem::path& path) {
   const std::string source = SourceOf(path);
+  std::error_code none;
+  if (path != "-" && std::filesystem::is_directory(path, none)) {
+    return OfFolder(path);
+  }
   Spool raw = SpoolOf(path, source);
   if (raw.file == nullptr) {
     auto own = std::make_shared<const std::string>(
@@ -394,14 +538,18 @@ TextLines TextLines::OfFile(const std::filesystem::path& path) {
   }
   // The part of the text that was kept is no longer needed.
   raw.head = std::string();
-  lines.ForEach([&](std::string_view line, std::size_t number) {
+  lines.CountLines();
+  return lines;
+}
+
+void TextLines::CountLines() {
+  ForEach([&](std::string_view line, std::size_t number) {
     if (line.find('\0') != std::string_view::npos) {
-      throw DataError(source + ": is binary, not text: export it as CSV");
+      throw DataError(source_ + ": is binary, not text: export it as CSV");
     }
-    lines.count_ = number;
+    count_ = number;
     return true;
   });
-  return lines;
 }
 
 std::string_view TextLines::Block(std::size_t begin, std::size_t end,

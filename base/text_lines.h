@@ -7,6 +7,7 @@
 #include <memory>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace fdi {
 
@@ -22,8 +23,12 @@ class TextLines {
 
   /// @param text has to outlive this.
   explicit TextLines(std::string_view text, std::string source = "input");
-  /// Lines of a file, or of stdin for `-`, as ReadTextFile() reads it.
-  /// @throws as ReadTextFile(), or if the temporary file cannot be written.
+  /// Lines of a file, or of stdin for `-`, as ReadTextFile() reads it. A folder
+  /// with a file for each tag is one table with a first column `tag`: the name
+  /// of the file without its extension, or that of its last column where this
+  /// is all that differs between the headers.
+  /// @throws as ReadTextFile(); DataError if the temporary file cannot be
+  ///   written, or if a folder has no table or tables with different headers.
   static TextLines OfFile(const std::filesystem::path& path);
 
   /// @throws DataError if a line is longer than 2 MiB.
@@ -33,11 +38,21 @@ class TextLines {
 
   /// True if the file was a gzip.
   bool packed() const { return packed_; }
+  /// `message`, in which "FOLDER:LINE:" becomes the file and line of a folder.
+  std::string WithPlace(std::string message) const;
   /// Size of the text.
   std::size_t bytes() const { return end_ - begin_; }
 
  private:
+  struct Part {
+    std::string file;
+    std::size_t first;  // Line of its first row,
+    std::size_t line;   // and that in the file.
+  };
+
   TextLines() = default;
+  static TextLines OfFolder(const std::filesystem::path& folder);
+  void CountLines();
   std::string_view Block(std::size_t begin, std::size_t end,
                          std::string& buffer) const;
   void CheckLength(std::size_t length, std::size_t number) const;
@@ -50,6 +65,7 @@ class TextLines {
   std::size_t end_{0};
   std::size_t count_{0};
   bool packed_{false};
+  std::vector<Part> parts_;  // Of a folder.
 };
 
 }  // namespace fdi

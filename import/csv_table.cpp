@@ -904,7 +904,11 @@ void TableReader::Cut() {
 }  // namespace
 
 CsvTable ReadCsv(const TextLines& lines, const CsvOptions& options) {
-  return TableReader(lines, options).Read();
+  try {
+    return TableReader(lines, options).Read();
+  } catch (const DataError& error) {
+    throw DataError(lines.WithPlace(error.what()));
+  }
 }
 
 CsvTable ReadCsv(std::string_view text, const CsvOptions& options) {

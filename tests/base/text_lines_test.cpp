@@ -99,6 +99,59 @@ TEST_F(TextLinesTest, LongFilesInOtherEncodingsAreConvertedInPieces) {
   EXPECT_TRUE(Forwards(Written(latin)) == ToUtf8(latin, "input") + '\n');
 }
 
+class FolderTest : public testing::Test {
+ protected:
+  FolderTest() { std::filesystem::create_directory(path_); }
+  ~FolderTest() override { std::filesystem::remove_all(path_); }
+
+  void Write(const std::string& name, const std::string& text) const {
+    std::ofstream(path_ + "/" + name, std::ios::binary) << text;
+  }
+  std::string Text() const { return Forwards(TextLines::OfFile(path_)); }
+
+  const std::string path_ =
+      testing::TempDir() +
+      testing::UnitTest::GetInstance()->current_test_info()->name();
+};
+
+TEST_F(FolderTest, AFileForEachTagMakesOneTable) {
+  Write("FIC1.OP.csv",
+        "\xEF\xBB\xBF\nTime,Status,Value\r\n1,ok,5\r\n2,ok,6\r\n");
+  Write("FIC1.PV.csv", "Time,Status,Value\n1,\"not\nok\",7\n\n2,ok,8");
+  Write("map.toml", "[time]\n");
+  EXPECT_EQ(Text(),
+            "tag,Time,Status,Value\n"
+            "\"FIC1.OP\",1,ok,5\r\n\"FIC1.OP\",2,ok,6\r\n"
+            "\"FIC1.PV\",1,\"not\nok\",7\n\n\"FIC1.PV\",2,ok,8\n");
+}
+
+TEST_F(FolderTest, ColumnsNameTheTagsWhereTheyDiffer) {
+  Write("a.txt", "t;FIC1.OP\n1;5\n");
+  Write("b.txt", "t;FIC1.PV\n1;7\n");
+  EXPECT_EQ(Text(), "tag;t;value\n\"FIC1.OP\";1;5\n\"FIC1.PV\";1;7\n");
+}
+
+TEST_F(FolderTest, AnErrorNamesTheFileAndItsLine) {
+  Write("a.csv", "t,Value\n1,5\n2,6\n");
+  Write("b.csv", "\nt,Value\n1,5\n2,six\n");
+  const TextLines lines = TextLines::OfFile(path_);
+  EXPECT_EQ(lines.WithPlace(path_ + ":3: six"), path_ + "/a.csv:3: six");
+  EXPECT_EQ(lines.WithPlace(path_ + ":5: six"), path_ + "/b.csv:4: six");
+  EXPECT_EQ(lines.WithPlace(path_ + ":1: tag"), path_ + ":1: tag");
+  EXPECT_EQ(lines.WithPlace("no reading"), "no reading");
+}
+
+TEST_F(FolderTest, WhatIsNoTableOfTagsIsRefused) {
+  EXPECT_THAT(storage::MessageOf<DataError>([&] { Text(); }),
+              HasSubstr("a folder without a table"));
+  Write("a.csv", "Time,Value\n1,5\n");
+  Write("b.csv", "Zeit,Wert\n1,5\n");
+  EXPECT_THAT(
+      storage::MessageOf<DataError>([&] { Text(); }),
+      HasSubstr("b.csv:1: its header is \"Zeit,Wert\", that of a.csv is "
+                "\"Time,Value\": expected one header"));
+}
+
 TEST_F(TextLinesTest, WhatIsNoTextIsRefusedHoweverLong) {
   const auto refusal = [&](const std::string& bytes) {
     return storage::MessageOf<DataError>([&] { Forwards(Written(bytes)); });

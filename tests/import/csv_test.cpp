@@ -555,7 +555,7 @@ TEST(CsvTest, FilesThatCannotBeReadAreNamedWithTheReason) {
     return std::string();
   };
   EXPECT_THROW(ReadCsvFile(directory.path() / "none.csv"), NotFoundError);
-  EXPECT_THAT(message(directory.path()), HasSubstr("is a directory"));
+  EXPECT_THAT(message(directory.path()), HasSubstr("is a folder without a table"));
 }
 
 }  // namespace

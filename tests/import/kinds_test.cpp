@@ -1315,6 +1315,43 @@ TEST(KindsTest, EveryReferenceFileIsReadWithItsMapOrRefusedForAReason) {
   EXPECT_GE(files, 50U);
 }
 
+// A file for each tag, of which the table has readings at different times.
+TEST(KindsTest, AFolderOfFilesIsATableOfTheirTags) {
+  const char* folder = std::getenv("FDI_REFERENCE_DATA");
+  if (folder == nullptr) {
+    GTEST_SKIP() << "FDI_REFERENCE_DATA is not set";
+  }
+  for (const char* kind : {"p03", "p08"}) {
+    SCOPED_TRACE(kind);
+    const std::filesystem::path path =
+        std::filesystem::path(testing::TempDir()) / kind;
+    std::filesystem::remove_all(path);
+    std::filesystem::create_directory(path);
+    for (const auto& entry : std::filesystem::directory_iterator(
+             std::string(folder) + "/cases-4")) {
+      if (entry.path().filename().string().starts_with(kind)) {
+        std::filesystem::copy(entry.path(), path);
+      }
+    }
+    const TextLines lines = TextLines::OfFile(path);
+    const Sniffed found = Sniff(lines, path, Utc());
+    SignalMask signals = 0;
+    for (const SniffedColumn& column : found.columns) {
+      signals = static_cast<SignalMask>(
+          signals | (column.signal ? MaskOf(*column.signal) : 0));
+    }
+    EXPECT_EQ(signals,
+              MaskOf(Signal::kCv) | MaskOf(Signal::kX) | MaskOf(Signal::kF));
+    const CsvTable table =
+        ReadCsv(lines, {.source = path,
+                        .map = ReadTagMapText(MapText(found, kind), kind),
+                        .required = 0,
+                        .split_gaps = true});
+    EXPECT_GT(table.runs.front().samples.size(), 300U);
+    std::filesystem::remove_all(path);
+  }
+}
+
 // F is a type there, and no Fahrenheit.
 TEST(KindsTest, ARowOfTypesSaysNothingOfUnits) {
   const Sniffed found = Sniff(
