@@ -484,13 +484,14 @@ void RowReader::AddHealth(const std::string& valve,
 // The finding of the fault catalogue that a verdict of the audit is, by its
 // name; empty: nothing to do.
 std::string CatalogueName(const std::string& verdict) {
-  constexpr std::array<std::pair<std::string_view, const char*>, 6> kNames{{
+  constexpr std::array<std::pair<std::string_view, const char*>, 7> kNames{{
       {"no_response", "no_response"},
       {"stiction", "stiction"},
       {"frozen", "reading_frozen"},
       {"saturated", "output_saturated"},
       {"tuning", "oscillation_tuning"},
       {"external", "oscillation_external"},
+      {"hunting", "positioner_hunts"},
   }};
   for (const auto& [name, finding] : kNames) {
     if (verdict == name) {

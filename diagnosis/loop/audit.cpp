@@ -48,6 +48,11 @@ constexpr double kFast_s = 2.0;
 constexpr std::size_t kOftenStands = 5;  // X stands at least so often,
 constexpr double kLongStands = 0.01;     // and for such a share of the time.
 constexpr double kUnrelated = 0.05;      // r² of X over OP: it is all noise.
+// Six swings are three periods: a step of OP or a bump makes fewer.
+constexpr std::size_t kSwings = 6;
+constexpr std::size_t kRestSamples = 20;
+constexpr double kHunts = 0.1;        // Share of the window.
+constexpr double kBeyondNoise = 4.0;  // Deviations of X from its mean.
 constexpr std::size_t kFrozenSamples = 300;
 constexpr double kBlock_s = 30.0;  // Block length of the second witness.
 
@@ -261,6 +266,43 @@ double UnansweredRun(const Window& window) {
   return longest;
 }
 
+// How often X passes from one side of its mean to the other, by more than
+// noise and what a good positioner leaves.
+std::size_t SwingsOf(std::span<const double> x, double least) {
+  const double mean = Mean(x);
+  std::size_t swings = 0;
+  int side = 0;
+  for (const double value : x) {
+    const int now = value > mean + least ? 1 : value < mean - least ? -1 : side;
+    swings += now != side && side != 0 ? 1U : 0U;
+    side = now;
+  }
+  return swings;
+}
+
+// The share of the stretches in which OP rests and X swings.
+double HuntingShare(const Window& window) {
+  if (window.x.empty() || !IsPercent(window.op)) {
+    return 0.0;
+  }
+  const double least = std::max(kGoodBand, kBeyondNoise * NoiseOf(window.x));
+  std::size_t hunting = 0;
+  std::size_t begin = 0;
+  for (std::size_t k = 1; k <= window.op.size(); ++k) {
+    if (k < window.op.size() &&
+        std::abs(window.op[k] - window.op[begin]) <= kGoodBand) {
+      continue;
+    }
+    if (k - begin >= kRestSamples &&
+        SwingsOf(std::span(window.x).subspan(begin, k - begin), least) >=
+            kSwings) {
+      hunting += k - begin;
+    }
+    begin = k;
+  }
+  return static_cast<double>(hunting) / static_cast<double>(window.op.size());
+}
+
 double MovingShare(std::span<const double> values) {
   if (values.size() < 2) {
     return 0.0;
@@ -323,8 +365,8 @@ bool IsPercent(std::span<const double> op) {
 
 std::string_view VerdictName(Verdict verdict) {
   constexpr std::array<std::string_view, kVerdictCount> kNames{
-      "undetermined", "stiction",  "no_response", "frozen",
-      "saturated",    "quantised", "tuning",      "external"};
+      "undetermined", "stiction", "no_response", "frozen", "saturated",
+      "quantised",    "tuning",   "external",    "hunting"};
   return kNames[static_cast<std::size_t>(verdict)];
 }
 
@@ -408,6 +450,9 @@ Finding Judge(const Window& window, const Evidence& e) {
     return {Verdict::kNoResponse, true,
             "OP stands at its end and PV comes no nearer to SP: stuck, shut, "
             "isolated, or too small"};
+  }
+  if (e.hunts > kHunts) {
+    return {Verdict::kHunting, true, "X swings to and fro while OP rests"};
   }
   if (e.op_range <= 0.0) {
     return {Verdict::kUndetermined, false, "OP stands still"};
@@ -529,6 +574,7 @@ Evidence EvidenceOf(const Window& window) {
   }
   e.op_range = RangeOf(window.op);
   e.at_limit = ShareAtLimit(window.op);
+  e.hunts = HuntingShare(window);
   e.off_limit = DistanceAtLimit(window);
   e.sp_moves = MovingShare(window.sp);
   e.longest_repeat = LongestRepeat(window);
@@ -586,6 +632,7 @@ Audit AuditValve(Window window) {
   Audit by_flow = by_x;
   by_flow.evidence.standing = {};
   by_flow.evidence.helpless = false;  // X tells where the rod is.
+  by_flow.evidence.hunts = 0.0;
   AddAnswer(window, by_flow.evidence);
   judge(by_flow);
   // A play that X does not show is none of the valve.

@@ -45,8 +45,9 @@ enum class Verdict : std::uint8_t {
   kQuantised,   ///< PV has too few values.
   kTuning,      ///< The controller makes the oscillation.
   kExternal,    ///< The oscillation comes from outside the loop.
+  kHunting,     ///< X oscillates while OP rests.
 };
-inline constexpr std::size_t kVerdictCount = 8;
+inline constexpr std::size_t kVerdictCount = 9;
 
 /// "undetermined", "stiction", "no_response", ...
 std::string_view VerdictName(Verdict verdict);
@@ -77,6 +78,7 @@ struct Evidence {
   std::optional<PlayFit> fit;              ///< PV, or X, over OP.
   Standing standing;            ///< Stops of X, for samples of 2 s or less.
   bool unrelated{false};        ///< X is noise, whatever OP does.
+  double hunts{0.0};            ///< Share in which X swings while OP rests.
   double prediction_gain{0.0};  ///< LLR, the second witness.
   double increments{0.0};       ///< r² of PV as the integral of OP.
   double correlation{0.0};      ///< Between OP and PV, times the gain's sign.
@@ -121,6 +123,8 @@ bool IsPercent(std::span<const double> op);
 ///   if a play explains half of what a straight line leaves of X over OP, or if
 ///   X stands five times and 1 % of the time while OP moves (Standing): where
 ///   OP is restless, friction holds X for seconds and is no play.
+/// - hunting, if X swings to and fro in a tenth of the time although OP rests:
+///   the positioner makes it, which no play between OP and X explains.
 /// - the other causes by the rest: see Verdict and docs/loops.md.
 ///
 /// In an integrating loop, play is never concluded from PV, because the

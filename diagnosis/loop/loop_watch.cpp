@@ -52,9 +52,10 @@ std::shared_ptr<const ModelSet> AuditModels(double interval_s) {
   models->preset = "audit";
   models->sample_period_s = interval_s;
   models->decision.settling_samples = 0;
-  for (int finding = kFirstLoopFinding; finding <= kLastLoopFinding;
-       ++finding) {
-    models->faults.push_back(finding);
+  for (int finding = kFirstLoopFinding; finding <= kLastFinding; ++finding) {
+    if (IsLoopFinding(finding)) {
+      models->faults.push_back(finding);
+    }
   }
   return models;
 }
@@ -81,6 +82,8 @@ int FindingOf(loop::Verdict verdict) {
       return kOscillationTuning;
     case loop::Verdict::kExternal:
       return kOscillationExternal;
+    case loop::Verdict::kHunting:
+      return kPositionerHunts;
     case loop::Verdict::kUndetermined:
     case loop::Verdict::kQuantised:
       return 0;
@@ -347,7 +350,9 @@ Severity LoopWatch::SeverityOf(const Found& found) const {
 void LoopWatch::Name(const Found& found) {
   found_ = found;
   named_ = true;
-  const auto bit = static_cast<std::size_t>(found.finding - kFirstLoopFinding);
+  // As in AuditModels(), whose numbers leave out the drift.
+  const auto bit = static_cast<std::size_t>(
+      std::min(found.finding, kLastLoopFinding + 1) - kFirstLoopFinding);
   verdict_.fault_factors.fill(0.0);
   verdict_.strengths.fill(0.0);
   verdict_.fault_factors[bit] = found.factor;

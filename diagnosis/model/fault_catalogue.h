@@ -187,8 +187,8 @@ inline constexpr FaultFacts kFaultCatalogue[] = {
 /// Findings of the floor (diagnosis/decision/floor.h), which are implausible
 /// readings, whatever the cause, then those of the audit of a loop
 /// (diagnosis/loop/loop_watch.h), then a drift
-/// (diagnosis/observers/drift_watch.h). Their numbers begin at kFirstFinding,
-/// to leave room for more faults.
+/// (diagnosis/observers/drift_watch.h), and what the audit finds since. Their
+/// numbers begin at kFirstFinding, to leave room for more faults.
 inline constexpr FaultFacts kFindingCatalogue[] = {
     {"travel_deviation", "rod does not follow the command", "", true},
     {"shut_flow", "flow with the valve shut", "", false},
@@ -209,6 +209,8 @@ inline constexpr FaultFacts kFindingCatalogue[] = {
      .description = "position drifts slowly",
      .is_signed = true,
      .visible_in = MaskOf(Signal::kX)},
+    {"positioner_hunts", "position oscillates while the command rests", "",
+     false},
 };
 
 /// The actuator faults of the DAMADICS benchmark are 1..kFaultCount.
@@ -242,6 +244,7 @@ inline constexpr int kOscillationTuning = 211;
 inline constexpr int kOscillationExternal = 212;
 inline constexpr int kLastLoopFinding = kOscillationExternal;
 inline constexpr int kPositionDrift = 213;
+inline constexpr int kPositionerHunts = 214;
 static_assert(kFaultCatalogue[kDiaphragmPerforation - 1].name == "f10" &&
               kFaultCatalogue[kSupplyDrop - 1].name == "f16" &&
               kFaultCatalogue[kTemperatureTransmitterFault - 1].name == "t1" &&
@@ -249,7 +252,7 @@ static_assert(kFaultCatalogue[kDiaphragmPerforation - 1].name == "f10" &&
                   "p2" &&
               kFindingCatalogue[kLowFlow - kFirstFinding].name == "low_flow" &&
               kFindingCatalogue[kStiction - kFirstFinding].name == "stiction" &&
-              kPositionDrift == kLastFinding);
+              kPositionerHunts == kLastFinding);
 
 constexpr bool IsFault(int number) {
   return number >= 1 && number <= kLastFault;
@@ -260,7 +263,8 @@ constexpr bool IsFinding(int number) {
 
 /// True if `number` is a finding of a loop audit.
 constexpr bool IsLoopFinding(int number) {
-  return number >= kFirstLoopFinding && number <= kLastLoopFinding;
+  return (number >= kFirstLoopFinding && number <= kLastLoopFinding) ||
+         number == kPositionerHunts;
 }
 
 /// The numbers of all faults, then of all findings.

@@ -410,7 +410,8 @@ Json JudgedJson(const Judged& one) {
       {"longest_repeat_s", static_cast<double>(e.longest_repeat) * period_s},
       {"unanswered_pct", e.unanswered},
       {"stands", one.window.x.empty() ? Json(nullptr) : Json(e.standing.times)},
-      {"stands_share", Optional(!one.window.x.empty(), e.standing.share)}};
+      {"stands_share", Optional(!one.window.x.empty(), e.standing.share)},
+      {"hunts_share", Optional(!one.window.x.empty(), e.hunts)}};
 }
 
 // The order of urgency; wide bands before narrow ones.
@@ -422,18 +423,20 @@ int RankOf(const Judged& one) {
       return 1;
     case Verdict::kStiction:
       return one.audit.sure ? 2 : 3;
-    case Verdict::kSaturated:
+    case Verdict::kHunting:
       return 4;
-    case Verdict::kTuning:
+    case Verdict::kSaturated:
       return 5;
-    case Verdict::kExternal:
+    case Verdict::kTuning:
       return 6;
-    case Verdict::kQuantised:
+    case Verdict::kExternal:
       return 7;
+    case Verdict::kQuantised:
+      return 8;
     case Verdict::kUndetermined:
       break;
   }
-  return 8;
+  return 9;
 }
 
 void Rank(std::vector<Judged>& judged) {

