@@ -233,9 +233,11 @@ std::vector<std::string> LimitsOfRecord(const Onboarding& onboarding) {
     lines.push_back(
         "no pressures on both sides (P1, P2): a change of pressure is taken "
         "for a change of the flow at the same opening (f2, f3, f17, f19)" +
-        std::string(at_position ? ""
-                                : ", and the force on the rod is not known "
-                                  "(f1, f10, f16)"));
+        std::string(at_position || !Contains(onboarding.models.faults,
+                                             kDiaphragmPerforation)
+                        ? ""
+                        : ", and the force on the rod is not known "
+                          "(f1, f10, f16)"));
   }
   if (period_s >= kSlowS) {
     lines.push_back(
