@@ -5,6 +5,7 @@
 #include <cerrno>
 #include <cstdint>
 #include <cstring>
+#include <iterator>
 #include <utility>
 
 #include <unistd.h>
@@ -373,14 +374,24 @@ namespace {
 std::vector<std::filesystem::path> TablesIn(
     const std::filesystem::path& folder) {
   std::vector<std::filesystem::path> files;
-  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+  std::error_code error;
+  for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {
     const std::filesystem::path& path = entry.path();
-    const bool gz = path.extension() == ".gz";
-    const std::string kind = (gz ? path.stem() : path).extension().string();
-    if (entry.is_regular_file() &&
-        (kind == ".csv" || kind == ".txt" || kind == ".tsv")) {
+    std::string kind = Lower(path.extension().string());
+    kind = kind == ".gz" ? Lower(path.stem().extension().string()) : kind;
+    std::error_code none;
+    if ((kind == ".csv" || kind == ".txt" || kind == ".tsv") &&
+        entry.is_regular_file(none)) {
       files.push_back(path);
     }
+  }
+  if (error) {
+    throw DataError(folder.string() + ": cannot be read: " + error.message());
+  }
+  if (files.empty()) {
+    throw DataError(folder.string() +
+                    ": is a folder without a table: expected a .csv, .tsv or "
+                    ".txt file for each tag");
   }
   std::ranges::sort(files);
   return files;
@@ -388,22 +399,35 @@ std::vector<std::filesystem::path> TablesIn(
 
 struct Header {
   char separator{','};
-  std::string line;
-  std::string before_last;  // Up to the last separator, with it.
-  std::string last;
+  std::size_t line{0};
+  std::vector<std::string> names;
 };
 
-Header HeaderOf(const TextLines& lines) {
+// Comments and a line with the separator may come before the names, as in a
+// table of its own; titles may not.
+Header HeaderOf(const std::filesystem::path& file) {
+  const TextLines lines = TextLines::OfFile(file);
+  constexpr std::size_t kShown = 20;
   Header header;
-  lines.ForEach([&](std::string_view line, std::size_t) {
-    header.line = line.substr(0, line.find_last_not_of(" \r") + 1);
-    return header.line.empty();
+  std::vector<std::string> shown;
+  lines.ForEach([&](std::string_view line, std::size_t number) {
+    const bool blank =
+        line.find_first_not_of(" \t\r") == std::string_view::npos;
+    if (!blank && !line.starts_with('#') && !line.starts_with("sep=")) {
+      header.line = shown.empty() ? number : header.line;
+      shown.emplace_back(line);
+    }
+    return shown.size() < kShown;
   });
-  const std::string_view line = header.line;
-  header.separator = FindSeparator({&line, 1});
-  const std::size_t at = header.line.rfind(header.separator) + 1;
-  header.before_last = header.line.substr(0, at);
-  header.last = header.line.substr(at);
+  const std::vector<std::string_view> views(shown.begin(), shown.end());
+  header.separator = FindSeparator(views);
+  CsvCells record(header.separator);
+  if (shown.empty() || !record.TakeLine(shown.front())) {
+    throw DataError(file.string() +
+                    ": has no names of columns in one line, which a file in a "
+                    "folder of tags needs");
+  }
+  header.names = record.cells();
   return header;
 }
 
@@ -416,8 +440,42 @@ std::string InQuotes(std::string_view text) {
   return cell + '"';
 }
 
-std::string StemOf(const std::filesystem::path& file) {
-  return (file.extension() == ".gz" ? file.stem() : file).stem().string();
+// The tag of each file: its name, or that of its last column where this is all
+// that differs between the headers.
+std::vector<std::string> TagsOf(const std::vector<std::filesystem::path>& files,
+                                std::vector<Header>& headers) {
+  const Header first = headers.front();
+  const bool by_file = std::ranges::all_of(headers, [&](const Header& header) {
+    return header.names == first.names;
+  });
+  std::vector<std::string> tags;
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    const std::string header = Listed(headers[i].names);
+    std::vector<std::string>& names = headers[i].names;
+    std::filesystem::path name = files[i].filename();
+    name = Lower(name.extension().string()) == ".gz" ? name.stem() : name;
+    const std::string tag = by_file ? name.stem().string() : names.back();
+    names.back() = first.names.back();
+    if (names != first.names || headers[i].separator != first.separator) {
+      throw DataError(files[i].string() + ":" +
+                      std::to_string(headers[i].line) + ": its header is " +
+                      Quoted(header) + ", that of " +
+                      files.front().filename().string() + " is " +
+                      Quoted(Listed(first.names)) +
+                      ": expected one header in all files of a folder");
+    }
+    if (std::ranges::find(tags, tag) != tags.end()) {
+      throw DataError(files[i].string() + ": is a second file for the tag " +
+                      Quoted(tag) +
+                      ": expected one, or names of columns of "
+                      "which each differs from the others");
+    }
+    tags.push_back(tag);
+  }
+  if (!by_file) {
+    headers.front().names.back() = "value";
+  }
+  return tags;
 }
 
 }  // namespace
@@ -429,27 +487,14 @@ TextLines TextLines::OfFolder(const std::filesystem::path& folder) {
   joined.file_ = TemporaryFile(joined.source_);
   std::vector<Header> headers;
   const std::vector<std::filesystem::path> files = TablesIn(folder);
-  for (const std::filesystem::path& file : files) {
-    headers.push_back(HeaderOf(OfFile(file)));
-    if (headers.back().before_last != headers.front().before_last) {
-      throw DataError(file.string() + ":1: its header is " +
-                      Quoted(headers.back().line) + ", that of " +
-                      files.front().filename().string() + " is " +
-                      Quoted(headers.front().line) +
-                      ": expected one header in all files of a folder");
-    }
-  }
-  if (files.empty()) {
-    throw DataError(joined.source_ +
-                    ": is a folder without a table: expected a .csv, .tsv or "
-                    ".txt file for each tag");
-  }
-  const bool by_file = std::ranges::all_of(headers, [&](const Header& header) {
-    return header.last == headers.front().last;
-  });
+  std::ranges::transform(files, std::back_inserter(headers), HeaderOf);
+  const std::vector<std::string> tags = TagsOf(files, headers);
   const char sign = headers.front().separator;
-  std::string text = std::string("tag") + sign + headers.front().before_last +
-                     (by_file ? headers.front().last : "value") + '\n';
+  std::string text = "tag";
+  for (const std::string& name : headers.front().names) {
+    text += sign + InQuotes(name);
+  }
+  text += '\n';
   const auto flush = [&] {
     Append(text, *joined.file_, joined.source_);
     joined.end_ += text.size();
@@ -459,28 +504,23 @@ TextLines TextLines::OfFolder(const std::filesystem::path& folder) {
   for (std::size_t i = 0; i < files.size(); ++i) {
     const TextLines table = OfFile(files[i]);
     joined.packed_ = joined.packed_ || table.packed();
-    const std::string tag =
-        InQuotes(by_file ? StemOf(files[i]) : headers[i].last) + sign;
+    joined.parts_.push_back(
+        {files[i].string(), count + 1, headers[i].line + 1});
     CsvCells record(sign);
-    bool named = false;
-    table.ForEach([&](std::string_view line, std::size_t number) {
-      const bool begins = !record.open();
-      record.TakeLine(line);
-      if (!named) {
-        named = !record.blank();
-        joined.parts_.resize(i);
-        joined.parts_.push_back({files[i].string(), count + 1, number + 1});
-        return true;
-      }
-      text += begins && !record.blank() ? tag : "";
-      text += line;
-      text += '\n';
-      ++count;
-      if (text.size() > kBlock) {
-        flush();
-      }
-      return true;
-    });
+    table.ForEach(
+        [&](std::string_view line, std::size_t) {
+          const bool begins = !record.open();
+          record.TakeLine(line);
+          text += begins && !record.blank() ? InQuotes(tags[i]) + sign : "";
+          text += line;
+          text += '\n';
+          ++count;
+          if (text.size() > kBlock) {
+            flush();
+          }
+          return true;
+        },
+        headers[i].line + 1);
   }
   flush();
   joined.CountLines();

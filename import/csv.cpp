@@ -772,15 +772,12 @@ void CsvReader::CheckHeader() const {
   require(fault_column_ || !strength_column_, "fault (or fault_no)");
   require(strength_column_ || !fault_column_, kStrengthColumn);
   if (!missing.empty()) {
-    const bool one_tag =
-        names_.size() == 2 || std::ranges::any_of(names_, [](const auto& name) {
-          return SameName(name, "value");
-        });
     Refuse("missing column " + JoinText(missing) + "; the header is " +
            Quoted(Listed(names_)) +
-           (map.columns.empty() && one_tag
+           (names_.size() == 2 && header_.signals == 0
                 ? "; is it a file for each tag? Try the folder that holds them"
-            : map.columns.empty()
+                : "") +
+           (map.columns.empty()
                 ? kSniff
                 : "; try the columns under [signal.CV], [signal.X] and "
                   "[signal.F] of --map, by their names in the header"));

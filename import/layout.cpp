@@ -1078,7 +1078,11 @@ std::string UnnamedAs(const std::string& cell, std::size_t index) {
 
 Layout FindLayout(const TextLines& lines, ColumnMap map,
                   const std::string& source, bool choose) {
-  return LayoutFinder(lines, std::move(map), source, choose).Find();
+  try {
+    return LayoutFinder(lines, std::move(map), source, choose).Find();
+  } catch (const DataError& error) {
+    throw DataError(lines.WithPlace(error.what()));
+  }
 }
 
 }  // namespace fdi::importer

@@ -330,7 +330,11 @@ Sniffed ScanColumns(const TextLines& lines, const std::string& source,
   for (const auto& [key, reason] : layout.choices) {
     found.choices.push_back(key + ": " + reason);
   }
-  ReadColumns(lines, layout, source, given, found);
+  try {
+    ReadColumns(lines, layout, source, given, found);
+  } catch (const DataError& error) {
+    throw DataError(lines.WithPlace(error.what()));
+  }
   return found;
 }
 

@@ -478,8 +478,10 @@ void ControlValve::Impl::Settle(const ProcessInputs& inputs) {
   const std::span<double> state = x();
   std::fill(state.begin(), state.end(), 0.0);
   state[kActuatorState] = z;
-  state[kChargeState] = dynamics_.ChargeFor(
-      gauge_pa + dynamics_.parameters().actuator.ambient_pressure_pa, z);
+  if (!dynamics_.is_electric()) {
+    state[kChargeState] = dynamics_.ChargeFor(
+        gauge_pa + dynamics_.parameters().actuator.ambient_pressure_pa, z);
+  }
   state[kFirstLagState] = command;
   state[kSecondLagState] = command;
   time_s_ = 0.0;
@@ -640,6 +642,11 @@ void ControlValve::SetEffects(const FaultEffects& effects) {
     return;
   }
   dynamics.SetEffects(effects);
+  if (dynamics.is_electric()) {
+    // The spindle of a motor goes with the rod.
+    double& z = impl_->x()[kActuatorState];
+    z = std::clamp(z, dynamics.LowStop(), dynamics.HighStop());
+  }
   dynamics.Commit(impl_->x().data());
   impl_->continues_ = false;
 }

@@ -17,9 +17,11 @@ double DelayedCommand(const std::vector<RecordRow>& record, std::size_t k,
   return record[static_cast<std::size_t>(at)].input.cv_pct;
 }
 
-double SimulatedPeriod(double period_s) {
+double SimulatedPeriod(double period_s, const ValveParameters& valve) {
   constexpr double kSettledS = 10.0;
-  return std::min(period_s, kSettledS);
+  return valve.actuator.drive == ActuatorDrive::kElectric
+             ? period_s
+             : std::min(period_s, kSettledS);
 }
 
 std::vector<RecordAnswer> SimulateRecord(const ValveParameters& parameters,
@@ -38,7 +40,7 @@ std::vector<RecordAnswer> SimulateRecord(const ValveParameters& parameters,
   ValveSimulationConfig config;
   config.parameters = parameters;
   config.excitation = std::move(excitation);
-  config.period_s = SimulatedPeriod(drive.period_s);
+  config.period_s = SimulatedPeriod(drive.period_s, parameters);
   config.duration_s = static_cast<double>(last - first) * config.period_s;
   config.continuous_inputs = drive.interpolated_command;
   config.tolerance_scale = tolerance_scale;

@@ -25,9 +25,9 @@ struct RecordDrive {
 double DelayedCommand(const std::vector<RecordRow>& record, std::size_t k,
                       int delay);
 
-/// Seconds that a row is simulated for. A valve settles within ten: longer ones
-/// change nothing at their ends but what the simulation costs.
-double SimulatedPeriod(double period_s);
+/// Seconds that a row is simulated for. A pneumatic valve settles within ten:
+/// longer ones change nothing at their ends but what the simulation costs.
+double SimulatedPeriod(double period_s, const ValveParameters& valve);
 
 /// Differences simulation - record over some rows.
 struct RecordFit {

@@ -616,7 +616,8 @@ std::vector<ValveUnknown> Identification::Unknowns(const ValveParameters& base,
 // rest, that is where the command is, and all of the record tells.
 Trim Identification::StartTrim(const ValveParameters& variant,
                                const RecordDrive& drive) const {
-  const bool rests = SimulatedPeriod(options_.period_s) < options_.period_s;
+  const bool rests =
+      SimulatedPeriod(options_.period_s, nominal_) < options_.period_s;
   if (HasPosition(records_) || rests) {
     return RegressTrim(records_, nominal_);
   }

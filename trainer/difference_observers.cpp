@@ -332,6 +332,20 @@ Condition ValidationPart(const FaultCondition& fault,
   return condition;
 }
 
+// A set of faults also knows those that simulation alone names.
+void AddSimulated(ModelSet& models) {
+  SignalMask predicted = 0;
+  for (const ChannelSpec& channel : models.channels) {
+    predicted = static_cast<SignalMask>(predicted | MaskOf(channel.output));
+  }
+  for (int fault = 1; fault <= kLastFault && !models.faults.empty(); ++fault) {
+    if (FaultFactsOf(fault).simulation_only && IsVisibleIn(fault, predicted) &&
+        !Contains(models.faults, fault)) {
+      models.faults.push_back(fault);
+    }
+  }
+}
+
 ModelSet Describe(const std::vector<TrainingRun>& healthy,
                   const Condition& normal,
                   const std::vector<FaultCondition>& faults,
@@ -341,15 +355,7 @@ ModelSet Describe(const std::vector<TrainingRun>& healthy,
   for (const FaultCondition& fault : faults) {
     AddObserver(fault.fault, fault.strength, models);
   }
-  SignalMask predicted = 0;
-  for (const ChannelSpec& channel : models.channels) {
-    predicted = static_cast<SignalMask>(predicted | MaskOf(channel.output));
-  }
-  for (int fault = 1; fault <= kLastFault && !faults.empty(); ++fault) {
-    if (FaultFactsOf(fault).simulation_only && IsVisibleIn(fault, predicted)) {
-      models.faults.push_back(fault);
-    }
-  }
+  AddSimulated(models);
   AddFindings(models);
   return models;
 }
@@ -688,6 +694,7 @@ ModelSet TransferDifferenceSet(const ModelSet& of_type,
   ModelSet models = Describe(healthy, fitted.normal, {}, options);
   models.faults = of_type.faults;
   std::erase_if(models.faults, IsFinding);
+  AddSimulated(models);
   AddFindings(models);
   reporter.Report(0.5, "setting the limits");
   FitLimits(fitted, CalibrateHealthy(fitted, options, models.observers.front()),

@@ -120,7 +120,9 @@ constexpr int kMaxUncertainRun = 60;
 
 // True if the limits are so wide that every known fault looks normal.
 bool SeesNoFault(const ModelSet& models) {
-  const auto known = std::ssize(models.faults) - FindingCount(models);
+  const auto known = std::ranges::count_if(models.faults, [](int fault) {
+    return IsFault(fault) && !FaultFactsOf(fault).simulation_only;
+  });
   return known > 0 && std::ssize(models.undetectable) >= known;
 }
 

@@ -52,7 +52,7 @@ constexpr double kUnrelated = 0.05;      // r² of X over OP: it is all noise.
 constexpr std::size_t kSwings = 6;
 constexpr std::size_t kRestSamples = 20;
 constexpr double kHunts = 0.1;        // Share of the window.
-constexpr double kBeyondNoise = 4.0;  // Deviations of X from its mean.
+constexpr double kBeyondNoise = 2.0;  // Deviations; short periods add to them.
 constexpr std::size_t kFrozenSamples = 300;
 constexpr double kBlock_s = 30.0;  // Block length of the second witness.
 
@@ -266,13 +266,12 @@ double UnansweredRun(const Window& window) {
   return longest;
 }
 
-// How often X passes from one side of its mean to the other, by more than
-// noise and what a good positioner leaves.
-std::size_t SwingsOf(std::span<const double> x, double least) {
-  const double mean = Mean(x);
+// How often a series passes from one side of its mean to the other, by `least`.
+std::size_t SwingsOf(std::span<const double> values, double least) {
+  const double mean = Mean(values);
   std::size_t swings = 0;
   int side = 0;
-  for (const double value : x) {
+  for (const double value : values) {
     const int now = value > mean + least ? 1 : value < mean - least ? -1 : side;
     swings += now != side && side != 0 ? 1U : 0U;
     side = now;
@@ -280,12 +279,41 @@ std::size_t SwingsOf(std::span<const double> x, double least) {
   return swings;
 }
 
+// X swings regularly about OP, by more than noise, more than a good positioner
+// leaves, and more than OP itself moves. An OP that repeats one value may have
+// been held or compressed, while the command moved.
+bool Hunts(std::span<const double> op, std::span<const double> x,
+           double noise) {
+  const double range = RangeOf(op);
+  if (range == 0.0) {
+    return false;
+  }
+  std::vector<double> distance(x.begin(), x.end());
+  for (std::size_t k = 0; k < op.size(); ++k) {
+    distance[k] -= op[k];
+  }
+  const auto oscillation = FindOscillation(distance);
+  if (!oscillation || oscillation->regularity <= kRegular) {
+    return false;
+  }
+  // What wanders is unlike itself a period ago.
+  CorrelationSums again;
+  const auto period =
+      static_cast<std::size_t>(std::lround(oscillation->period));
+  for (std::size_t k = period; k < distance.size(); ++k) {
+    again.Add(distance[k - period], distance[k]);
+  }
+  return again.Correlation() > kHalf &&
+         SwingsOf(distance, std::max({kGoodBand, kBeyondNoise * noise,
+                                      range})) >= kSwings;
+}
+
 // The share of the stretches in which OP rests and X swings.
 double HuntingShare(const Window& window) {
   if (window.x.empty() || !IsPercent(window.op)) {
     return 0.0;
   }
-  const double least = std::max(kGoodBand, kBeyondNoise * NoiseOf(window.x));
+  const double noise = NoiseOf(window.x);
   std::size_t hunting = 0;
   std::size_t begin = 0;
   for (std::size_t k = 1; k <= window.op.size(); ++k) {
@@ -293,9 +321,11 @@ double HuntingShare(const Window& window) {
         std::abs(window.op[k] - window.op[begin]) <= kGoodBand) {
       continue;
     }
+    const auto part = [&](const std::vector<double>& values) {
+      return std::span(values).subspan(begin, k - begin);
+    };
     if (k - begin >= kRestSamples &&
-        SwingsOf(std::span(window.x).subspan(begin, k - begin), least) >=
-            kSwings) {
+        Hunts(part(window.op), part(window.x), noise)) {
       hunting += k - begin;
     }
     begin = k;
@@ -452,7 +482,7 @@ Finding Judge(const Window& window, const Evidence& e) {
             "isolated, or too small"};
   }
   if (e.hunts > kHunts) {
-    return {Verdict::kHunting, true, "X swings to and fro while OP rests"};
+    return {Verdict::kHunting, false, "X swings to and fro while OP rests"};
   }
   if (e.op_range <= 0.0) {
     return {Verdict::kUndetermined, false, "OP stands still"};

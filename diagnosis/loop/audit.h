@@ -123,8 +123,8 @@ bool IsPercent(std::span<const double> op);
 ///   if a play explains half of what a straight line leaves of X over OP, or if
 ///   X stands five times and 1 % of the time while OP moves (Standing): where
 ///   OP is restless, friction holds X for seconds and is no play.
-/// - hunting, if X swings to and fro in a tenth of the time although OP rests:
-///   the positioner makes it, which no play between OP and X explains.
+/// - hunting, if X swings regularly about OP in a tenth of the time although OP
+///   rests: the positioner makes it, which no play between OP and X explains.
 /// - the other causes by the rest: see Verdict and docs/loops.md.
 ///
 /// In an integrating loop, play is never concluded from PV, because the

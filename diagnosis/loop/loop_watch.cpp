@@ -20,7 +20,7 @@ constexpr double kSureFactor = 1.0;
 constexpr double kLikelyFactor = 0.75;
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 // The interval [ms] is in the low half of the hash.
-constexpr std::uint64_t kHashBase = 0xA0D1'7000'0000'0000ULL;
+constexpr std::uint64_t kHashBase = 0xA0D2'7000'0000'0000ULL;
 constexpr double kMsPerSecond = 1e3;
 constexpr double kOtherInterval = 0.2;  // Share by which another one differs.
 
@@ -34,9 +34,10 @@ Estimate SizeOf(const loop::Audit& audit) {
     return {share(kPerCent * band->width), share(kPerCent * band->low),
             share(kPerCent * band->high)};
   }
-  const double size = audit.verdict == loop::Verdict::kSaturated
-                          ? share(e.at_limit)
-                          : share(kPerCent * e.op_range);
+  const double size =
+      audit.verdict == loop::Verdict::kSaturated ? share(e.at_limit)
+      : audit.verdict == loop::Verdict::kHunting ? share(e.hunts)
+                                                 : share(kPerCent * e.op_range);
   return {size, size, size};
 }
 
@@ -297,8 +298,10 @@ void LoopWatch::Count(const loop::Audit& audit) {
     verdict_.normal_factor = 1.0;
   }
   const int finding = FindingOf(audit.verdict);
-  if (finding == 0 && audit.evidence.op_range < kOpMoves) {
-    return;  // A loop at rest says nothing.
+  // A loop at rest says nothing, but that its position rests, too.
+  if (finding == 0 && audit.evidence.op_range < kOpMoves &&
+      found_.finding != kPositionerHunts) {
+    return;
   }
   if (vote_.times == 0 || finding != vote_.found.finding) {
     vote_ = {{}, 0, taken_ns_};
@@ -350,9 +353,8 @@ Severity LoopWatch::SeverityOf(const Found& found) const {
 void LoopWatch::Name(const Found& found) {
   found_ = found;
   named_ = true;
-  // As in AuditModels(), whose numbers leave out the drift.
-  const auto bit = static_cast<std::size_t>(
-      std::min(found.finding, kLastLoopFinding + 1) - kFirstLoopFinding);
+  const auto bit =
+      static_cast<std::size_t>(FaultIndex(*models_, found.finding));
   verdict_.fault_factors.fill(0.0);
   verdict_.strengths.fill(0.0);
   verdict_.fault_factors[bit] = found.factor;

@@ -227,6 +227,8 @@ inline constexpr int kSupplyDrop = 16;
 inline constexpr int kTemperatureTransmitterFault = 20;
 inline constexpr int kInletPressureTransmitterFault = 21;
 inline constexpr int kOutletPressureTransmitterFault = 22;
+/// Beside the positioner, whose own is f13.
+inline constexpr int kPositionTransmitterFault = 23;
 inline constexpr int kTravelDeviation = kFirstFinding;
 inline constexpr int kShutFlow = 202;
 inline constexpr int kExcessFlow = 203;
@@ -250,6 +252,7 @@ static_assert(kFaultCatalogue[kDiaphragmPerforation - 1].name == "f10" &&
               kFaultCatalogue[kTemperatureTransmitterFault - 1].name == "t1" &&
               kFaultCatalogue[kOutletPressureTransmitterFault - 1].name ==
                   "p2" &&
+              kFaultCatalogue[kPositionTransmitterFault - 1].name == "x1" &&
               kFindingCatalogue[kLowFlow - kFirstFinding].name == "low_flow" &&
               kFindingCatalogue[kStiction - kFirstFinding].name == "stiction" &&
               kPositionerHunts == kLastFinding);

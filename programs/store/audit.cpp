@@ -68,6 +68,11 @@ importer::ColumnMap LoopMap(const TextLines& lines, const AuditOptions& options,
   }
   const importer::Sniffed found = importer::ScanColumns(lines, source, map);
   map.long_table = found.map.long_table;
+  if (std::filesystem::is_directory(source) && !map.long_table) {
+    throw ConfigError(source +
+                      ": its files have more than one tag each; expected the "
+                      "files, a loop each, and not their folder");
+  }
   importer::GuessLoop(found.columns, options.names, source, map);
   return map;
 }
@@ -92,7 +97,8 @@ LoopRecord ReadLoop(const std::string& file, const AuditOptions& options,
     table = importer::ReadCsv(lines, csv);
   }
   LoopRecord record;
-  record.loop = std::filesystem::path(file).stem().string();
+  const auto path = std::filesystem::path(file);
+  record.loop = (path.has_filename() ? path : path.parent_path()).stem();
   record.source = file;
   record.dated = table.dated;
   const auto has = [&](std::string_view name) {

@@ -286,7 +286,7 @@ Trajectory Looker::Simulate(int fault, double strength, Course course,
   config.parameters = valve_;
   config.parameters.actuator.supply_pressure_gauge_pa *= supply;
   config.excitation = std::move(excitation);
-  config.period_s = SimulatedPeriod(physics_.drive.period_s);
+  config.period_s = SimulatedPeriod(physics_.drive.period_s, valve_);
   config.duration_s = rows_ * config.period_s;
   config.continuous_inputs = physics_.drive.interpolated_command;
   config.noise = false;

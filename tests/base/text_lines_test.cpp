@@ -120,7 +120,7 @@ TEST_F(FolderTest, AFileForEachTagMakesOneTable) {
   Write("FIC1.PV.csv", "Time,Status,Value\n1,\"not\nok\",7\n\n2,ok,8");
   Write("map.toml", "[time]\n");
   EXPECT_EQ(Text(),
-            "tag,Time,Status,Value\n"
+            "tag,\"Time\",\"Status\",\"Value\"\n"
             "\"FIC1.OP\",1,ok,5\r\n\"FIC1.OP\",2,ok,6\r\n"
             "\"FIC1.PV\",1,\"not\nok\",7\n\n\"FIC1.PV\",2,ok,8\n");
 }
@@ -128,7 +128,29 @@ TEST_F(FolderTest, AFileForEachTagMakesOneTable) {
 TEST_F(FolderTest, ColumnsNameTheTagsWhereTheyDiffer) {
   Write("a.txt", "t;FIC1.OP\n1;5\n");
   Write("b.txt", "t;FIC1.PV\n1;7\n");
-  EXPECT_EQ(Text(), "tag;t;value\n\"FIC1.OP\";1;5\n\"FIC1.PV\";1;7\n");
+  EXPECT_EQ(Text(), "tag;\"t\";\"value\"\n\"FIC1.OP\";1;5\n\"FIC1.PV\";1;7\n");
+}
+
+TEST_F(FolderTest, CommentsAndQuotesOfTheHeaderAreNoPartOfIt) {
+  Write("a.CSV", "sep=;\n# PI\n\"Time, UTC\";\"FIC1.OP\"\n1;5\n");
+  Write("b.csv", "\"Time, UTC\";FIC1.PV\n1;7\n");
+  EXPECT_EQ(Text(),
+            "tag;\"Time, UTC\";\"value\"\n\"FIC1.OP\";1;5\n"
+            "\"FIC1.PV\";1;7\n");
+}
+
+TEST_F(FolderTest, TwoFilesOfOneTagAreRefused) {
+  Write("a.csv", "Time,Value\n1,5\n");
+  Write("a.txt", "Time,Value\n1,5\n");
+  EXPECT_THAT(storage::MessageOf<DataError>([&] { Text(); }),
+              HasSubstr("a.txt: is a second file for the tag \"a\""));
+  Write("a.txt", "Time,Wert\n1,5\n");
+  Write("b.csv", "Time,Value\n1,5\n");
+  EXPECT_THAT(storage::MessageOf<DataError>([&] { Text(); }),
+              HasSubstr("b.csv: is a second file for the tag \"Value\""));
+  Write("b.csv", "");
+  EXPECT_THAT(storage::MessageOf<DataError>([&] { Text(); }),
+              HasSubstr("b.csv: has no names of columns"));
 }
 
 TEST_F(FolderTest, AnErrorNamesTheFileAndItsLine) {

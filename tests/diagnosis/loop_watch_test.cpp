@@ -402,6 +402,28 @@ TEST_F(LoopWatchTest, WhereXIsMeasuredItIsReadOffX) {
   EXPECT_NEAR(told_[1].strength, 0.02, 0.004);
 }
 
+// It ends when X rests, too, though OP does not move.
+TEST_F(LoopWatchTest, APositionerThatHuntsHasAnEpisodeUntilItRests) {
+  const auto feed = [&](double swing) {
+    loop::Window loop;
+    for (int k = 0; k < 1100; ++k) {
+      loop.op.push_back(50.0 + 0.05 * std::sin(13.0 * k * k));
+      loop.x.push_back(50.0 + swing * std::sin(0.5 * k) +
+                       0.02 * std::sin(7.0 * k * k));
+      loop.pv.push_back(loop.x.back());
+    }
+    Feed(loop, true);
+  };
+  feed(1.5);
+  ASSERT_THAT(Kinds(), ElementsAre(TransitionKind::kDetected,
+                                   TransitionKind::kIsolated));
+  EXPECT_EQ(watch_.models()->faults.at(6), kPositionerHunts);
+  EXPECT_EQ(watch_.verdict().isolated, 1U << 6U);
+  EXPECT_GT(watch_.verdict().strengths[6], 0.9);
+  feed(0.0);
+  EXPECT_EQ(told_.back().reason, EndReason::kCleared);
+}
+
 TEST(AuditModelsTest, TheHashTellsTheInterval) {
   const auto models = AuditModels(60.0);
   EXPECT_EQ(models->sample_period_s, 60.0);

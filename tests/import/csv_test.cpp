@@ -555,7 +555,8 @@ TEST(CsvTest, FilesThatCannotBeReadAreNamedWithTheReason) {
     return std::string();
   };
   EXPECT_THROW(ReadCsvFile(directory.path() / "none.csv"), NotFoundError);
-  EXPECT_THAT(message(directory.path()), HasSubstr("is a folder without a table"));
+  EXPECT_THAT(message(directory.path()),
+              HasSubstr("is a folder without a table"));
 }
 
 }  // namespace

@@ -1270,7 +1270,7 @@ TEST(KindsTest, EveryReferenceFileIsReadWithItsMapOrRefusedForAReason) {
       {"p03_23ZT101.PV.csv", "missing column CV_pct"},
       {"p05_report_by_exception.jsonl", "is JSON lines, not a table"},
       {"p06_minute_stamps.csv", "the seconds are missing"},
-      {"p08_niagara_FT101_Flow.csv", "Try the folder that holds them"},
+      {"p08_niagara_FT101_Flow.csv", "missing column CV_pct"},
       {"p08_niagara_FV101_Cmd.csv", "missing column CV_pct"},
       {"p08_niagara_FV101_Pos.csv", "missing column CV_pct"},
       {"p10_historian_odata.json", "is JSON of OData, not a table"},

@@ -307,8 +307,9 @@ TEST(ControlValveTest, AMotorRunsAtConstantSpeedOutsideItsDeadBand) {
   EXPECT_EQ(valve.state().signal, -1.0);
 }
 
-// Its torque switch opens there, so that it need not come back through travel
-// that the rod never had.
+// Its torque switch opens there, and a stop that moves inwards takes its
+// spindle along, so that it need not come back through travel that the rod
+// never had.
 TEST(ControlValveTest, AMotorStopsWhereTheRodIsBlocked) {
   ValveParameters parameters = Electric();
   parameters.actuator.play_fraction = 0.02;
@@ -323,6 +324,11 @@ TEST(ControlValveTest, AMotorStopsWhereTheRodIsBlocked) {
   EXPECT_EQ(valve.state().signal, 0.0);
   Hold(valve, 0.4, 6);
   EXPECT_NEAR(valve.state().rod, 0.62 - 6.0 / 60.0, 2e-3);
+  clogged.upper_stop_factor = 0.3;
+  valve.SetEffects(clogged);
+  EXPECT_DOUBLE_EQ(valve.state().rod, 0.3);
+  Hold(valve, 0.1, 6);
+  EXPECT_NEAR(valve.state().rod, 0.32 - 6.0 / 60.0, 2e-3);
 }
 
 // With the spring that closes and air that opens, the travel is mirrored; a

@@ -43,7 +43,10 @@ INSTANTIATE_TEST_SUITE_P(
     SecondLook, NamedFaultTest,
     ::testing::Values(std::pair{1, 0.45}, std::pair{1, 0.25},
                       std::pair{13, -0.2}, std::pair{16, 0.7},
-                      std::pair{16, 0.78}, std::pair{19, 0.25}));
+                      std::pair{16, 0.78}, std::pair{19, 0.25},
+                      std::pair{kPositionTransmitterFault, 0.06},
+                      std::pair{kPositionTransmitterFault, -0.2},
+                      std::pair{13, 0.06}));
 
 // A fault that has stood since before the window.
 LookWindow OnTopOf(const Explanation& standing,
@@ -340,8 +343,8 @@ TEST(SecondLookTest, AWindowWithinTheCorrelationIsOneReading) {
 // A row of a minute ends within three quarters of a per cent of where one of
 // ten seconds does: the rest is what has not settled by then.
 TEST(RecordFitTest, LongRowsAreSimulatedForAsLongAsAValveSettles) {
-  EXPECT_EQ(SimulatedPeriod(1.0), 1.0);
-  EXPECT_EQ(SimulatedPeriod(60.0), 10.0);
+  EXPECT_EQ(SimulatedPeriod(1.0, {}), 1.0);
+  EXPECT_EQ(SimulatedPeriod(60.0, {}), 10.0);
   const std::vector<RecordRow> record = Recording(60, 2, {});
   const auto answers = [&](double period_s) {
     ValveSimulationConfig config;

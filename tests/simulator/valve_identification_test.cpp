@@ -140,6 +140,31 @@ TEST(ValveIdentificationTest, FindsTheSpeedOfAMotor) {
             nominal.positioner.filling_cv);
 }
 
+// A row of half a minute is simulated for half a minute: the motor may still
+// run at its end.
+TEST(ValveIdentificationTest, FindsTheSpeedOfAMotorInSlowRows) {
+  ValveParameters nominal = ParameterSet("lublin-actuator-3-refit");
+  nominal.actuator.drive = ActuatorDrive::kElectric;
+  ValveParameters truth = nominal;
+  truth.actuator.stroke_time_s = 200.0;
+  HealthyRecord record;
+  ValveSimulationConfig config;
+  config.parameters = truth;
+  config.excitation = RecordedExcitation{BusyInputs(600, 3, 0.8)};
+  config.period_s = 30.0;
+  config.duration_s = 600.0 * config.period_s;
+  ValveSimulation simulation(config);
+  while (!simulation.finished()) {
+    const Sample s = simulation.Step().sample;
+    record.rows.push_back(
+        {{s[Signal::kCv], s[Signal::kP1], s[Signal::kP2], s[Signal::kT1]},
+         s[Signal::kX],
+         s[Signal::kF]});
+  }
+  const ValveFit fit = FitValve({record}, nominal, {.period_s = 30.0});
+  ExpectRecovered(fit, "actuator.stroke_time_s", 200.0, 0.1);
+}
+
 // As much flow where the record is, from a much smaller valve.
 TEST(ValveIdentificationTest, FindsAFlatTrim) {
   const ValveParameters nominal = ParameterSet("lublin-actuator-3-refit");

@@ -126,7 +126,8 @@ std::vector<Sample> FaultSynthesizer::Simulate(
   config.period_s = simulator::SimulatedPeriod(
       inputs.size() > 1
           ? 1e-9 * static_cast<double>(inputs[1].stamp_ns - inputs[0].stamp_ns)
-          : 1.0);
+          : 1.0,
+      config.parameters);
   config.duration_s = config.period_s * static_cast<double>(inputs.size());
   // Only the difference of two simulations is used; the recorded readings have
   // noise and resolution of their own.

@@ -294,10 +294,12 @@ simulator::ValveFit FitType(const std::vector<TrainingRun>& runs,
   fit.has_flow = runs.front().samples.front().sample.Has(Signal::kF);
   fit.period_s = runs.front().period_s;
   // Rows beyond what a valve settles in cost as much each, and tell no more.
-  fit.max_rows = std::max(
-      kMinFitRows,
-      static_cast<int>(fit.max_rows / std::max(1.0, simulator::SimulatedPeriod(
-                                                        fit.period_s))));
+  fit.max_rows =
+      std::max(kMinFitRows,
+               static_cast<int>(
+                   fit.max_rows /
+                   std::max(1.0, simulator::SimulatedPeriod(
+                                     fit.period_s, options.type.parameters))));
   fit.threads =
       options.threads > 0
           ? options.threads
