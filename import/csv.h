@@ -213,7 +213,7 @@ struct CsvRow {
 /// Header: t_s,CV_pct,P1_kPa,P2_kPa,T1_degC,X_pct,F_m3_h (or F_t_h), in any
 /// order and case; optional SP_pct,CVI,Ps_kPa,Pz_kPa; optional PV, and with it
 /// SP, unless a map names the columns; optional truth: fault
-/// (f1..f19, t1, p1, p2, normal) or fault_no (0..22) with fault_strength, where
+/// (kFaultNames, normal) or fault_no (0..kLastFault) with fault_strength, where
 /// only a non-zero strength marks a fault; optional mode (kValveModeNames, or
 /// the words of controllers, CAS, MAN, ...; AUTO if the column is missing).
 /// Further columns are ignored. docs/import.md has the rest: other names, forms

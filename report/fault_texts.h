@@ -76,7 +76,7 @@ struct FaultWords {
 };
 
 /// The fault catalogue: a text for every fault and for faults unlike any of
-/// them. A TOML file with one table per fault, [f1]..[p2] and [unknown], and
+/// them. A TOML file with one table per fault, [f1]..[x1] and [unknown], and
 /// the keys name, check, discipline, namur and severity; and one per figure,
 /// [figure.dead_band] and so on, with unit, lowest and highest instead of
 /// severity.

@@ -14,7 +14,7 @@ namespace fdi::simulator {
 /// linearly from initial_strength to final_strength over development_s, stays
 /// there, and is 0 again from end_s on.
 struct FaultSchedule {
-  int fault{0};               ///< 1..22.
+  int fault{0};               ///< 1..kLastFault.
   double start_s{0.0};        ///< From the first sample, >= 0.
   double development_s{0.0};  ///< >= 0; 0 = abrupt.
   double initial_strength{0.0};

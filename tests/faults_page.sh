@@ -95,7 +95,7 @@ print <<'TEXT';
 Made by `tests/faults_page.sh` from the catalogue that the programs show (`fdi-store faults`); change that, not this page.
 
 **Seen with which signals**: the smallest strength at which a fault is detected, as a share of its full size, in the one loop where it was measured
-([how](results/closed-loop.md)). Your valve may differ: `fdi-trainer onboard` prints its own table. "not" means not at any strength. Without P1,
+([how](results/closed-loop.md)). Your valve may differ: `fdi-trainer onboard` prints its own table. "not" means not at any strength, "-" that it was not measured. Without P1,
 P2 and T1 few faults are told apart: expect a set of two to four.
 
 TEXT
@@ -103,7 +103,7 @@ print '| code | name | ', join(' | ', @sets), " |\n";
 print '|---|---|', '---|' x @sets, "\n";
 for my $code (@faults) {
   print "| [$code](#$code) | $entry{$code}{name} | ",
-    join(' | ', map { $seen{$_}{$code} // 'not' } @sets), " |\n";
+    join(' | ', map { $seen{$_}{$code} // ($code eq 'f14' ? 'not' : '-') } @sets), " |\n";
 }
 print <<'TEXT';
 

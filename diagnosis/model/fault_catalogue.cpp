@@ -10,7 +10,7 @@
 namespace fdi {
 namespace {
 
-// "f1..f19, t1, p1, p2".
+// "f1..f19, t1, p1, p2, x1".
 std::string JoinedNames() {
   std::string names = "f1..f" + std::to_string(kFaultCount);
   for (int fault = kFaultCount + 1; fault <= kLastFault; ++fault) {

@@ -46,7 +46,7 @@ inline constexpr SignalMask kRodSignals =
     static_cast<SignalMask>(MaskOf(Signal::kX) | MaskOf(Signal::kF));
 
 struct FaultFacts {
-  std::string_view name;          ///< "f1"; "t1", "p1", "p2" for transmitters.
+  std::string_view name;  ///< "f1"; "t1", "p1", "p2", "x1" for transmitters.
   std::string_view description;   ///< "valve clogging".
   std::string_view paper_name{};  ///< "F1".."F5", or empty.
   bool is_signed{false};          ///< Strength in [-1, 1], else in [0, 1].
@@ -284,7 +284,7 @@ inline constexpr auto kFaultsAndFindings = [] {
 /// True if `fault` is one of `faults`.
 bool Contains(const std::vector<int>& faults, int fault);
 
-/// The names of all faults, for messages and help: "f1..f19, t1, p1, p2".
+/// The names of all faults, for messages and help: "f1..f19, t1, p1, p2, x1".
 extern const std::string kFaultNames;
 
 /// @throws std::invalid_argument if `fault` is neither a fault nor a finding.

@@ -92,7 +92,7 @@ struct ChannelObserver {
 /// One observer: normal operation (fault 0) or one fault condition.
 struct Observer {
   std::string name;                       ///< "normal", "f19 0.50".
-  int fault{0};                           ///< 0 = normal, else 1..22.
+  int fault{0};                           ///< 0 = normal, else 1..kLastFault.
   double strength{0.0};                   ///< As trained; signed.
   std::vector<ChannelObserver> channels;  ///< One per ModelSet::channels.
   /// P1, P2, T1: outside normal operation in all of the condition's own data.

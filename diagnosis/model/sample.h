@@ -132,7 +132,7 @@ double GoodReading(const Sample& sample, Signal signal);
 
 /// The truth of a simulated or labelled sample; never seen by an engine.
 struct FaultTruth {
-  int fault{0};          ///< 1..22, 0 = none acting.
+  int fault{0};          ///< 1..kLastFault, 0 = none acting.
   double strength{0.0};  ///< Signed; 0 while the fault is inactive.
 };
 

@@ -40,7 +40,7 @@ struct HealthChannel {
 
 /// The estimates of a fault while it was isolated, alone or with others.
 struct StrengthSums {
-  int fault{0};  ///< 1..22
+  int fault{0};  ///< 1..kLastFault
   std::int64_t samples{0};
   std::int64_t strength{0};  ///< Σ s/kShare
 

@@ -49,7 +49,7 @@ struct NewRun {
 struct RunLabel {
   double from_s{0.0};
   double to_s{std::numeric_limits<double>::infinity()};
-  int fault{0};  ///< 0 = normal, else 1..22.
+  int fault{0};  ///< 0 = normal, else 1..kLastFault.
   double strength{0.0};
 };
 

@@ -317,6 +317,11 @@ TEST(ValveEngineIntakeTest, WhereEveryFaultLooksNormalNothingIsJudged) {
   models.undetectable = models.faults;
   ValveEngine blind(std::make_shared<const ModelSet>(models));
   EXPECT_EQ(StepRange(blind, 0, 50).last.confidence, 0.0);
+
+  // One that no observer is taught makes no set that sees.
+  models.faults.push_back(kPositionTransmitterFault);
+  ValveEngine still(std::make_shared<const ModelSet>(models));
+  EXPECT_EQ(StepRange(still, 0, 50).last.confidence, 0.0);
 }
 
 }  // namespace

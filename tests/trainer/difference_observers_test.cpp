@@ -286,11 +286,14 @@ TEST(DifferenceObserversTest, AFurtherValveOfTheTypeTakesTheFaultsOver) {
   of_type.observers.push_back(of_type.observers.back());
   of_type.observers.back().name += kTaughtMark;
   of_type.observers.back().moved = MaskOf(Signal::kT1);
+  // A set of before x1, which a set of X and F knows without an observer.
+  EXPECT_EQ(std::erase(of_type.faults, kPositionTransmitterFault), 1U);
   ASSERT_TRUE(IsTransferable(of_type, healthy, TwoChannels()));
 
   const auto models = std::make_shared<const ModelSet>(
       TransferDifferenceSet(of_type, healthy, TwoChannels()));
 
+  EXPECT_TRUE(Contains(models->faults, kPositionTransmitterFault));
   EXPECT_TRUE(IsTaught(models->observers.back()));
   EXPECT_EQ(models->observers.back().moved, MaskOf(Signal::kT1));
   EXPECT_EQ(ComputeIndices(ScoreRun(models, FurtherValve(4, 7200))).episodes,
