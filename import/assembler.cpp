@@ -437,6 +437,11 @@ Sample Assembler::SampleAt(std::int64_t instant_ns, Valve& valve) {
     }
   }
   sample.mode = valve.mode;
+  if (IsAllZero(sample, valve.valve.map.columns)) {
+    sample.present = 0;
+    sample.values.fill(0.0);
+    sample.quality.fill(SignalQuality::kBad);
+  }
   DropLoneSetPoint(has_pv ? MaskOf(Signal::kPv) : SignalMask{0}, sample);
   return sample;
 }

@@ -11,6 +11,7 @@
 #include "base/error.h"
 #include "base/text.h"
 #include "diagnosis/model/fault_catalogue.h"
+#include "import/assembler.h"
 #include "import/elapsed.h"
 #include "import/layout.h"
 #include "import/tag_map.h"
@@ -145,6 +146,23 @@ std::string_view WithoutFlag(std::string_view cell) {
   }
   const std::string_view number = cell.substr(0, cell.size() - 1);
   return SplitUnit(number).second.empty() ? number : cell;
+}
+
+bool IsAllZero(const Sample& sample,
+               const std::vector<ColumnMapping>& columns) {
+  std::size_t zeros = 0;
+  bool shut = false;
+  for (const ColumnMapping& m : columns) {
+    if (!sample.Has(m.signal)) {
+      continue;
+    }
+    if (sample[m.signal] != Converted(m, 0.0)) {
+      return false;
+    }
+    ++zeros;
+    shut = shut || (m.signal == Signal::kCv && m.sense == Sense::kOpening);
+  }
+  return zeros >= 3 && shut;
 }
 
 CsvReader::CsvReader(CsvOptions options)

@@ -149,6 +149,12 @@ struct ColumnMap {
   std::optional<Resampling> resampling;
 };
 
+/// True if everything that `sample` has, three signals or more, is 0 in its
+/// source, and that would be a shut valve: some systems write zeros into all
+/// columns where they have no reading, and of a valve that is really shut
+/// nothing is judged.
+bool IsAllZero(const Sample& sample, const std::vector<ColumnMapping>& columns);
+
 /// Settings of the CSV readers.
 struct CsvOptions {
   std::string source{"input"};  ///< File name for error messages.

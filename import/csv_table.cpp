@@ -130,6 +130,7 @@ class TableReader {
   void Resample();
   void NoteForm();
   void DropImpossible(const ColumnMapping& mapping);
+  void DropZeros();
   void CheckReadings();
   void CheckValues();
   void CheckPair(Signal signal);
@@ -186,6 +187,7 @@ CsvTable TableReader::Read() {
     OrderTags();
   }
   CheckOrder();
+  DropZeros();
   if (options().check_values) {
     CheckValues();
   }
@@ -605,6 +607,24 @@ void TableReader::DropImpossible(const ColumnMapping& m) {
       std::to_string(count) + " cells beyond the range of the signal (" +
       Listed(usual) + (cells.size() > usual.size() ? ",..." : "") +
       ") taken as no reading");
+}
+
+void TableReader::DropZeros() {
+  std::size_t count = 0;
+  for (CsvRow& row : rows_) {
+    Sample& sample = row.labelled.sample;
+    if (IsAllZero(sample, options().map.columns)) {
+      for (const ColumnMapping& m : options().map.columns) {
+        Drop(m.signal, sample);
+      }
+      ++count;
+    }
+  }
+  if (count > 0) {
+    table_.notes.push_back(std::to_string(count) + " of " +
+                           std::to_string(rows_.size()) +
+                           " rows are 0 in all columns, taken as no reading");
+  }
 }
 
 // A signal is there if it has readings: a mere header, or a column that is bad

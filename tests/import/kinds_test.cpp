@@ -1352,6 +1352,32 @@ TEST(KindsTest, AFolderOfFilesIsATableOfTheirTags) {
   }
 }
 
+// Unless 0 of a command in % of closing is the open valve, and its flow is
+// lost.
+TEST(KindsTest, RowsThatAreZeroInAllColumnsAreNoReadings) {
+  const auto table = [](const std::string& sense) {
+    std::string text = "t_s,OP,ZT,FT\n";
+    for (int k = 0; k < 120; ++k) {
+      text += std::to_string(k) + (k / 10 == 3 ? ",0.0,0,0.00\n"
+                                   : k == 50   ? ",0.0,0,3.1\n"
+                                               : ",40.1,40.2,3.1\n");
+    }
+    std::string map = "[signal.F]\ncolumn = \"FT\"\nunit = \"t/h\"\n";
+    for (const char* pair : {"CV]\ncolumn = \"OP\"", "X]\ncolumn = \"ZT\""}) {
+      map += std::string("[signal.") + pair + "\nsense = \"" + sense + "\"\n";
+    }
+    return ReadCsv(text, {.map = ReadTagMapText(map, "map")});
+  };
+  const CsvTable opening = table("opening");
+  const auto& samples = opening.runs.front().samples;
+  for (std::size_t k = 0; k < samples.size(); ++k) {
+    EXPECT_EQ(samples[k].sample.Has(Signal::kX), k / 10 != 3) << k;
+  }
+  EXPECT_THAT(opening.notes, Contains("10 of 120 rows are 0 in all columns, "
+                                      "taken as no reading"));
+  EXPECT_TRUE(table("closing").runs.front().samples[30].sample.Has(Signal::kX));
+}
+
 // F is a type there, and no Fahrenheit.
 TEST(KindsTest, ARowOfTypesSaysNothingOfUnits) {
   const Sniffed found = Sniff(

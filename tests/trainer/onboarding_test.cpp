@@ -354,6 +354,29 @@ TEST(RecordChecksTest, TheReferenceFilesAreOnboardedOrRefusedForTheirReason) {
   EXPECT_GE(files, 27U);
 }
 
+// One that is off by as much and is no curve of CV has another cause.
+TEST(RecordChecksTest, ACharacteristicOfThePositionerIsSaid) {
+  LabelledSample labelled;
+  TrainingRun curve;
+  TrainingRun other;
+  for (int k = 0; k < 600; ++k) {
+    const double cv = 50.0 + 20.0 * std::sin(0.05 * k);
+    labelled.sample.Set(Signal::kCv, cv);
+    labelled.sample.Set(Signal::kX, 0.01 * cv * cv);
+    curve.samples.push_back(labelled);
+    labelled.sample.Set(Signal::kX, 25.0 + 20.0 * std::sin(0.05 * k - 1.0));
+    other.samples.push_back(labelled);
+  }
+  try {
+    CheckFit({curve}, {24.0, 0.0, 0.0, 0.0}, {}, 40.0);
+    FAIL() << "not refused";
+  } catch (const DataError& error) {
+    EXPECT_THAT(error.what(), testing::HasSubstr("X is a fixed curve of CV"));
+  }
+  EXPECT_NO_THROW(CheckFit({other}, {24.0, 0.0, 0.0, 0.0}, {}, 40.0));
+  EXPECT_NO_THROW(CheckFit({curve}, {5.0, 0.0, 0.0, 0.0}, {}, 40.0));
+}
+
 TEST(RecordChecksTest, SimulationHasToBeBetterThanNone) {
   const std::vector<TrainingRun> runs{
       RunOf({"r", SimulateHealthy(Lublin(), 900.0, 3)})};

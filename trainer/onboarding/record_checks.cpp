@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <map>
 #include <string>
 
 #include "base/error.h"
@@ -20,6 +21,8 @@ constexpr double kMinVariation = 1.0;  // of CV, X [% rms]; 2 % of the flow
 constexpr double kAgainst = 0.3;       // correlation of the wrong sign
 constexpr double kWorse = 1.05;        // times the error of the naive model
 constexpr double kAtBound = 1e-3;      // relative
+constexpr double kCurve = 10.0;  // error of X that no calibration makes [%]
+constexpr double kFixed = 0.25;  // times it: X is nearly a function of CV
 
 std::string Text(double value) {
   char text[32];
@@ -278,6 +281,29 @@ std::string BeyondMeter(const std::vector<TrainingRun>& runs, const Readings& f,
          "under [instruments] of --type FILE.toml. With the present range, ";
 }
 
+// How far readings of X lie from their mean at the same CV, rounded to 1 % [%].
+double ScatterOfX(const std::vector<TrainingRun>& runs) {
+  std::map<long, std::vector<double>> bins;
+  for (const TrainingRun& run : runs) {
+    for (const LabelledSample& labelled : run.samples) {
+      const Sample& sample = labelled.sample;
+      if (sample.Has(Signal::kCv) && sample.Has(Signal::kX)) {
+        bins[std::lround(sample[Signal::kCv])].push_back(sample[Signal::kX]);
+      }
+    }
+  }
+  double squares = 0.0;
+  double count = 0.0;
+  for (const auto& [cv, values] : bins) {
+    const double mean = Mean(values);
+    for (const double value : values) {
+      squares += (value - mean) * (value - mean);
+      count += 1.0;
+    }
+  }
+  return std::sqrt(squares / std::max(count, 1.0));
+}
+
 }  // namespace
 
 void CheckRecords(const std::vector<TrainingRun>& runs,
@@ -325,6 +351,16 @@ void CheckFit(const std::vector<TrainingRun>& runs,
   if (x.measured() &&
       simulation.x_rmse_pct > std::max(kWorse * naive, kMinVariation)) {
     refuse("X", simulation.x_rmse_pct, naive, "X = CV", " %");
+  }
+  if (x.measured() && simulation.x_rmse_pct > kCurve &&
+      ScatterOfX(runs) < kFixed * simulation.x_rmse_pct) {
+    throw DataError(
+        "X is a fixed curve of CV, and the simulated valve is off by " +
+        Text(simulation.x_rmse_pct) +
+        " % (RMSE): the positioner has a characteristic of its own, of which "
+        "it is not known what faults do to it. Map the command behind the "
+        "curve as [signal.CV] (the positioner's set point), or give the "
+        "positioner a linear characteristic and the curve to the trim");
   }
   // Where the command hardly moves, a flow that does is that of the pressures,
   // and following the command does not make the simulation the worse model.

@@ -37,17 +37,17 @@ double CommandSpan(const std::vector<TrainingRun>& runs) {
              : SortedQuantile(commands, 0.99) - SortedQuantile(commands, 0.01);
 }
 
-// The hours that rest on readings of X and of F; what else a record has is held
-// or filled in.
+// The hours that rest on readings; what else a record has is held or filled in.
 struct ReadHours {
-  double most{0.0};
+  double command{0.0};
+  double answer{0.0};  // X or F, whatever has more.
   std::string text;  // "X 0.08 h, F 2.50 h"; empty: hardly anything is filled.
 };
 
 ReadHours ReadHoursOf(const std::vector<TrainingRun>& runs) {
   ReadHours read;
   bool filled = false;
-  for (const Signal signal : {Signal::kX, Signal::kF}) {
+  for (const Signal signal : {Signal::kCv, Signal::kX, Signal::kF}) {
     double all = 0.0;
     double hours = 0.0;
     for (const TrainingRun& run : runs) {
@@ -60,9 +60,14 @@ ReadHours ReadHoursOf(const std::vector<TrainingRun>& runs) {
                      : 0.0;
       }
     }
-    if (all > 0.0) {
-      filled = filled || hours < kMostlyRead * all;
-      read.most = std::max(read.most, hours);
+    const bool is_filled = hours < kMostlyRead * all;
+    if (signal == Signal::kCv) {
+      read.command = hours;
+    } else {
+      read.answer = std::max(read.answer, hours);
+    }
+    if (all > 0.0 && (is_filled || signal != Signal::kCv)) {
+      filled = filled || is_filled;
       read.text += (read.text.empty() ? "" : ", ") +
                    std::string(SignalName(signal)) + ' ' + Fixed(hours, 2) +
                    " h";
@@ -110,7 +115,8 @@ RecordVerdict JudgeRecord(const std::vector<TrainingRun>& runs, double hours,
   const double span = CommandSpan(runs);
   const ReadHours read = ReadHoursOf(runs);
   std::vector<std::string> lacks;
-  if (!read.text.empty() && 60.0 * read.most < kLeastMinutes) {
+  if (!read.text.empty() &&
+      60.0 * std::min(read.command, read.answer) < kLeastMinutes) {
     lacks.push_back(Fixed(hours, 2) + " h, of which only " + read.text +
                     " rest on readings and the others are held or filled in: " +
                     Fixed(kLeastMinutes / 60.0, 2) +
