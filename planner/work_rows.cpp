@@ -216,6 +216,8 @@ class RowReader {
   void AddHealth(const std::string& valve, const std::vector<HealthHour>& hours,
                  std::map<std::string, ValveLife>& lives);
   void AddAudits(storage::History* history);
+  /// Before AddCosts() and AddStop(), which read them.
+  void LeaveOutBadCosts();
   /// After AddAudits(), which may doubt a name.
   void AddCosts(storage::History& history);
   void AddOrders();
@@ -317,6 +319,20 @@ void RowReader::AddFault(SameFault& same) {
   }
   row.episode = episode.id;
   rows_.push_back(std::move(row));
+}
+
+// A version that knows more kinds of figures may have stored them.
+void RowReader::LeaveOutBadCosts() {
+  for (WorkRow& row : rows_) {
+    Finding& finding = row.finding;
+    try {
+      ParseCosts(finding.about.costs);
+    } catch (const ConfigError& error) {
+      finding.about.costs.clear();
+      row.why += "; the costs of " + finding.valve_id +
+                 " in models.db are left out: " + error.what();
+    }
+  }
 }
 
 // Tells what waiting costs, and whether the fault can wait until the stop.
@@ -728,6 +744,7 @@ std::vector<WorkRow> ReadRows(storage::History* history,
     }
   }
   rows.AddAudits(history);
+  rows.LeaveOutBadCosts();
   if (history != nullptr) {
     rows.AddCosts(*history);
   }
