@@ -352,8 +352,12 @@ test('the page of a valve that nobody judges now does not call it normal',
       const refused = {reason: 'range', signals: ['P1'], flow_unit: 'm3/h'};
       monitor.reset([tile('ended', 'NOT_JUDGED', [], {...since, quality: 'ENDED'}),
         tile('bar', 'NOT_JUDGED', [], {quality: 'BAD_INPUT', refused}),
+        tile('unit', 'NOT_JUDGED', [], {quality: 'BAD_INPUT',
+          refused: {...refused, reason: 'unit'}}),
+        tile('flow', 'NOT_JUDGED', [], {quality: 'BAD_INPUT',
+          refused: {reason: 'unit', signals: ['F'], flow_unit: 't/h'}}),
         tile('well', 'NORMAL')]);
-      for (const id of ['ended', 'bar', 'well']) {
+      for (const id of ['ended', 'bar', 'unit', 'flow', 'well']) {
         monitor.answers[`valves/${id}/trend`] = {...trend({state: 'NORMAL',
           d0: 1, d: [0, 0]}), words: 'as the normal model expects'};
       }
@@ -361,7 +365,9 @@ test('the page of a valve that nobody judges now does not call it normal',
       for (const width of [1400, 390]) {
         await page.setViewportSize({width, height: 800});
         for (const [id, words] of [['ended', /not confirmed since/],
-          ['bar', /not judged: bad input: P1 implausible/]]) {
+          ['bar', /not judged: bad input: P1 implausible/],
+          ['unit', /not judged: bad input: P1 in another unit than trained/],
+          ['flow', /not judged: bad input: flow in another unit than t\/h/]]) {
           await page.goto(`${address}/#/valve/${id}`);
           await page.locator('.words', {hasText: words}).waitFor();
           const live = page.locator('.live');
@@ -389,6 +395,21 @@ test('names that could not be fetched are fetched again', async () => {
   monitor.answers.faults = faults;
   await page.locator('.state-line', {hasText: 'Flow transmitter wrong'}).waitFor();
   await close(page);
+});
+
+test('the page of an episode says what gave the name', async () => {
+  const witness = 'named by simulation of the valve: f2 explains it 40 times ' +
+    'better than f19, the observers are undecided';
+  const row = alarm('0000000000000001', 'V', 'f19', {layer: 'physics', witness});
+  monitor.reset([tile('V', 'ISOLATED', ['f19'])], [row]);
+  monitor.answers[`episodes/${row.episode}`] = {episode: row, events: [],
+    trace: null, model_hash: 'x', look: null, growth: []};
+  for (const width of [1400, 390]) {
+    const page = await openShared(browser, address,
+        `#/episode/${row.episode}`, {viewport: {width, height: 800}});
+    await page.getByText(`(f19), ${witness}`).waitFor();
+    await close(page);
+  }
 });
 
 test('what ended before it had a name is not unlike any known fault',
