@@ -835,6 +835,14 @@ test('the work list has the order of its document, factors, and what nobody ' +
   }
   assert.deepEqual(await page.getByRole('table', {name: 'Work list'})
       .locator('tbody th').allInnerTexts(), [kLongId, 'W']);
+  // A list without rows says if there was anything to find them in.
+  const bare = {...kList, rows: []};
+  for (const [coverage, said] of [[kList.coverage, 'Nothing to do: no valve'],
+    [{loops: 2, named_faults: 0, audit: 0, nothing: 2}, 'Nothing was judged']]) {
+    monitor.answers.worklist = {...bare, coverage};
+    await page.getByRole('button', {name: 'Refresh'}).click();
+    await page.locator('.nothing', {hasText: said}).waitFor();
+  }
   await close(page);
 });
 
