@@ -387,14 +387,18 @@ test('the page of a valve that nobody judges now does not call it normal',
     });
 
 test('names that could not be fetched are fetched again', async () => {
-  monitor.reset([tile('V', 'ISOLATED', ['f19'])]);
-  const {faults} = monitor.answers;
-  delete monitor.answers.faults;
-  const page = await openShared(browser, address, '#/valve/V');
-  await page.locator('.state-line', {hasText: 'f19'}).waitFor();
-  monitor.answers.faults = faults;
-  await page.locator('.state-line', {hasText: 'Flow transmitter wrong'}).waitFor();
-  await close(page);
+  for (const [hash, place] of [['#/valve/V', '.state-line'],
+    ['#/alarms', 'td.fault']]) {
+    monitor.reset([tile('V', 'ISOLATED', ['f19'])],
+        [alarm('0000000000000001', 'V', 'f19')]);
+    const {faults} = monitor.answers;
+    delete monitor.answers.faults;
+    const page = await openShared(browser, address, hash);
+    await page.locator(place, {hasText: 'f19'}).waitFor();
+    monitor.answers.faults = faults;
+    await page.locator(place, {hasText: 'Flow transmitter wrong'}).waitFor();
+    await close(page);
+  }
 });
 
 test('the page of an episode says what gave the name', async () => {
