@@ -36,15 +36,16 @@ using storage::PrivatePostgres;
 
 // All of them have to agree on these keys of an alarm.
 constexpr std::array kAgreed = {
-    "valve_id", "fault",       "fault_name",  "strength", "worst",
-    "severity", "priority",    "alarm_state", "shelved",  "unconfirmed",
-    "acked_by", "ack_comment", "label",       "stands",   "score"};
+    "valve_id", "fault",       "fault_name", "strength",
+    "worst",    "severity",    "priority",   "alarm_state",
+    "shelved",  "unconfirmed", "acked_by",   "ack_comment",
+    "label",    "certainty",   "stands",     "score"};
 using Alarms = std::map<std::string, json>;  // By episode.
 
 constexpr const char* kViewColumns =
     "episode_id, valve_id, fault, fault_name, strength, worst_strength, "
     "severity, priority, alarm_state, shelved_until_utc IS NOT NULL, "
-    "unconfirmed_utc IS NOT NULL, acked_by, ack_comment, label "
+    "unconfirmed_utc IS NOT NULL, acked_by, ack_comment, label, certainty "
     "FROM ";
 
 bool Same(const json& a, const json& b) {
@@ -229,6 +230,7 @@ class ShiftTest : public MonitorFixture {
             {"fault", tile["fault"]},
             {"strength", tile["strength"]},
             {"severity", tile["severity"]},
+            {"certainty", tile["certainty"]},
             {"alarm_state", tile["unacked"] == true ? "UNACK" : "ACKED"},
             {"shelved", !tile["shelved_until_ms"].is_null()},
             {"unconfirmed", !tile["unconfirmed_ms"].is_null()}};
@@ -364,6 +366,7 @@ class ShiftTest : public MonitorFixture {
                     {"fault", row["fault"]},
                     {"severity", row["severity"]},
                     {"unconfirmed", !row["unconfirmed_utc"].is_null()},
+                    {"certainty", row["certainty"]},
                     {"stands", row["open"]},
                     {"score", row["score"]},
                     {"strength", row["strength"]}};
@@ -428,6 +431,7 @@ class ShiftTest : public MonitorFixture {
             {"fault", state.fault.empty() ? json() : json(state.fault)},
             {"severity", SeverityName(*SeverityOf(state.priority))},
             {"priority", state.priority},
+            {"certainty", state.certainty},
             {"unconfirmed", state.unconfirmed_ns != 0}};
       }
     }
