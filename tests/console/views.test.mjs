@@ -15,6 +15,9 @@ const kTypes = {html: 'text/html', js: 'text/javascript', css: 'text/css',
   svg: 'image/svg+xml'};
 const kNowMs = Date.now();
 const kDayMs = 86400000;
+const kHealthCounts = ['travel_strokes', 'reversals', 'auto_h', 'shut_h',
+  'open_h', 'at_limit', 'slip_jumps', 'slip_jump', 'dead_band', 'error_band',
+  'delay', 't63', 't86', 'overshoot', 'travel_gain', 'single_readings'];
 const kLongId = 'PLANT-HALL-NORTH-LIC-2107A';
 
 /** A monitor of canned `answers`, by path; `asked` are its last requests. */
@@ -360,6 +363,10 @@ test('the page of a valve that nobody judges now does not call it normal',
       for (const id of ['ended', 'bar', 'unit', 'flow', 'well']) {
         monitor.answers[`valves/${id}/trend`] = {...trend({state: 'NORMAL',
           d0: 1, d: [0, 0]}), words: 'as the normal model expects'};
+        monitor.answers[`valves/${id}/health`] = {valve: id, step: 'day',
+          t_ms: [kNowMs], status: ['good'], exceeded: [[]], channels: [],
+          trends: [], ...Object.fromEntries(kHealthCounts.map((key) =>
+            [key, [null]]))};
       }
       const page = await openShared(browser, address, '#/valve/ended');
       for (const width of [1400, 390]) {
@@ -374,10 +381,12 @@ test('the page of a valve that nobody judges now does not call it normal',
           await live.getByText('Last residuals').waitFor();
           assert.doesNotMatch(await live.innerText(),
               /expects|\byes\b|within/i);
+          await page.getByText('NE 107): check function, not ').waitFor();
         }
         await page.goto(`${address}/#/valve/well`);
         await page.locator('.words', {hasText: 'normal model expects'}).waitFor();
         await page.getByText('Residuals now').waitFor();
+        await page.getByText('NE 107): good').waitFor();
       }
       // It falls silent while it is shown.
       await monitor.push('tiles', {tiles: [tile('well', 'NOT_JUDGED', [],
