@@ -886,6 +886,11 @@ test('the table of residuals says what is within, beyond and not judged',
       [['C0', 'above', 'out'], ['C1', 'below', 'out'], ['C2', 'within', ''],
         ['C2, mean over 60 samples', 'above', 'out'], ['C3', 'abstains', '']]);
       await page.getByText(/^Last work: recalibrated, .* by bo$/).waitFor();
+      // Limits of 21 % would call anything within.
+      await monitor.push('tiles', {tiles: [tile('V', 'DETECTED', [],
+          {blind: true})]});
+      await rows.filter({hasText: 'C2'})
+          .getByText('within, but the limits are too wide').waitFor();
       await close(page);
     });
 
