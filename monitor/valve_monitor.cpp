@@ -408,6 +408,13 @@ bool ValveMonitor::CheckStale(TimePoint now, EpisodeOutlet& outlet) {
   return true;
 }
 
+void ValveMonitor::Flush(EpisodeOutlet& outlet) {
+  tracker_.Flush(outlet);
+  if (episode_open()) {
+    outlet.OnSilence(id_, stamp_ns_);
+  }
+}
+
 std::uint64_t ValveMonitor::CountStale(TimePoint now) {
   if (!stale_) {
     return 0;

@@ -93,7 +93,9 @@ class ValveMonitor {
   /// Closes an episode that was to be resumed if the valve is silent.
   void ExpireRecovery(std::int64_t now_ns, EpisodeOutlet& outlet);
 
-  void Flush(EpisodeOutlet& outlet) { tracker_.Flush(outlet); }
+  /// The last call: stores what is left, and that nothing confirms an open
+  /// episode any more.
+  void Flush(EpisodeOutlet& outlet);
 
   /// Rows of time since the last TakeCheckpoint().
   std::size_t book_rows() const { return coverage_.rows(); }

@@ -129,7 +129,13 @@ TEST_F(WatchSystemTest, ASilentValveIsNotConfirmedInListsEither) {
   EXPECT_TRUE(Await([&] { return since().is_null(); }));
   EXPECT_THAT(ask("worklist"), testing::Not(HasSubstr("not confirmed")));
 
-  // Nor does an episode that an earlier session left open stand by itself.
+  // Nor does an episode stand by itself that a monitor left open.
+  monitor_->Signal(SIGTERM);
+  monitor_->AwaitExit();
+  EXPECT_EQ(since(), FormatTime(PlantSample(62).stamp_ns, true));
+  monitor_ = StartMonitor();
+  Publish(63, 103, kF7Offset);
+  EXPECT_TRUE(Await([&] { return since().is_null(); })) << "it goes on";
   monitor_->Signal(SIGKILL);
   monitor_->AwaitExit();
   monitor_ = StartMonitor();
