@@ -170,8 +170,7 @@ void ValveStates::SetAlarms(
 
 Json ValveStates::AlarmOf(const storage::Alarm& alarm) const {
   const storage::Episode& episode = alarm.episode;
-  const report::FaultWords words = texts_.Words(
-      episode.fault.value_or("unknown"), episode.strength, episode.priority);
+  const report::FaultWords words = findings::FindingOf(episode, texts_).words;
   const auto time = [](const std::optional<std::int64_t>& stamp_ns) {
     return stamp_ns ? Json(FormatTime(*stamp_ns, true)) : Json();
   };

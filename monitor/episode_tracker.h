@@ -37,6 +37,10 @@ class EpisodeOutlet {
   virtual void OnGap(DataGap gap) = 0;
   /// The valve was judged, and is normal.
   virtual void OnNormal(const std::string& valve_id, std::int64_t stamp_ns) = 0;
+  /// The valve has sent nothing since then, so that nothing confirms its open
+  /// episode; nothing: it sends again.
+  virtual void OnSilence(const std::string& valve_id,
+                         std::optional<std::int64_t> since_ns) = 0;
   /// An episode of an earlier session goes on.
   virtual void OnResumed(const OpenEpisode& episode, std::int64_t stamp_ns) = 0;
 };

@@ -168,6 +168,12 @@ void Journal::OnNormal(const std::string& valve_id, std::int64_t stamp_ns) {
   AddLocked(Normal{valve_id, stamp_ns});
 }
 
+void Journal::OnSilence(const std::string& valve_id,
+                        std::optional<std::int64_t> since_ns) {
+  const MutexLock lock(mutex_);
+  AddLocked(Silent{valve_id, since_ns});
+}
+
 void Journal::OnGap(DataGap gap) {
   counters_.Add(Counter::kGaps);
   log_.Report(
@@ -406,12 +412,15 @@ bool Journal::Store(const Record& record) {
   }
   if (const auto* resumed = std::get_if<Resumption>(&record)) {
     history_.Resume(resumed->episode_id, resumed->stamp_ns);
+    history_.StoreSilence(resumed->valve_id, std::nullopt);
   } else if (const auto* look = std::get_if<EpisodeLook>(&record)) {
     history_.StoreLook(*look);
   } else if (const auto* point = std::get_if<StrengthPoint>(&record)) {
     history_.StoreStrength(*point);
   } else if (const auto* normal = std::get_if<Normal>(&record)) {
     history_.ConfirmNormal(normal->valve_id, normal->stamp_ns);
+  } else if (const auto* silent = std::get_if<Silent>(&record)) {
+    history_.StoreSilence(silent->valve_id, silent->since_ns);
   }
   return true;
 }

@@ -73,6 +73,8 @@ class Journal : public EpisodeOutlet {
   void OnStrength(StrengthPoint point) override;
   void OnGap(DataGap gap) override;
   void OnNormal(const std::string& valve_id, std::int64_t stamp_ns) override;
+  void OnSilence(const std::string& valve_id,
+                 std::optional<std::int64_t> since_ns) override;
   void OnResumed(const OpenEpisode& episode, std::int64_t stamp_ns) override;
   /// `event` was published before Start(): marks it as sent once that is due.
   void MarkPublished(const FaultEvent& event);
@@ -119,11 +121,15 @@ class Journal : public EpisodeOutlet {
     std::string valve_id;
     std::int64_t stamp_ns;
   };
+  struct Silent {
+    std::string valve_id;
+    std::optional<std::int64_t> since_ns;
+  };
   struct Sent {  // The event is on the bus.
     PendingEvent pending;
   };
   using Record = std::variant<PendingEvent, Resumption, EpisodeLook,
-                              StrengthPoint, Normal, DataGap, Sent>;
+                              StrengthPoint, Normal, Silent, DataGap, Sent>;
 
   struct Deferred {  // Failed for its own sake so many times.
     Record record;

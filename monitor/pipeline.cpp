@@ -170,6 +170,8 @@ void Pipeline::Recover(const std::vector<OpenEpisode>& episodes) {
       tracker.AbandonRecovery(EndReason::kUnknown, journal_);
     }
     tracker.Recover(newer);
+    // Until its valve sends and it goes on, nothing confirms it.
+    journal_.OnSilence(newer.valve_id, newer.last_stamp_ns);
   }
   if (!episodes.empty()) {
     recovery_deadline_ = last_poll_ + options_.recovery_window;
@@ -506,7 +508,7 @@ void Pipeline::CheckSilentValves(TimePoint now) {
     }
     // The order matters: CountStale() acts only on a valve that CheckStale()
     // has labelled, CheckTimeout() on such a one or if its stream has ended.
-    if (monitor.CheckStale(now)) {
+    if (monitor.CheckStale(now, journal_)) {
       counters_.Add(Counter::kStaleEvents);
       log_.Report(LogId::kStale, "valve_stale",
                   [&monitor] { return "valve=" + LogValue(monitor.id()); });

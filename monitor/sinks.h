@@ -102,9 +102,9 @@ class RecordError : public std::runtime_error {
 class HistorySink {
  public:
   virtual ~HistorySink() = default;
-  /// Makes the calls of Record(), Resume(), StoreLook(), StoreStrength() and
-  /// ConfirmNormal() in `batch` one commit: on return everything is on the
-  /// disk; on failure, nothing.
+  /// Makes the calls of Record(), Resume(), StoreLook(), StoreStrength(),
+  /// ConfirmNormal() and StoreSilence() in `batch` one commit: on return
+  /// everything is on the disk; on failure, nothing.
   virtual void CommitBatch(const std::function<void()>& batch) = 0;
   /// Within CommitBatch(). @returns whether the event is in the history: false
   ///   if its episode has ended there, or does not exist.
@@ -119,6 +119,10 @@ class HistorySink {
   /// CommitBatch().
   virtual void ConfirmNormal(const std::string& valve_id,
                              std::int64_t stamp_ns) = 0;
+  /// Nothing confirms the open episode of the valve since then; nothing: it is
+  /// confirmed again. Within CommitBatch().
+  virtual void StoreSilence(const std::string& valve_id,
+                            std::optional<std::int64_t> since_ns) = 0;
   /// Buffers. Evidence of an unknown episode is dropped.
   virtual void AddTrace(const EpisodeTrace& trace) = 0;
   /// Buffers.

@@ -115,7 +115,7 @@ ValveOutcome ValveMonitor::Step(const Sample& sample, std::uint64_t writer,
   const bool swapped = std::exchange(swapped_, false);
   if (!decision_) {
     const Intake intake = order_.Place(sample).intake;
-    Hear(intake, writer, received);
+    Hear(intake, writer, received, outlet);
     return StepLoop(sample, intake == Intake::kSuperseded, swapped, outlet);
   }
   RestoreOnce(sample.source_id);
@@ -128,7 +128,7 @@ ValveOutcome ValveMonitor::Step(const Sample& sample, std::uint64_t writer,
     decision_->Inherit(tracker_.Resumable(sample, *models_));
   }
   const Verdict& verdict = decision_->Step(sample);
-  Hear(verdict.intake, writer, received);
+  Hear(verdict.intake, writer, received, outlet);
   pending_.Request(decision_->TakeDue(), decision_->simulation());
   tracker_.Advance(sample, verdict, *models_, outlet);
   if (CountsAsTime(verdict)) {
@@ -159,8 +159,8 @@ ValveOutcome ValveMonitor::Step(const Sample& sample, std::uint64_t writer,
 
 // A superseded publisher that goes on sending must neither end the stream of
 // its successor nor keep a valve alive of which nothing else is heard.
-void ValveMonitor::Hear(Intake intake, std::uint64_t writer,
-                        TimePoint received) {
+void ValveMonitor::Hear(Intake intake, std::uint64_t writer, TimePoint received,
+                        EpisodeOutlet& outlet) {
   if (intake == Intake::kSuperseded) {
     rival_samples_ = received - rival_at_ > SourcePatience()
                          ? 1
@@ -174,6 +174,10 @@ void ValveMonitor::Hear(Intake intake, std::uint64_t writer,
   writer_ = writer;
   received_ = received;
   stale_counted_ = received;
+  // Before the sample is judged, which may end the episode.
+  if (stale_ && episode_open()) {
+    outlet.OnSilence(id_, std::nullopt);
+  }
   stale_ = false;
   ended_ = false;
   closed_ = false;
@@ -392,13 +396,23 @@ bool ValveMonitor::Adopt(const std::optional<EngineParts>& parts,
   return true;
 }
 
-bool ValveMonitor::CheckStale(TimePoint now) {
+bool ValveMonitor::CheckStale(TimePoint now, EpisodeOutlet& outlet) {
   const std::chrono::duration<double> limit(kStalePeriods * period_s());
   if (!seen_ || ended_ || stale_ || now - received_ <= limit) {
     return false;
   }
   stale_ = true;
+  if (episode_open()) {
+    outlet.OnSilence(id_, stamp_ns_);
+  }
   return true;
+}
+
+void ValveMonitor::Flush(EpisodeOutlet& outlet) {
+  tracker_.Flush(outlet);
+  if (episode_open()) {
+    outlet.OnSilence(id_, stamp_ns_);
+  }
 }
 
 std::uint64_t ValveMonitor::CountStale(TimePoint now) {

@@ -77,9 +77,10 @@ class ValveMonitor {
   /// whether it differs from the current one.
   bool Adopt(const std::optional<EngineParts>& parts, EpisodeOutlet& outlet);
 
-  /// Labels the valve STALE if it was silent for three periods.
+  /// Labels the valve STALE if it was silent for three periods: nothing
+  /// confirms its open episode then.
   /// @returns whether it became so by this call.
-  bool CheckStale(TimePoint now);
+  bool CheckStale(TimePoint now, EpisodeOutlet& outlet);
 
   /// Periods of silence of a STALE valve since the last call; they count as
   /// time.
@@ -92,7 +93,9 @@ class ValveMonitor {
   /// Closes an episode that was to be resumed if the valve is silent.
   void ExpireRecovery(std::int64_t now_ns, EpisodeOutlet& outlet);
 
-  void Flush(EpisodeOutlet& outlet) { tracker_.Flush(outlet); }
+  /// The last call: stores what is left, and that nothing confirms an open
+  /// episode any more.
+  void Flush(EpisodeOutlet& outlet);
 
   /// Rows of time since the last TakeCheckpoint().
   std::size_t book_rows() const { return coverage_.rows(); }
@@ -142,7 +145,8 @@ class ValveMonitor {
   void StepAudit(const Sample& sample, const Verdict& verdict,
                  EpisodeOutlet& outlet);
   void TellOfLoop(const Sample& sample, EpisodeOutlet& outlet);
-  void Hear(Intake intake, std::uint64_t writer, TimePoint received);
+  void Hear(Intake intake, std::uint64_t writer, TimePoint received,
+            EpisodeOutlet& outlet);
   TimePoint::duration SourcePatience() const;
   bool RestartsEngine(const Sample& sample) const;
   void RecordPosition(const Sample& sample);

@@ -4,6 +4,7 @@
 #include <array>
 #include <string_view>
 
+#include "base/time_units.h"
 #include "storage/models/models.h"
 #include "storage/models/plant_loops.h"
 
@@ -35,6 +36,22 @@ std::string QualityText(const std::string& quality) {
     }
   }
   return quality;
+}
+
+// "stiction, likely, band 2.00 % of OP: X sticks", as onboarding stores it.
+LoopAudits::Window VerdictOf(const storage::PlantLoop& row) {
+  const std::string& text = row.finding;
+  LoopAudits::Window window;
+  window.loop = row.name;
+  window.verdict = text.substr(0, text.find_first_of(",:"));
+  window.sure = text.starts_with(window.verdict + ", sure");
+  const std::size_t colon = text.find(": ");
+  window.reason = colon == std::string::npos ? text : text.substr(colon + 2);
+  window.reason += "; so says its record, as onboarded";
+  // Whole seconds, as repairs have.
+  window.start_ns = window.end_ns =
+      row.checked_ns / kNsPerSecond * kNsPerSecond;
+  return window;
 }
 
 }  // namespace
@@ -151,6 +168,8 @@ std::vector<PlannedLoop> LoopsOf(const std::filesystem::path& models) {
     if (row.state == storage::LoopState::kRefused ||
         row.finding.starts_with("not judged")) {
       loop.finding = row.finding;
+    } else if (row.state == storage::LoopState::kDataOnly) {
+      loop.verdict = VerdictOf(row);
     }
   }
   for (const storage::ValveEntry& entry : store.Valves()) {

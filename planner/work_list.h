@@ -25,6 +25,8 @@ struct PlannedLoop {
   std::string valve_id;
   ValveIdentity about{};
   std::string finding{};  ///< Why its record could not be used, if known.
+  /// What the audit said of its record as it was onboarded, at that time.
+  std::optional<LoopAudits::Window> verdict{};
 };
 
 /// Something was done about a finding, or was ordered.

@@ -111,6 +111,14 @@ std::string CoverageText(const Json& coverage) {
          " by nothing.";
 }
 
+// What nothing has judged may be anything.
+std::string NothingText(const Json& coverage) {
+  return coverage["nothing"] != coverage["loops"]
+             ? "Nothing to do."
+             : "Nothing was judged: `fdi-monitor run` judges what valves send, "
+               "`fdi-store worklist --audit-windows 3` stored runs.";
+}
+
 void AddHead(report::Report& report) {
   report.Fields("", {{"as of", "as_of_utc", Format::kTime},
                      {"since", "since_utc", Format::kTime},
@@ -326,7 +334,7 @@ report::Report WorkListReport(Json document, std::size_t top) {
   report.document = std::move(document);
   AddHead(report);
   const Json& rows = report.document["rows"];
-  report.Line(rows.empty() ? "Nothing to do." : "");
+  report.Line(rows.empty() ? NothingText(report.document["coverage"]) : "");
   const std::size_t shown = top == 0 ? rows.size() : std::min(top, rows.size());
   for (std::size_t i = 0; i < shown; ++i) {
     report.Line(RowText(rows[i]));
@@ -356,7 +364,7 @@ report::Report WorkListPage(Json document) {
                  CoverageBar(json["coverage"]));
   }
   page.Heading("The worst first");
-  page.Table("rows", RowColumns(), "Nothing to do.");
+  page.Table("rows", RowColumns(), NothingText(json["coverage"]));
   page.Heading("Loops that share a cause or a period");
   page.Table("shared",
              {{"share", "shares"},

@@ -215,15 +215,20 @@ class RowReader {
   void AddEpisodes(storage::History& history);
   void AddHealth(const std::string& valve, const std::vector<HealthHour>& hours,
                  std::map<std::string, ValveLife>& lives);
-  void AddAudits();
+  void AddAudits(storage::History* history);
+  /// Before AddCosts() and AddStop(), which read them.
+  void LeaveOutBadCosts();
   /// After AddAudits(), which may doubt a name.
   void AddCosts(storage::History& history);
   void AddOrders();
   void AddStop();
   std::vector<WorkRow> Ranked() &&;
-  std::vector<DoneFinding> TakeDone() { return std::move(done_); }
+  std::vector<DoneFinding> TakeDone() &&;
 
  private:
+  std::optional<Repair> RepairAfter(const std::string& valve,
+                                    std::int64_t since_ns) const;
+  std::vector<LoopAudits::Window> Audits(storage::History* history) const;
   void FindDone(SameFault& same, storage::History& history) const;
   void AddFault(SameFault& same);
   bool JoinFault(const LoopAudits::Window& audit, const std::string& text);
@@ -238,24 +243,28 @@ class RowReader {
   std::vector<DoneFinding> done_;
 };
 
-void RowReader::FindDone(SameFault& same, storage::History& history) const {
-  const auto add = [&same](const Repair& repair) {
-    if (!same.done || same.done->at_ns <= repair.at_ns) {
-      same.done = repair;
-    }
-  };
+// The newest one. One that was noted for later is not done yet; one before
+// `since_ns` was about something else.
+std::optional<Repair> RowReader::RepairAfter(const std::string& valve,
+                                             std::int64_t since_ns) const {
+  std::optional<Repair> newest;
   for (const Repair& repair : query_.repairs) {
-    // One that was noted for later is not done yet; one before the first of
-    // these was about something else.
     if (!repair.ordered && repair.at_ns <= query_.now_ns &&
-        repair.at_ns >= same.episodes.front()->detected_ns &&
-        GlobMatches(repair.valves, same.episodes.front()->valve_id)) {
-      add(repair);
+        repair.at_ns >= since_ns && GlobMatches(repair.valves, valve) &&
+        (!newest || newest->at_ns <= repair.at_ns)) {
+      newest = repair;
     }
   }
+  return newest;
+}
+
+void RowReader::FindDone(SameFault& same, storage::History& history) const {
+  const Episode& first = *same.episodes.front();
+  same.done = RepairAfter(first.valve_id, first.detected_ns);
   for (const Episode* const episode : same.episodes) {
-    if (const auto label = LabelOf(*episode, history)) {
-      add(*label);
+    const auto label = LabelOf(*episode, history);
+    if (label && (!same.done || same.done->at_ns <= label->at_ns)) {
+      same.done = label;
     }
   }
 }
@@ -310,6 +319,20 @@ void RowReader::AddFault(SameFault& same) {
   }
   row.episode = episode.id;
   rows_.push_back(std::move(row));
+}
+
+// A version that knows more kinds of figures may have stored them.
+void RowReader::LeaveOutBadCosts() {
+  for (WorkRow& row : rows_) {
+    Finding& finding = row.finding;
+    try {
+      ParseCosts(finding.about.costs);
+    } catch (const ConfigError& error) {
+      finding.about.costs.clear();
+      row.why += "; the costs of " + finding.valve_id +
+                 " in models.db are left out: " + error.what();
+    }
+  }
 }
 
 // Tells what waiting costs, and whether the fault can wait until the stop.
@@ -374,9 +397,13 @@ void RowReader::AddEpisodes(storage::History& history) {
     FindDone(same, history);
     AddFault(same);
   }
+}
+
+std::vector<DoneFinding> RowReader::TakeDone() && {
   std::ranges::stable_sort(
       done_, std::greater<>(),
       [](const DoneFinding& each) { return each.by.at_ns; });
+  return std::move(done_);
 }
 
 Finding RowReader::Low(const Finding& of, const char* kind,
@@ -545,12 +572,39 @@ bool RowReader::JoinFault(const LoopAudits::Window& audit,
   return false;
 }
 
+// Those of stored runs, and of the records of loops that were onboarded in the
+// period and that nothing has judged on a later day.
+std::vector<LoopAudits::Window> RowReader::Audits(
+    storage::History* history) const {
+  std::vector<LoopAudits::Window> audits = query_.audits.windows;
+  for (const PlannedLoop& loop : query_.loops) {
+    if (!loop.verdict || loop.verdict->end_ns < query_.since_ns ||
+        std::ranges::find(query_.audits.windows, loop.valve_id,
+                          &LoopAudits::Window::loop) !=
+            query_.audits.windows.end()) {
+      continue;
+    }
+    storage::EpisodeFilter later;
+    later.since_ns = loop.verdict->end_ns + kNsPerDay;
+    const auto times = history == nullptr ? std::vector<storage::CoverageTime>{}
+                                          : history->Coverage(later);
+    if (std::ranges::none_of(times, [&loop](const auto& time) {
+          return time.valve_id == loop.valve_id &&
+                 time.quality == QualityName(Quality::kLive);
+        })) {
+      audits.push_back(*loop.verdict);
+    }
+  }
+  return audits;
+}
+
 // A loop may have been audited in several windows; its worst verdict counts.
-void RowReader::AddAudits() {
+void RowReader::AddAudits(storage::History* history) {
   std::map<std::string, WorkRow> by_loop;
-  for (const LoopAudits::Window& audit : query_.audits.windows) {
+  for (const LoopAudits::Window& audit : Audits(history)) {
     const std::string name = CatalogueName(audit.verdict);
-    if (name.empty() && audit.verdict != kQuantised) {
+    if ((name.empty() && audit.verdict != kQuantised) ||
+        !GlobMatches(query_.valve_glob, audit.loop)) {
       continue;
     }
     Finding finding;
@@ -570,6 +624,10 @@ void RowReader::AddAudits() {
           "; band of " + report::FormatNumber(*audit.band_pct, 1) + " % of OP";
     }
     if (JoinFault(audit, why)) {
+      continue;
+    }
+    if (const auto done = RepairAfter(audit.loop, audit.end_ns)) {
+      done_.push_back({audit.loop, finding.fault, finding.words.name, *done});
       continue;
     }
     const auto [place, is_new] =
@@ -686,13 +744,14 @@ std::vector<WorkRow> ReadRows(storage::History* history,
       rows.AddHealth(valve, history->Health({valve, query.since_ns}), lives);
     }
   }
-  rows.AddAudits();
+  rows.AddAudits(history);
+  rows.LeaveOutBadCosts();
   if (history != nullptr) {
     rows.AddCosts(*history);
   }
   rows.AddOrders();
   rows.AddStop();
-  done = rows.TakeDone();
+  done = std::move(rows).TakeDone();
   return std::move(rows).Ranked();
 }
 

@@ -53,6 +53,10 @@ class HistoryStore : public HistorySink {
                      std::int64_t stamp_ns) override {
     writer_.ConfirmNormal(valve_id, stamp_ns);
   }
+  void StoreSilence(const std::string& valve_id,
+                    std::optional<std::int64_t> since_ns) override {
+    writer_.StoreSilence(valve_id, since_ns);
+  }
   void AddTrace(const EpisodeTrace& trace) override;
   void AddGap(const DataGap& gap) override { writer_.AddGap(gap); }
   void CommitCheckpoint(const Checkpoint& checkpoint) override;

@@ -105,7 +105,8 @@ std::string_view NoNameText(const Episode& episode) {
   if (IsNamed(episode) || CertaintyOf(episode) == Certainty::kNotKnown) {
     return "";
   }
-  return episode.ended_ns && !episode.unconfirmed_ns
+  return episode.isolated_ns ? "Fault whose name was withdrawn"
+         : episode.ended_ns && !episode.unconfirmed_ns
              ? "Fault that ended before it had a name"
              : "Fault without a name yet";
 }

@@ -79,7 +79,8 @@ struct Episode {
   std::optional<double> worst_strength;
   /// 1 (critical) to 4 (low), as of now; null: not known.
   std::optional<std::int64_t> priority;
-  /// The data ended then, and the fault has not been seen to be gone since.
+  /// The data ended then, for good or for now, and the fault has not been seen
+  /// to be gone since.
   std::optional<std::int64_t> unconfirmed_ns;
   /// In plain words, as the monitor's catalogue has them; nothing before a name
   /// or where no monitor has said so.

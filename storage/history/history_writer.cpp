@@ -519,6 +519,13 @@ void HistoryWriter::ConfirmNormal(const std::string& valve_id,
   });
 }
 
+void HistoryWriter::StoreSilence(const std::string& valve_id,
+                                 std::optional<std::int64_t> since_ns) {
+  CommitBatch([&] {
+    database_.Cached(sql::set_silence).Bind(since_ns, valve_id).Run();
+  });
+}
+
 void HistoryWriter::RequireEpisode(const std::string& id) {
   if (!database_.QueryInt64("SELECT 1 FROM episode WHERE episode_id = ?", id)) {
     throw NotFoundError("no episode " + id);

@@ -87,6 +87,11 @@ class HistoryWriter {
   /// The valve was judged normal: so is what ended with its data.
   void ConfirmNormal(const std::string& valve_id, std::int64_t stamp_ns);
 
+  /// Nothing confirms the open episode of the valve since then, because the
+  /// valve sends nothing; nothing: it is confirmed again.
+  void StoreSilence(const std::string& valve_id,
+                    std::optional<std::int64_t> since_ns);
+
   /// Replaces the result of an earlier second look at the episode.
   /// @throws NotFoundError
   void StoreLook(const EpisodeLook& look);

@@ -147,11 +147,15 @@ WHERE valve_id = ? AND unconfirmed_ns IS NOT NULL AND episode_id <> ?
 -- The valve was judged, and is normal.
 -- name: confirm_normal
 UPDATE episode SET cleared_ns = max(?1, ended_ns), unconfirmed_ns = NULL
-WHERE valve_id = ?2 AND unconfirmed_ns IS NOT NULL
+WHERE valve_id = ?2 AND unconfirmed_ns IS NOT NULL AND ended_ns IS NOT NULL
+-- The valve fell silent while its episode is open, or (NULL) sends again.
+-- name: set_silence
+UPDATE episode SET unconfirmed_ns = ?1
+WHERE valve_id = ?2 AND ended_ns IS NULL AND cleared_ns IS NULL
 -- Somebody acknowledged it, knowing of its end.
 -- name: end_by_hand
 UPDATE episode SET unconfirmed_ns = NULL
-WHERE episode_id = ?1 AND unconfirmed_ns IS NOT NULL
+WHERE episode_id = ?1 AND unconfirmed_ns IS NOT NULL AND ended_ns IS NOT NULL
 -- name: what_is_certain
 SELECT e.fault, e.unknown_kind, e.layer, e.peak_factor, e.strength, e.known,
   (SELECT CASE WHEN a.layer = 'audit' AND a.end_reason = 'superseded'

@@ -15,6 +15,9 @@ const kTypes = {html: 'text/html', js: 'text/javascript', css: 'text/css',
   svg: 'image/svg+xml'};
 const kNowMs = Date.now();
 const kDayMs = 86400000;
+const kHealthCounts = ['travel_strokes', 'reversals', 'auto_h', 'shut_h',
+  'open_h', 'at_limit', 'slip_jumps', 'slip_jump', 'dead_band', 'error_band',
+  'delay', 't63', 't86', 'overshoot', 'travel_gain', 'single_readings'];
 const kLongId = 'PLANT-HALL-NORTH-LIC-2107A';
 
 /** A monitor of canned `answers`, by path; `asked` are its last requests. */
@@ -352,26 +355,38 @@ test('the page of a valve that nobody judges now does not call it normal',
       const refused = {reason: 'range', signals: ['P1'], flow_unit: 'm3/h'};
       monitor.reset([tile('ended', 'NOT_JUDGED', [], {...since, quality: 'ENDED'}),
         tile('bar', 'NOT_JUDGED', [], {quality: 'BAD_INPUT', refused}),
+        tile('unit', 'NOT_JUDGED', [], {quality: 'BAD_INPUT',
+          refused: {...refused, reason: 'unit'}}),
+        tile('flow', 'NOT_JUDGED', [], {quality: 'BAD_INPUT',
+          refused: {reason: 'unit', signals: ['F'], flow_unit: 't/h'}}),
         tile('well', 'NORMAL')]);
-      for (const id of ['ended', 'bar', 'well']) {
+      for (const id of ['ended', 'bar', 'unit', 'flow', 'well']) {
         monitor.answers[`valves/${id}/trend`] = {...trend({state: 'NORMAL',
           d0: 1, d: [0, 0]}), words: 'as the normal model expects'};
+        monitor.answers[`valves/${id}/health`] = {valve: id, step: 'day',
+          t_ms: [kNowMs], status: ['good'], exceeded: [[]], channels: [],
+          trends: [], ...Object.fromEntries(kHealthCounts.map((key) =>
+            [key, [null]]))};
       }
       const page = await openShared(browser, address, '#/valve/ended');
       for (const width of [1400, 390]) {
         await page.setViewportSize({width, height: 800});
         for (const [id, words] of [['ended', /not confirmed since/],
-          ['bar', /not judged: bad input: P1 implausible/]]) {
+          ['bar', /not judged: bad input: P1 implausible/],
+          ['unit', /not judged: bad input: P1 in another unit than trained/],
+          ['flow', /not judged: bad input: flow in another unit than t\/h/]]) {
           await page.goto(`${address}/#/valve/${id}`);
           await page.locator('.words', {hasText: words}).waitFor();
           const live = page.locator('.live');
           await live.getByText('Last residuals').waitFor();
           assert.doesNotMatch(await live.innerText(),
               /expects|\byes\b|within/i);
+          await page.getByText('NE 107): check function, not ').waitFor();
         }
         await page.goto(`${address}/#/valve/well`);
         await page.locator('.words', {hasText: 'normal model expects'}).waitFor();
         await page.getByText('Residuals now').waitFor();
+        await page.getByText('NE 107): good').waitFor();
       }
       // It falls silent while it is shown.
       await monitor.push('tiles', {tiles: [tile('well', 'NOT_JUDGED', [],
@@ -381,14 +396,33 @@ test('the page of a valve that nobody judges now does not call it normal',
     });
 
 test('names that could not be fetched are fetched again', async () => {
-  monitor.reset([tile('V', 'ISOLATED', ['f19'])]);
-  const {faults} = monitor.answers;
-  delete monitor.answers.faults;
-  const page = await openShared(browser, address, '#/valve/V');
-  await page.locator('.state-line', {hasText: 'f19'}).waitFor();
-  monitor.answers.faults = faults;
-  await page.locator('.state-line', {hasText: 'Flow transmitter wrong'}).waitFor();
-  await close(page);
+  for (const [hash, place] of [['#/valve/V', '.state-line'],
+    ['#/alarms', 'td.fault']]) {
+    monitor.reset([tile('V', 'ISOLATED', ['f19'])],
+        [alarm('0000000000000001', 'V', 'f19')]);
+    const {faults} = monitor.answers;
+    delete monitor.answers.faults;
+    const page = await openShared(browser, address, hash);
+    await page.locator(place, {hasText: 'f19'}).waitFor();
+    monitor.answers.faults = faults;
+    await page.locator(place, {hasText: 'Flow transmitter wrong'}).waitFor();
+    await close(page);
+  }
+});
+
+test('the page of an episode says what gave the name', async () => {
+  const witness = 'named by simulation of the valve: f2 explains it 40 times ' +
+    'better than f19, the observers are undecided';
+  const row = alarm('0000000000000001', 'V', 'f19', {layer: 'physics', witness});
+  monitor.reset([tile('V', 'ISOLATED', ['f19'])], [row]);
+  monitor.answers[`episodes/${row.episode}`] = {episode: row, events: [],
+    trace: null, model_hash: 'x', look: null, growth: []};
+  for (const width of [1400, 390]) {
+    const page = await openShared(browser, address,
+        `#/episode/${row.episode}`, {viewport: {width, height: 800}});
+    await page.getByText(`(f19), ${witness}`).waitFor();
+    await close(page);
+  }
 });
 
 test('what ended before it had a name is not unlike any known fault',
@@ -814,6 +848,14 @@ test('the work list has the order of its document, factors, and what nobody ' +
   }
   assert.deepEqual(await page.getByRole('table', {name: 'Work list'})
       .locator('tbody th').allInnerTexts(), [kLongId, 'W']);
+  // A list without rows says if there was anything to find them in.
+  const bare = {...kList, rows: []};
+  for (const [coverage, said] of [[kList.coverage, 'Nothing to do: no valve'],
+    [{loops: 2, named_faults: 0, audit: 0, nothing: 2}, 'Nothing was judged']]) {
+    monitor.answers.worklist = {...bare, coverage};
+    await page.getByRole('button', {name: 'Refresh'}).click();
+    await page.locator('.nothing', {hasText: said}).waitFor();
+  }
   await close(page);
 });
 
@@ -844,6 +886,11 @@ test('the table of residuals says what is within, beyond and not judged',
       [['C0', 'above', 'out'], ['C1', 'below', 'out'], ['C2', 'within', ''],
         ['C2, mean over 60 samples', 'above', 'out'], ['C3', 'abstains', '']]);
       await page.getByText(/^Last work: recalibrated, .* by bo$/).waitFor();
+      // Limits of 21 % would call anything within.
+      await monitor.push('tiles', {tiles: [tile('V', 'DETECTED', [],
+          {blind: true})]});
+      await rows.filter({hasText: 'C2'})
+          .getByText('within, but the limits are too wide').waitFor();
       await close(page);
     });
 

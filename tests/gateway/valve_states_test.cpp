@@ -225,6 +225,12 @@ TEST_F(ValveStatesTest, TheAlarmsOfTheHistoryAreToldWithWhoHasSeenThem) {
   EXPECT_EQ(alarm["acked_utc"], "1970-01-01T00:00:50Z");
   EXPECT_EQ(alarm["ack_comment"], "on the way");
   EXPECT_TRUE(alarm["shelved_until_utc"].is_null());
+  // One whose name was withdrawn is not unlike any known fault.
+  storage::Alarm withdrawn = AcknowledgedAlarm();
+  withdrawn.episode.fault = "unknown";
+  withdrawn.episode.isolated_ns = 42 * kSecond;
+  states_.SetAlarms(std::vector{withdrawn});
+  EXPECT_EQ(StateTold()["alarms"][0]["name"], "Fault whose name was withdrawn");
 }
 
 TEST_F(ValveStatesTest, AnAlarmOfAValveThatNobodyTellsOfIsTold) {

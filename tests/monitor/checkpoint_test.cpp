@@ -225,7 +225,7 @@ TEST(ValveMonitorCheckpointTest, SilenceOfAStaleValveIsTimeToo) {
   const auto start = ValveMonitor::TimePoint{};
   valve.Step(PlantSample(0), 1, start, outlet);
   EXPECT_EQ(valve.CountStale(start + milliseconds(2500)), 0U);
-  ASSERT_TRUE(valve.CheckStale(start + milliseconds(3500)));
+  ASSERT_TRUE(valve.CheckStale(start + milliseconds(3500), outlet));
   EXPECT_EQ(valve.CountStale(start + milliseconds(3500)), 3U);
   EXPECT_EQ(valve.CountStale(start + milliseconds(10'200)), 7U);
   Checkpoint checkpoint;

@@ -157,6 +157,13 @@ class FakeHistory : public HistorySink {
       normal.push_back(valve_id);
     });
   }
+  void StoreSilence(const std::string& valve_id,
+                    std::optional<std::int64_t> since_ns) override {
+    notice.Apply([&] {
+      FailIfBroken();
+      silences.emplace_back(valve_id, since_ns);
+    });
+  }
   void AddTrace(const EpisodeTrace& trace) override {
     std::this_thread::sleep_for(trace_time.load());
     notice.Apply([&] {
@@ -212,6 +219,7 @@ class FakeHistory : public HistorySink {
   std::map<std::uint64_t, EpisodeLook> looks;
   std::vector<StrengthPoint> strengths;
   std::vector<std::string> normal;
+  std::vector<std::pair<std::string, std::optional<std::int64_t>>> silences;
   std::vector<DataGap> gaps;
   Checkpoint checkpoint_sum;
   int checkpoints{0};
@@ -236,6 +244,8 @@ class FakeOutlet : public EpisodeOutlet {
   void OnStrength(StrengthPoint /*point*/) override {}
   void OnGap(DataGap /*gap*/) override {}
   void OnNormal(const std::string& /*valve*/, std::int64_t /*ns*/) override {}
+  void OnSilence(const std::string& /*valve*/,
+                 std::optional<std::int64_t> /*since_ns*/) override {}
   void OnResumed(const OpenEpisode& /*episode*/,
                  std::int64_t /*stamp_ns*/) override {}
 };

@@ -37,6 +37,10 @@ class Notebook : public EpisodeOutlet {
   void OnNormal(const std::string& /*valve*/, std::int64_t stamp_ns) override {
     normal.push_back(stamp_ns);
   }
+  void OnSilence(const std::string& /*valve*/,
+                 std::optional<std::int64_t> since_ns) override {
+    silences.push_back(since_ns);
+  }
   void OnResumed(const OpenEpisode& episode, std::int64_t /*stamp*/) override {
     resumed.push_back(episode.episode_id);
   }
@@ -54,6 +58,7 @@ class Notebook : public EpisodeOutlet {
   std::vector<StrengthPoint> strengths;
   std::vector<DataGap> gaps;
   std::vector<std::int64_t> normal;
+  std::vector<std::optional<std::int64_t>> silences;
   std::vector<std::uint64_t> resumed;
   bool complete{false};
 };
@@ -413,18 +418,32 @@ TEST_F(ValveMonitorTest, AnEarlierPublisherCannotEndTheStreamOfItsSuccessor) {
 TEST_F(ValveMonitorTest, ThreeSilentPeriodsMakeAValveStaleUntilItSpeaks) {
   Feed(0, 10);
 
-  EXPECT_FALSE(valve_.CheckStale(now_ + seconds(3)));
-  EXPECT_TRUE(valve_.CheckStale(now_ + std::chrono::milliseconds(3001)));
-  EXPECT_FALSE(valve_.CheckStale(now_ + seconds(5)));
+  EXPECT_FALSE(valve_.CheckStale(now_ + seconds(3), notebook_));
+  EXPECT_TRUE(
+      valve_.CheckStale(now_ + std::chrono::milliseconds(3001), notebook_));
+  EXPECT_FALSE(valve_.CheckStale(now_ + seconds(5), notebook_));
   EXPECT_TRUE(valve_.stale());
   Feed(10, 11);
   EXPECT_FALSE(valve_.stale());
 }
 
+TEST_F(ValveMonitorTest, NothingConfirmsTheEpisodeOfASilentValve) {
+  Feed(0, 100);
+  EXPECT_TRUE(valve_.CheckStale(now_ + seconds(10), notebook_));
+  Feed(100, 120, kF7Offset);
+  EXPECT_THAT(notebook_.silences, testing::IsEmpty()) << "there was none";
+
+  EXPECT_TRUE(valve_.CheckStale(now_ + seconds(10), notebook_));
+  EXPECT_THAT(notebook_.silences, ElementsAre(PlantSample(119).stamp_ns));
+  Feed(120, 122, kF7Offset);
+  EXPECT_THAT(notebook_.silences,
+              ElementsAre(PlantSample(119).stamp_ns, std::nullopt));
+}
+
 TEST_F(ValveMonitorTest, ALongSilenceClosesTheEpisode) {
   Feed(0, 100);
   Feed(100, 120, kF7Offset);
-  ASSERT_TRUE(valve_.CheckStale(now_ + seconds(10)));
+  ASSERT_TRUE(valve_.CheckStale(now_ + seconds(10), notebook_));
 
   valve_.CheckTimeout(now_ + seconds(59), seconds(60), notebook_);
   EXPECT_TRUE(valve_.episode_open());

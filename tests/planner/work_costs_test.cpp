@@ -306,5 +306,24 @@ TEST_F(WorkListCostsTest, FiguresStandInTheRowAndInColumnsOfTheirOwn) {
   EXPECT_TRUE(row["about"].is_null());
 }
 
+// Of a later version, or damaged: the list has its rows all the same.
+TEST_F(WorkListCostsTest, CostsThatCannotBeReadAreLeftOutAndSaidSo) {
+  query_.stop_ns = kDetected + 20 * kNsPerDay;
+  for (const char* const costs :
+       {"2 EUR/m3, 9 EUR/kWh", "\xff\x01\xc3", "2 EUR/m3, 3 USD/h"}) {
+    query_.loops[0].about.costs = costs;
+    const Json row = List().document["rows"].at(0);
+    EXPECT_EQ(row["fault"], "f5");
+    EXPECT_EQ(row["safe_until_stop"], "not known");
+    EXPECT_FALSE(row.contains("waiting"));
+    EXPECT_THAT(row["why"].get<std::string>(),
+                AllOf(HasSubstr("; the costs of LV-1 in models.db are left "
+                                "out: costs "),
+                      HasSubstr("; safe until the stop"),
+                      Not(HasSubstr("downtime costs 4000"))));
+    EXPECT_THAT(Csv(), HasSubstr("LV-1"));
+  }
+}
+
 }  // namespace
 }  // namespace fdi::planner

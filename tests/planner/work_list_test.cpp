@@ -10,6 +10,7 @@
 #include "report/shared_files.h"
 #include "storage/history/history_editor.h"
 #include "storage/models/models.h"
+#include "storage/models/plant_loops.h"
 #include "tests/html_check.h"
 #include "tests/storage/history_fixture.h"
 
@@ -101,9 +102,9 @@ TEST_F(WorkListTest, EmptyHistoryIsSaidToBeEmpty) {
   EXPECT_EQ(list["coverage"]["loops"], 0);
   EXPECT_TRUE(list["rows"].empty());
   EXPECT_TRUE(list["changes"].is_null());
-  EXPECT_THAT(Html(),
-              AllOf(HasSubstr("No loop is known"), HasSubstr("Nothing to do."),
-                    HasSubstr("There is no earlier list")));
+  EXPECT_THAT(Html(), AllOf(HasSubstr("No loop is known"),
+                            HasSubstr("Nothing was judged"),
+                            HasSubstr("There is no earlier list")));
 }
 
 TEST_F(WorkListTest, ARowHasItsFactorsAndWhoSawIt) {
@@ -539,6 +540,65 @@ TEST_F(WorkListTest, AuditsAreRowsAndShareAPeriod) {
   EXPECT_EQ(list["rows"][0]["fault"], "stiction");
   EXPECT_DOUBLE_EQ(list["rows"][0]["score"].get<double>(), 2.0);
   EXPECT_EQ(list["coverage"]["audit"], 4);
+}
+
+// The list of a plant whose service was not started yet.
+TEST_F(WorkListTest, WhatOnboardingFoundIsARowUntilTheLoopIsJudged) {
+  const auto models = path_.parent_path() / "models.db";
+  {
+    storage::ModelStore store(models, storage::Access::kOccasionalWriter);
+    const auto put = [&store](const char* name, const char* finding,
+                              storage::LoopState state) {
+      storage::PlantLoop loop;
+      loop.name = name;
+      loop.watch = storage::LoopWatch::kAudit;
+      loop.state = state;
+      loop.finding = finding;
+      storage::ValveEntry entry;
+      entry.pattern = name;
+      store.PutLoop(loop, entry);
+    };
+    using enum storage::LoopState;
+    put("F1", "no_response: OP is at an end; no sp", kDataOnly);
+    put("F2", "stiction, sure, band 2.00 % of OP: X stays, then jumps",
+        kDataOnly);
+    put("F3", "undetermined: nothing stands out", kDataOnly);
+    put("F4", "not judged: at most 3 samples in a row", kDataOnly);
+    put("F5", "no_response: of an earlier record", kOnboarded);
+  }
+  const std::int64_t checked =
+      storage::ModelStore(models).Loops()[0].checked_ns;
+  query_.loops = LoopsOf(models);
+  query_.now_ns = checked + 2 * kDay;
+  query_.since_ns = checked - kDay;
+
+  const Json list = List();
+  const Json& rows = list["rows"];
+  ASSERT_EQ(rows.size(), 2U);
+  EXPECT_EQ(rows[0]["valve_id"], "F1");
+  EXPECT_EQ(rows[0]["fault"], "no_response");
+  EXPECT_EQ(rows[0]["certainty"], "likely");
+  EXPECT_THAT(rows[0]["why"].get<std::string>(),
+              HasSubstr(": OP is at an end; no sp; so says its record"));
+  EXPECT_EQ(rows[1]["fault"], "stiction");
+  EXPECT_EQ(rows[1]["certainty"], "sure");
+  EXPECT_EQ(list["coverage"]["nothing"], 5) << "a record is not watched";
+
+  query_.valve_glob = "F2";
+  EXPECT_EQ(Rows().size(), 1U);
+  query_.valve_glob = "*";
+  query_.repairs = {{"F2", query_.loops[1].verdict->end_ns, "bo", "repacked"}};
+  EXPECT_EQ(Rows().size(), 1U);
+  EXPECT_EQ(List()["done"][0]["what"], "repacked");
+  CoverageDay day{"F1", checked / kDay + 1, 1.0, {}};
+  day.samples.Add(Quality::kLive, 3600);
+  Checkpoint checkpoint;
+  checkpoint.coverage = {day};
+  writer_.CommitCheckpoint(checkpoint);
+  EXPECT_TRUE(Rows().empty());
+  query_.repairs.clear();
+  query_.since_ns = checked + kDay;
+  EXPECT_TRUE(Rows().empty()) << "it was before the period";
 }
 
 TEST_F(WorkListTest, WhatIsNotJudgedIsListedWithItsReason) {

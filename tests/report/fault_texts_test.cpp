@@ -46,6 +46,11 @@ TEST_F(FaultTextsTest, ShippedCatalogueHasWordsOfItsOwnForEveryFault) {
   EXPECT_EQ(texts_.Of(19).namur, NamurClass::kFailure);
 }
 
+// Or else who finds the plug at its end takes the name for a contradiction.
+TEST_F(FaultTextsTest, FlashingSaysWhereThePlugEnds) {
+  EXPECT_THAT(texts_.Of(7).check, HasSubstr("X at its open end (0 %)"));
+}
+
 TEST_F(FaultTextsTest, SeverityFollowsTheSizeOfTheStrength) {
   texts_.Override(Write("own.toml",
                         "[f19]\nseverity = [{from = 0.0, level = 'low'},"

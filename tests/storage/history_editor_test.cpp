@@ -160,6 +160,24 @@ TEST_F(UnconfirmedTest, OnlyAValveThatIsJudgedNormalHasReturned) {
   EXPECT_EQ(Find().episode.end_reason, "stale_timeout");
 }
 
+TEST_F(UnconfirmedTest, ASilentValveConfirmsNothingUntilItSendsAgain) {
+  writer_.StoreSilence("open", kDetected + 90 * kSecond);
+  writer_.StoreSilence("LV-1", kDetected + 90 * kSecond);
+  EXPECT_EQ(Find().episode.unconfirmed_ns, kDetected + 90 * kSecond);
+  EXPECT_EQ(Find().state, AlarmState::kUnacked);
+  EXPECT_EQ(CountOf(EpisodeState::kAlarmReturnedUnacked), 2U) << "LV-1 is over";
+  // Neither an acknowledgement nor a normal verdict ends what is open.
+  editor_.Acknowledge(IdText("open"), By("anna", now_ + 1));
+  writer_.ConfirmNormal("open", kDetected + 500 * kSecond);
+  EXPECT_EQ(Find().state, AlarmState::kAcked);
+  EXPECT_EQ(Find().episode.unconfirmed_ns, kDetected + 90 * kSecond);
+  EXPECT_FALSE(Find().episode.cleared_ns);
+
+  writer_.StoreSilence("open", std::nullopt);
+  EXPECT_FALSE(Find().episode.unconfirmed_ns);
+  EXPECT_EQ(Find().state, AlarmState::kAcked);
+}
+
 TEST_F(UnconfirmedTest, TheNextEpisodeOfTheValveTakesItsPlace) {
   EndData(EndReason::kStaleTimeout);
   FaultEvent next =

@@ -223,6 +223,10 @@ TEST_F(HistoryWriterTest, ReisolationReplacesTheAnswerAndKeepsTheFirstTime) {
             "2026-11-20T14:56:31.000Z");
   EXPECT_EQ(Sql("SELECT peak_factor FROM fault_history"), "0.75");
   EXPECT_EQ(Sql("SELECT count(*) FROM episode_fault"), "3");
+
+  writer.Record(Event(Kind::kReisolated, 90, 0, 0.3), kDetected);
+  EXPECT_EQ(Sql("SELECT fault_name FROM fault_history"),
+            "Fault whose name was withdrawn");
 }
 
 TEST_F(HistoryWriterTest, RecordingTwiceIsANoOp) {

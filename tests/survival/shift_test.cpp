@@ -36,15 +36,16 @@ using storage::PrivatePostgres;
 
 // All of them have to agree on these keys of an alarm.
 constexpr std::array kAgreed = {
-    "valve_id", "fault",       "fault_name",  "strength", "worst",
-    "severity", "priority",    "alarm_state", "shelved",  "unconfirmed",
-    "acked_by", "ack_comment", "label",       "stands",   "score"};
+    "valve_id", "fault",       "fault_name", "strength",
+    "worst",    "severity",    "priority",   "alarm_state",
+    "shelved",  "unconfirmed", "acked_by",   "ack_comment",
+    "label",    "certainty",   "stands",     "score"};
 using Alarms = std::map<std::string, json>;  // By episode.
 
 constexpr const char* kViewColumns =
     "episode_id, valve_id, fault, fault_name, strength, worst_strength, "
     "severity, priority, alarm_state, shelved_until_utc IS NOT NULL, "
-    "unconfirmed_utc IS NOT NULL, acked_by, ack_comment, label "
+    "unconfirmed_utc IS NOT NULL, acked_by, ack_comment, label, certainty "
     "FROM ";
 
 bool Same(const json& a, const json& b) {
@@ -229,6 +230,7 @@ class ShiftTest : public MonitorFixture {
             {"fault", tile["fault"]},
             {"strength", tile["strength"]},
             {"severity", tile["severity"]},
+            {"certainty", tile["certainty"]},
             {"alarm_state", tile["unacked"] == true ? "UNACK" : "ACKED"},
             {"shelved", !tile["shelved_until_ms"].is_null()},
             {"unconfirmed", !tile["unconfirmed_ms"].is_null()}};
@@ -364,6 +366,7 @@ class ShiftTest : public MonitorFixture {
                     {"fault", row["fault"]},
                     {"severity", row["severity"]},
                     {"unconfirmed", !row["unconfirmed_utc"].is_null()},
+                    {"certainty", row["certainty"]},
                     {"stands", row["open"]},
                     {"score", row["score"]},
                     {"strength", row["strength"]}};
@@ -428,6 +431,7 @@ class ShiftTest : public MonitorFixture {
             {"fault", state.fault.empty() ? json() : json(state.fault)},
             {"severity", SeverityName(*SeverityOf(state.priority))},
             {"priority", state.priority},
+            {"certainty", state.certainty},
             {"unconfirmed", state.unconfirmed_ns != 0}};
       }
     }
@@ -470,6 +474,7 @@ class ShiftTest : public MonitorFixture {
         alarms[alarm["episode_id"]] = {
             {"valve_id", state["valve_id"]},
             {"fault", alarm["fault"]},
+            {"fault_name", alarm["fault"].is_null() ? json() : alarm["name"]},
             {"severity", alarm["severity"]},
             {"alarm_state", alarm["state"]},
             {"shelved", !alarm["shelved_until_utc"].is_null()},
@@ -503,15 +508,16 @@ class ShiftTest : public MonitorFixture {
     std::erase_if(hook, [&active](const auto& item) {
       return item.second["unconfirmed"] == true && !active.contains(item.first);
     });
-    // The state of a valve is not confirmed either while it is silent, and what
-    // ended with its data stays on the bus until the valve is normal again.
+    // What ended with its data stays on the bus until the valve is normal
+    // again.
     Alarms bus = FromBus();
     std::erase_if(bus, [&active](const auto& item) {
       return item.second["unconfirmed"] == true && !active.contains(item.first);
     });
+    // Nor is the hook told that a valve fell silent.
     for (const auto& [id, row] : active) {
-      if (row["unconfirmed"] == false && bus.contains(id)) {
-        bus[id].erase("unconfirmed");
+      if (row["ended_utc"].is_null() && hook.contains(id)) {
+        hook[id].erase("unconfirmed");
       }
     }
     const Alarms page = FromPage();
@@ -566,9 +572,10 @@ class ShiftTest : public MonitorFixture {
     json severity;
     json strength;  // Now, to 0.05; null: not yet.
     bool shelved{false};
-    bool unconfirmed{false};
+    bool ended{false};  // With its data.
   };
-  // The moment is reached, and all say so.
+  // The moment is reached, and all say so. No valve sends meanwhile, so that
+  // soon nothing confirms what is active.
   void Moment(const char* what, const std::vector<Expected>& expected) {
     SCOPED_TRACE(what);
     const auto deadline = Clock::now() + std::chrono::seconds(60);
@@ -602,7 +609,10 @@ class ShiftTest : public MonitorFixture {
                                              e.strength.get<double>()) < 0.05;
       if (is["alarm_state"] != e.state || is["fault"] != e.fault ||
           (!e.severity.is_null() && is["severity"] != e.severity) || !strong ||
-          is["shelved"] != e.shelved || is["unconfirmed"] != e.unconfirmed) {
+          is["shelved"] != e.shelved ||
+          is["unconfirmed"] == (is["alarm_state"] == "RTN_UNACK") ||
+          is["ended_utc"].is_null() ==
+              (e.ended || is["alarm_state"] == "RTN_UNACK")) {
         text += std::string(e.valve) + " is " + is.dump() + '\n';
       }
     }
@@ -685,7 +695,7 @@ TEST_F(ShiftTest, EverybodySaysTheSameOfEveryAlarm) {
     }
   }
   std::vector<Expected> dead = shelved;
-  dead[2].unconfirmed = true;
+  dead[2].ended = true;
   Moment("the gateway is dead", dead);
 
   monitor_->Signal(SIGKILL);

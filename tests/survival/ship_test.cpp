@@ -429,7 +429,7 @@ TEST_F(ShipTest, RefusalsHaveAReasonAndCode3) {
   EXPECT_EQ(Store("history list --db '" + Url("screen") + "'").code, 0);
   owner.Run("UPDATE fdi.plant SET version = version + 1");
   refused(Ship("a"),
-          "schema fdi has version 12, this program needs 11: update "
+          "schema fdi has version 13, this program needs 12: update "
           "this program");
   refused(Store("ship --data " + Folder("a").string() +
                 " --db 'postgresql://x:secret@/plant?host=/nowhere'"),
@@ -698,7 +698,7 @@ TEST_F(ShipTest, TheVerbsReadThePlant) {
   EXPECT_THAT(Store("history list --db '" + Url() + "' --monitor b").out,
               HasSubstr("no episode matches"));
   EXPECT_THAT(Store("worklist --monitor b --db '" + Url() + "'" + since).out,
-              HasSubstr("Nothing to do."));
+              HasSubstr("Nothing was judged: "));
 }
 
 // Sets in particular, where globs and regular expressions differ.

@@ -102,6 +102,46 @@ TEST_F(WatchSystemTest, WhoComesLateHearsNoVectorOfAStreamThatHasEnded) {
   EXPECT_EQ(heard, 0);
 }
 
+// The page says so by its clock, the other views by what the history has.
+TEST_F(WatchSystemTest, ASilentValveIsNotConfirmedInListsEither) {
+  const auto ask = [this](const std::string& verb) {
+    const std::filesystem::path file = directory_.path() / "answer";
+    const std::string command =
+        FDI_STORE_PROGRAM " --utc --data " + data_.string() + " " + verb;
+    EXPECT_EQ(std::system((command + " >" + file.string()).c_str()), 0);
+    std::ostringstream text;
+    text << std::ifstream(file).rdbuf();
+    return text.str();
+  };
+  const auto since = [&] {
+    return nlohmann::json::parse(
+        ask("worklist --json"))["rows"][0]["unconfirmed_utc"];
+  };
+  ASSERT_TRUE(Await([&] { return !since().is_null(); }));
+  const std::string stamp = FormatTime(PlantSample(59).stamp_ns, true);
+  EXPECT_EQ(since(), stamp);
+  EXPECT_THAT(ask("worklist"), HasSubstr(", not confirmed for "));
+  EXPECT_THAT(ask("worklist --csv"), HasSubstr(stamp));
+  EXPECT_THAT(ask("history list"), HasSubstr("not confirmed"));
+  EXPECT_THAT(ask("history show last"), HasSubstr("not confirmed since "));
+
+  Publish(60, 63, kF7Offset);
+  EXPECT_TRUE(Await([&] { return since().is_null(); }));
+  EXPECT_THAT(ask("worklist"), testing::Not(HasSubstr("not confirmed")));
+
+  // Nor does an episode stand by itself that a monitor left open.
+  monitor_->Signal(SIGTERM);
+  monitor_->AwaitExit();
+  EXPECT_EQ(since(), FormatTime(PlantSample(62).stamp_ns, true));
+  monitor_ = StartMonitor();
+  Publish(63, 103, kF7Offset);
+  EXPECT_TRUE(Await([&] { return since().is_null(); })) << "it goes on";
+  monitor_->Signal(SIGKILL);
+  monitor_->AwaitExit();
+  monitor_ = StartMonitor();
+  EXPECT_TRUE(Await([&] { return !since().is_null(); }));
+}
+
 // Its history is what the monitor knows after a crash.
 TEST_F(WatchSystemTest, AnAlarmOfBeforeARestartStandsUntilTheValveIsNormal) {
   samples_->Dispose({"V1", {}});

@@ -282,6 +282,20 @@ TEST_F(FdiStoreHistoryTest, ANameThatWasWithdrawnIsNone) {
   const std::string shown = Store("history show last").out;
   EXPECT_THAT(shown, HasSubstr("after 20 s, withdrawn since\n"));
   EXPECT_THAT(shown, HasSubstr("name withdrawn\n"));
+  // Its title does not say that it never had one, whatever its end.
+  const char* const title = "Fault whose name was withdrawn";
+  for (const EndReason end : {EndReason::kNone, EndReason::kCleared}) {
+    if (end != EndReason::kNone) {
+      HistoryWriter(path_).Record(
+          Event(TransitionKind::kClosed, 90, 0, 0.3, end), kDetected);
+    }
+    EXPECT_EQ(
+        StoreJson("history list --valve LV-1")["episodes"][0]["fault_name"],
+        title);
+    EXPECT_THAT(Store("history list").out, HasSubstr(title));
+    EXPECT_THAT(Store("history show last").out, HasSubstr(title));
+    EXPECT_THAT(Store("worklist --from 2026-11-01").out, HasSubstr(title));
+  }
 }
 
 TEST_F(FdiStoreHistoryTest, FiltersReachTheQuery) {
@@ -628,7 +642,7 @@ TEST_F(FdiStoreHistoryTest, DoctorFindsASoundDirectorySound) {
   EXPECT_EQ(report["sound"], true);
   ASSERT_EQ(report["databases"].size(), 3U);
   EXPECT_EQ(report["databases"][0]["present"], false);
-  EXPECT_EQ(report["databases"][2]["version"], 20);
+  EXPECT_EQ(report["databases"][2]["version"], 21);
   EXPECT_EQ(report["databases"][2]["figures"]["open_episodes"], 1);
   EXPECT_EQ(report["databases"][2]["figures"]["unsent_events"], 2);
 }

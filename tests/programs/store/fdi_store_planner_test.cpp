@@ -92,7 +92,7 @@ TEST_F(FdiStorePlannerTest, StatusIsThatOfTheGravestFigureBeyondItsLimit) {
 TEST_F(FdiStorePlannerTest, WorkListOfAnEmptyHistoryIsEmpty) {
   { const HistoryWriter writer(path_); }
   EXPECT_TRUE(StoreJson("worklist")["rows"].empty());
-  EXPECT_THAT(Store("worklist").out, HasSubstr("Nothing to do.\n"));
+  EXPECT_THAT(Store("worklist").out, HasSubstr("Nothing was judged: "));
   EXPECT_EQ(Store("worklist --discipline plumber").code, 2);
   const Outcome ignored = Store("worklist --monitor x");
   EXPECT_EQ(ignored.code, 2);

@@ -54,6 +54,10 @@ TEST_F(AppEvaluateTest, JsonHasTheKeysOfTheContractAndFindsTheFault) {
   EXPECT_EQ(summary["fault_free_episodes"], 0);
   EXPECT_EQ(summary["answers"],
             json::parse(R"([{"certainty":"sure","answers":1,"right":1}])"));
+  // A pipe gets all of it.
+  EXPECT_THAT(Run("evaluate --model-set quick --runs " + id).out,
+              AllOf(HasSubstr("wrong  said to be  final set\n"),
+                    HasSubstr("how right the answers are")));
 }
 
 TEST_F(AppEvaluateTest, RunWithoutTruthIsScoredButNotCounted) {

@@ -134,7 +134,10 @@ class Worklist extends View {
         h('p', {}, `As of ${utcText(list.as_of_utc)}, since ` +
             `${utcText(list.since_utc)}. ` + coverageText(list.coverage)),
         list.rows.length === 0 ?
-          h('p', {class: 'nothing'}, 'Nothing to do: no valve stands out.') :
+          h('p', {class: 'nothing'},
+              list.coverage.nothing === list.coverage.loops ?
+                'Nothing was judged yet.' :
+                'Nothing to do: no valve stands out.') :
           dataTable('Work list, the worst first', kRows, list.rows,
               {layout: 'cards'}),
         part('Loops that share a cause', kShared, list.shared),
