@@ -321,12 +321,10 @@ int RunOut(const OutOptions& options, const report::Context& context) {
     }
     duties.Tick([&] {
       return std::vector<Metric>{
-          {"valves", "Valves that are told of.",
-           static_cast<double>(states.valves())},
-          {"published_total", "Messages that went out.",
-           static_cast<double>(published)},
+          {"valves", "Valves that are told of.", states.valves()},
+          {"published_total", "Messages that went out.", published},
           {"broker_connected", "1 while there is a connection.",
-           connected ? 1.0 : 0.0}};
+           connected ? 1U : 0U}};
     });
   }
   outlet->End(farewell);
