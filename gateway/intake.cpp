@@ -77,12 +77,15 @@ void Intake::Reload() {
                                              {"reason", error.what()}}));
     return;
   }
-  std::set<std::string> ids;
+  std::set<std::pair<std::string, std::string>> stay;
+  const auto place = [this](const importer::LiveValve& valve) {
+    return std::pair(valve.id, options_.by_group ? valve.group : "");
+  };
   for (const importer::LiveValve& valve : table.valves) {
-    ids.insert(valve.id);
+    stay.insert(place(valve));
   }
   for (const importer::LiveValve& valve : table_.valves) {
-    if (!ids.contains(valve.id)) {
+    if (!stay.contains(place(valve))) {
       wire_.End(valve.id);
     }
   }
