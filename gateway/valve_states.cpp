@@ -73,10 +73,6 @@ std::string DescriptionOf(std::string_view answer) {
 
 }  // namespace
 
-std::string TopicPrefix(const std::string& site) {
-  return "fdi/" + TopicLevel(site) + "/";
-}
-
 std::string TopicLevel(std::string_view valve_id) {
   std::string level;
   for (const char c : valve_id) {
@@ -108,6 +104,18 @@ void ValveStates::Add(const Json& record, Clock::time_point now) {
   table_.Add(record, now);
   if (record["topic"] == "FaultEvent" && new_events_.size() < kMaxEvents) {
     new_events_.push_back(record);
+  }
+}
+
+void ValveStates::TakeKept(const MqttEvent& event) {
+  std::string_view level = event.topic;
+  constexpr std::string_view kState = "/state";
+  if (!event.retained || event.payload.empty() || !level.starts_with(prefix_)) {
+    return;
+  }
+  level.remove_prefix(prefix_.size());
+  if (level.ends_with(kState)) {
+    Expect(ValveOfLevel(level.substr(0, level.size() - kState.size())));
   }
 }
 

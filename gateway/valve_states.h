@@ -18,8 +18,6 @@
 
 namespace fdi::gateway {
 
-/// "fdi/SITE/": the topics of one plant.
-std::string TopicPrefix(const std::string& site);
 /// A valve in a topic: /, +, # and % as %2F, ...; and back.
 std::string TopicLevel(std::string_view valve_id);
 std::string ValveOfLevel(std::string_view level);
@@ -38,14 +36,17 @@ class ValveStates {
   ValveStates(report::FaultTexts texts, const std::string& site)
       : texts_(texts),
         table_(std::move(texts), true),
-        prefix_(TopicPrefix(site)) {}
+        prefix_("fdi/" + TopicLevel(site) + "/") {}
 
   /// @param record as WatchRecord::object; of any topic.
   void Add(const report::Json& record, Clock::time_point now);
   void Remove(const std::string& valve_id) { table_.Remove(valve_id); }
-  /// A valve that ought to be there: one of the plant's table, or one of which
-  /// the broker still tells from before the start.
+  /// A valve that ought to be there.
   void Expect(const std::string& valve_id) { expected_.insert(valve_id); }
+  /// States that a broker has kept from an earlier run: their valves may be
+  /// gone, but ought to be there.
+  std::string kept_topics() const { return prefix_ + "+/state"; }
+  void TakeKept(const MqttEvent& event);
   void SetGroup(const std::string& valve_id, const std::string& group) {
     groups_[valve_id] = group;
   }

@@ -46,29 +46,6 @@ struct OutOptions {
   std::string http;
 };
 
-// States that the broker has kept from an earlier run: these valves may be
-// gone.
-class Former {
- public:
-  explicit Former(const std::string& prefix) : prefix_(prefix) {}
-  std::string pattern() const { return prefix_ + "+/state"; }
-  void Take(const MqttEvent& event) {
-    constexpr std::string_view kState = "/state";
-    if (event.retained && event.topic.starts_with(prefix_) &&
-        event.topic.ends_with(kState) && !event.payload.empty()) {
-      valves_.push_back(ValveOfLevel(
-          std::string_view(event.topic)
-              .substr(prefix_.size(),
-                      event.topic.size() - prefix_.size() - kState.size())));
-    }
-  }
-  const std::vector<std::string>& valves() const { return valves_; }
-
- private:
-  std::string prefix_;
-  std::vector<std::string> valves_;
-};
-
 // The alarms as operators have left them, from the history of a monitor on this
 // host.
 class AlarmReader {
@@ -119,29 +96,45 @@ class Outlet {
   virtual void End(const Outgoing& farewell) = 0;
 };
 
+// To a broker; with --sparkplug as an edge node.
 class BrokerOutlet : public Outlet {
  public:
   BrokerOutlet(const OutOptions& options, const Outgoing& will,
                const LogSink& log)
       : client_(
-            options.mqtt, [will] { return will; }, log),
-        former_(TopicPrefix(options.site)) {
+            options.mqtt, [this, will] { return node_ ? node_->Will() : will; },
+            log) {
+    if (!options.mqtt.sparkplug.empty()) {
+      node_.emplace(options.mqtt.sparkplug, options.site);
+    }
     client_.Start();
   }
   bool Publish(const Outgoing& message) override {
-    return client_.Publish(message);
+    if (!node_) {
+      return client_.Publish(message);
+    }
+    bool sent = false;
+    for (const Outgoing& part : node_->Tell(message)) {
+      sent = client_.Publish(part);
+    }
+    return sent;
   }
   bool Ready(ValveStates& states) override {
     client_.Take(events_, std::chrono::milliseconds(0));
+    bool begin = false;
     for (const MqttEvent& event : events_) {
-      former_.Take(event);
       if (event.kind == MqttEvent::Kind::kConnected) {
-        client_.Subscribe({former_.pattern()});
-        states.Forget();
+        client_.Subscribe({node_ ? node_->commands() : states.kept_topics()});
+        begin = true;
       }
+      states.TakeKept(event);
+      begin = begin || (node_ && SparkplugNode::AsksForBirth(event.payload));
     }
-    for (const std::string& valve_id : former_.valves()) {
-      states.Expect(valve_id);
+    if (begin) {
+      if (node_) {
+        client_.Publish(node_->Birth());
+      }
+      states.Forget();
     }
     return client_.connected();
   }
@@ -150,60 +143,12 @@ class BrokerOutlet : public Outlet {
     return Clock::now() - start_ >= kAcquainted;
   }
   void End(const Outgoing& farewell) override {
-    client_.Publish(farewell);
+    client_.Publish(node_ ? node_->Death() : farewell);
     client_.Stop();
   }
 
  private:
-  MqttClient client_;
-  Former former_;
-  std::vector<MqttEvent> events_;
-  Clock::time_point start_{Clock::now()};
-};
-
-// The same states as an edge node of Sparkplug B.
-class SparkplugOutlet : public Outlet {
- public:
-  SparkplugOutlet(const OutOptions& options, const LogSink& log)
-      : node_(options.mqtt.sparkplug, options.site),
-        client_(
-            options.mqtt, [this] { return node_.Will(); }, log) {
-    client_.Start();
-  }
-  bool Publish(const Outgoing& message) override {
-    bool sent = false;
-    for (const Outgoing& part : node_.Tell(message)) {
-      sent = client_.Publish(part);
-    }
-    return sent;
-  }
-  bool Ready(ValveStates& states) override {
-    client_.Take(events_, std::chrono::milliseconds(0));
-    bool birth = false;
-    for (const MqttEvent& event : events_) {
-      if (event.kind == MqttEvent::Kind::kConnected) {
-        client_.Subscribe({node_.commands()});
-        birth = true;
-      }
-      birth = birth || (event.kind == MqttEvent::Kind::kMessage &&
-                        SparkplugNode::AsksForBirth(event.payload));
-    }
-    if (birth) {
-      client_.Publish(node_.Birth());
-      states.Forget();
-    }
-    return client_.connected();
-  }
-  bool KnowsAll() const override {
-    return Clock::now() - start_ >= kAcquainted;
-  }
-  void End(const Outgoing& /*farewell*/) override {
-    client_.Publish(node_.Death());
-    client_.Stop();
-  }
-
- private:
-  SparkplugNode node_;
+  std::optional<SparkplugNode> node_;
   MqttClient client_;
   std::vector<MqttEvent> events_;
   Clock::time_point start_{Clock::now()};
@@ -253,9 +198,6 @@ std::unique_ptr<Outlet> OpenOutlet(const OutOptions& options,
   }
   if (!options.lines.empty()) {
     return std::make_unique<LineOutlet>(options.lines);
-  }
-  if (!options.mqtt.sparkplug.empty()) {
-    return std::make_unique<SparkplugOutlet>(options, log);
   }
   return std::make_unique<BrokerOutlet>(options, will, log);
 }
