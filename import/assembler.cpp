@@ -113,10 +113,7 @@ void Assembler::Replace(std::vector<LiveValve> valves) {
     if (old == by_id.end()) {
       continue;
     }
-    valve.begun = old->second->begun;
-    valve.next_ns = old->second->next_ns;
-    valve.seq = old->second->seq;
-    valve.mode = old->second->mode;
+    static_cast<Progress&>(valve) = *old->second;
     for (Slot& slot : valve.slots) {
       const auto same =
           std::ranges::find_if(old->second->slots, [&](const Slot& other) {

@@ -176,9 +176,7 @@ class Assembler {
     std::optional<Held> held;
     std::deque<Held> pending;  // One for each instant that is not written.
   };
-  struct Valve {
-    LiveValve valve;
-    std::vector<Slot> slots;
+  struct Progress {
     bool begun{false};
     std::int64_t next_ns{0};
     std::uint64_t seq{0};
@@ -187,6 +185,10 @@ class Assembler {
     // Nothing is known of the time between, exclusive.
     std::int64_t gap_from_ns{0};
     std::int64_t gap_to_ns{0};
+  };
+  struct Valve : Progress {
+    LiveValve valve;
+    std::vector<Slot> slots;
   };
   struct TextHash {
     using is_transparent = void;

@@ -425,6 +425,19 @@ TEST_F(AssemblerTest, AValveOfAnotherTableGoesOn) {
   EXPECT_EQ(CountsOf("V1.OP").readings, 3U);
 }
 
+TEST_F(AssemblerTest, ASilentValveIsNotToldAgainByAnotherTable) {
+  Make({ValveNamed("V1"), ValveNamed("V2")});
+  SayAll(1.0, "V1", "plc1");
+  for (int s = 1; s <= 20; ++s) {
+    if (s == 12) {
+      assembler_->Replace({ValveNamed("V1"), ValveNamed("V2")});
+    }
+    SayAll(s, "V2", "plc2");
+    Advance(s);
+  }
+  EXPECT_THAT(With("V1", Signal::kCv, false), ElementsAre(4.0, 5.0, 6.0));
+}
+
 TEST_F(AssemblerTest, TheEndWritesWhatWasSaid) {
   Make({ValveNamed("V1")});
   SayAll(1.0, "V1");
