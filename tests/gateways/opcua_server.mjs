@@ -3,7 +3,7 @@
 // time and every 10 ms. Goes on while somebody subscribes to all tags. Its
 // namespace urn:plant has another number after each start, and the tag NOTE.SP a
 // text.
-// Usage: opcua_server.mjs CSV PORT
+// Usage: opcua_server.mjs CSV PORT [CERTIFICATE KEY]
 import {readFileSync} from 'node:fs';
 
 console.log = console.error;
@@ -48,7 +48,8 @@ function give(at) {
 }
 
 async function start() {
-  const server = new OPCUAServer({port: Number(process.argv[3]), host: '127.0.0.1',
+  const [port, certificateFile, privateKeyFile] = process.argv.slice(3);
+  const server = new OPCUAServer({port: Number(port), host: '127.0.0.1', certificateFile, privateKeyFile,
     serverCapabilities: {minSupportedSampleRate: 0}});
   await server.initialize();
   for (let i = 0; i < starts; ++i) server.engine.addressSpace.registerNamespace(`urn:other:${i}`);
