@@ -47,11 +47,11 @@ class ValveStates {
   /// gone, but ought to be there.
   std::string kept_topics() const { return prefix_ + "+/state"; }
   void TakeKept(const MqttEvent& event);
-  void SetGroup(const std::string& valve_id, const std::string& group) {
+  /// Where and what the valve is; `about` of its state is
+  /// findings::AboutJson().
+  void Describe(const std::string& valve_id, const std::string& group,
+                const ValveIdentity& identity) {
     groups_[valve_id] = group;
-  }
-  /// Who the valve is; `about` of its state is findings::AboutJson().
-  void SetIdentity(const std::string& valve_id, const ValveIdentity& identity) {
     identities_[valve_id] = identity;
   }
   /// The alarms of all valves that somebody has still to see or that stand.
@@ -78,8 +78,7 @@ class ValveStates {
   };
   report::Json StateOf(const report::Json& row, bool monitored) const;
   report::Json AlarmOf(const storage::Alarm& alarm) const;
-  report::Json AlarmsOf(const std::string& valve_id) const;
-  report::Json GroupOf(const std::string& valve_id) const;
+  report::Json KnownOf(const std::string& valve_id) const;
   void Tell(const std::string& topic, report::Json state,
             const report::Json& as_of, Clock::time_point now,
             std::vector<Outgoing>& due);

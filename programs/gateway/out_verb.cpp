@@ -14,7 +14,6 @@
 #include "base/time_text.h"
 #include "diagnosis/records/valve_glob.h"
 #include "gateway/duties.h"
-#include "gateway/live_table.h"
 #include "gateway/mqtt_client.h"
 #include "gateway/sparkplug_node.h"
 #include "gateway/valve_states.h"
@@ -207,20 +206,11 @@ void ExpectTable(const OutOptions& options, ValveStates& states) {
   if (options.plant.empty()) {
     return;
   }
-  const LiveTable table = ReadLiveTable(options.plant, false);
-  for (const importer::LiveValve& valve : table.valves) {
-    if (GlobMatches(options.valves, valve.id)) {
-      states.Expect(valve.id);
-      states.SetGroup(valve.id, valve.group);
-    }
-  }
   for (const importer::PlantRow& row :
        importer::ReadPlantTable(options.plant).rows) {
-    states.SetIdentity(row.name, row);
-  }
-  for (const RefusedRow& row : table.refused) {
-    if (GlobMatches(options.valves, row.name)) {
+    if (!row.name.empty() && GlobMatches(options.valves, row.name)) {
       states.Expect(row.name);
+      states.Describe(row.name, row.group, row);
     }
   }
 }

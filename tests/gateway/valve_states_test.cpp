@@ -190,10 +190,9 @@ TEST_F(ValveStatesTest, AStateThatTheBrokerKeptIsThatOfAValve) {
 
 TEST_F(ValveStatesTest, AMissingValveWaitsUntilMonitorsWereHeard) {
   states_.Expect("FV/1");
-  states_.SetGroup("FV/1", "hall 1");
   ValveIdentity identity;
   identity.description = "Feed";
-  states_.SetIdentity("FV/1", identity);
+  states_.Describe("FV/1", "hall 1", identity);
   EXPECT_EQ(states_.Due(0, now_, false).size(), 1U);  // The monitor's.
   EXPECT_EQ(StateTold()["group"], "hall 1");
   EXPECT_EQ(StateTold()["about"]["description"], "Feed");
