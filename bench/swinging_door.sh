@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
 # A day of a healthy valve as a historian keeps it: swinging door, 0.2 % of span,
 # a reading of each tag at least every 2 min. A valve that was onboarded on two
-# such hours takes it with the map that `sniff` writes: how it is put onto a grid,
-# from which change on a fault is seen, how long the day was judged, and how many
-# false episodes it has.
+# such hours takes it with the map that `sniff` writes, and with one that holds
+# instead of drawing lines: how it is put onto a grid, from which change on a fault
+# is seen, how long the day was judged, and how many false episodes it has.
 # Usage: swinging_door.sh FOLDER-OF-PROGRAMS
 set -euo pipefail
 source "$(dirname "$0")/../tests/system/programs.sh" "$1"
@@ -57,8 +57,12 @@ compressed 7200 11 1767600000 >hours.csv
 compressed 86400 12 1767700000 >day.csv
 echo "$(($(wc -l <day.csv) - 1)) readings instead of $((6 * 86400))"
 "$bin/fdi-store" runs sniff hours.csv -o tags.toml | grep -E '^(compressed|resample)'
-"$bin/fdi-trainer" onboard --valve V --file hours.csv --map tags.toml --no-coverage 2>onboard.log |
-  grep -E '^(usable:|channel|X|F|F\(CV\)|limits) ' || fail "not onboarded"
-"$bin/fdi-trainer" evaluate --model-set V --file day.csv --map tags.toml 2>evaluate.log |
-  sed -n '/^run/,/^$/p; /^time/,$p'
-grep -o 'resampled .*' evaluate.log
+for form in linear hold; do
+  sed "s/linear/$form/" tags.toml >"$form.toml"
+  echo "$form:"
+  "$bin/fdi-trainer" onboard --valve "V-$form" --file hours.csv --map "$form.toml" --no-coverage 2>onboard.log |
+    grep -E '^(usable:|channel|X|F|F\(CV\)|limits) ' || fail "not onboarded"
+  "$bin/fdi-trainer" evaluate --model-set "V-$form" --file day.csv --map "$form.toml" 2>evaluate.log |
+    sed -n '/^run/,/^$/p; /^time/,$p'
+  grep -o 'resampled .*' evaluate.log
+done

@@ -1,8 +1,8 @@
 #include "gateway/duties.h"
 
-#include <sstream>
-
 #include <systemd/sd-daemon.h>
+
+#include "monitor/counters.h"
 
 namespace fdi::gateway {
 namespace {
@@ -10,20 +10,19 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr std::chrono::seconds kTick(1);
-constexpr std::chrono::minutes kCalm(1);
-// Subjects that are remembered: a client may make up names without end.
-constexpr std::size_t kMaxTold = 10'000;
+// A client may make up names of any length.
+constexpr std::size_t kLongestLine = 1024;
 
 std::string PageOf(const std::vector<Metric>& metrics) {
-  std::ostringstream page;
-  page.precision(15);
+  monitor::Exposition page;
   for (const Metric& metric : metrics) {
-    const std::string name = "fdi_gateway_" + metric.name;
-    page << "# HELP " << name << ' ' << metric.help << "\n# TYPE " << name
-         << (name.ends_with("_total") ? " counter\n" : " gauge\n") << name
-         << ' ' << metric.value << '\n';
+    using Type = monitor::Exposition::Type;
+    page.Family("fdi_gateway_" + metric.name,
+                metric.name.ends_with("_total") ? Type::kCounter : Type::kGauge,
+                metric.help);
+    page.Value(metric.value);
   }
-  return page.str();
+  return page.text();
 }
 
 }  // namespace
@@ -79,23 +78,15 @@ bool Duties::Tick(const std::function<std::vector<Metric>()>& metrics,
 void CalmLog::Warn(
     std::string_view event, const std::string& about,
     std::initializer_list<std::pair<std::string_view, std::string>> fields) {
-  const auto now = Clock::now();
-  const std::string key = std::string(event) + ' ' + about;
-  auto told = told_.find(key);
-  if (told == told_.end() && told_.size() >= kMaxTold) {
-    told_.clear();
-  }
-  if (told == told_.end()) {
-    told = told_.emplace(key, Told{}).first;
-  } else if (now - told->second.at < kCalm) {
-    ++told->second.not_shown;
+  std::uint64_t not_shown = 0;
+  if (!limit_.Admit(std::string(event) + ' ' + about.substr(0, kLongestLine),
+                    not_shown)) {
     return;
   }
-  std::string line = EventLine(event, fields);
-  if (told->second.not_shown > 0) {
-    line += " not_shown=" + std::to_string(told->second.not_shown);
+  std::string line = EventLine(event, fields).substr(0, kLongestLine);
+  if (not_shown > 0) {
+    line += " not_shown=" + std::to_string(not_shown);
   }
-  told->second = {now, 0};
   log_(LogLevel::kWarning, line);
 }
 

@@ -5,12 +5,12 @@
 #include <functional>
 #include <memory>
 #include <string>
-#include <unordered_map>
 #include <vector>
 
 #include "base/log.h"
 #include "base/mutex.h"
 #include "monitor/http/http_server.h"
+#include "monitor/throttled_log.h"
 
 namespace fdi::gateway {
 
@@ -18,7 +18,7 @@ namespace fdi::gateway {
 struct Metric {
   std::string name;  ///< Without "fdi_gateway_"; "_total" marks a counter.
   std::string help;
-  double value{0.0};
+  std::uint64_t value{0};
 };
 
 /// The duties of a service to its host: tells systemd that it is ready and
@@ -44,8 +44,9 @@ class Duties {
   std::unique_ptr<monitor::HttpServer> server_;  // Last: uses the others.
 };
 
-/// A log in which one thing is said at most once a minute, so that no flood of
-/// bad input fills the disk.
+/// A log in which one thing is said at most once a minute, and at most 10 000
+/// things, in lines of at most 1 KiB, so that no flood of bad input fills the
+/// disk or the memory.
 class CalmLog {
  public:
   explicit CalmLog(LogSink log) : log_(std::move(log)) {}
@@ -56,12 +57,8 @@ class CalmLog {
       std::initializer_list<std::pair<std::string_view, std::string>> fields);
 
  private:
-  struct Told {
-    std::chrono::steady_clock::time_point at;
-    std::uint64_t not_shown{0};
-  };
   LogSink log_;
-  std::unordered_map<std::string, Told> told_;
+  monitor::LogLimit limit_{{1, std::chrono::minutes(1)}};
 };
 
 }  // namespace fdi::gateway

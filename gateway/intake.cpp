@@ -1,7 +1,6 @@
 #include "gateway/intake.h"
 
 #include <chrono>
-#include <map>
 #include <set>
 #include <utility>
 
@@ -78,12 +77,15 @@ void Intake::Reload() {
                                              {"reason", error.what()}}));
     return;
   }
-  std::set<std::string> ids;
+  std::set<std::pair<std::string, std::string>> stay;
+  const auto place = [this](const importer::LiveValve& valve) {
+    return std::pair(valve.id, options_.by_group ? valve.group : "");
+  };
   for (const importer::LiveValve& valve : table.valves) {
-    ids.insert(valve.id);
+    stay.insert(place(valve));
   }
   for (const importer::LiveValve& valve : table_.valves) {
-    if (!ids.contains(valve.id)) {
+    if (!stay.contains(place(valve))) {
       wire_.End(valve.id);
     }
   }
@@ -216,39 +218,33 @@ void Intake::Run(Duties& duties) {
 }
 
 std::vector<Metric> Intake::Metrics() const {
-  const auto number = [](auto value) { return static_cast<double>(value); };
   const auto [alive, all] = assembler_.sources();
-  return {
-      {"readings_total", "Readings that came.", number(totals_.readings)},
-      {"bad_readings_total", "Of these without a usable value or stamp.",
-       number(totals_.bad)},
-      {"late_readings_total", "Of these after their instant was written.",
-       number(totals_.late)},
-      {"unknown_readings_total", "Of these of tags that no row has.",
-       number(totals_.unknown)},
-      {"unreadable_total", "Lines and payloads that say nothing.",
-       number(totals_.wrong)},
-      {"dropped_readings_total", "Readings dropped because they came too fast.",
-       number(source_.dropped())},
-      {"samples_total", "Samples that were published.", number(wire_.sent())},
-      {"samples_not_sent_total", "Samples for which there was no room.",
-       number(wire_.not_sent())},
-      {"valves", "Rows of the table in use.", number(assembler_.valves())},
-      {"rows_refused", "Rows of the table that are refused.",
-       number(table_.refused.size())},
-      {"sources", "Sources that have spoken.", number(all)},
-      {"sources_alive", "Of these alive.", number(alive)},
-      {"readers", "Readers of the samples.", number(wire_.readers())}};
+  return {{"readings_total", "Readings that came.", totals_.readings},
+          {"bad_readings_total", "Of these without a usable value or stamp.",
+           totals_.bad},
+          {"late_readings_total", "Of these after their instant was written.",
+           totals_.late},
+          {"unknown_readings_total", "Of these of tags that no row has.",
+           totals_.unknown},
+          {"unreadable_total", "Lines and payloads that say nothing.",
+           totals_.wrong},
+          {"dropped_readings_total",
+           "Readings dropped because they came too fast.", source_.dropped()},
+          {"samples_total", "Samples that were published.", wire_.sent()},
+          {"samples_not_sent_total", "Samples for which there was no room.",
+           wire_.not_sent()},
+          {"valves", "Rows of the table in use.", assembler_.valves()},
+          {"rows_refused", "Rows of the table that are refused.",
+           table_.refused.size()},
+          {"sources", "Sources that live, or that a tag waits for.", all},
+          {"sources_alive", "Of these alive.", alive},
+          {"readers", "Readers of the samples.",
+           static_cast<std::uint64_t>(wire_.readers())}};
 }
 
 std::string Intake::TagsPage() const {
-  std::map<std::string, importer::TagCounts> sorted;
-  assembler_.ForEachTag(
-      [&](const std::string& name, const importer::TagCounts& counts) {
-        sorted.emplace(name, counts);
-      });
   report::Json tags = report::Json::array();
-  for (const auto& [name, counts] : sorted) {
+  for (const auto& [name, counts] : assembler_.tags()) {
     tags.push_back(
         {{"tag", name},
          {"readings", counts.readings},

@@ -24,8 +24,9 @@ namespace {
 constexpr int kKeepAliveS = 5;
 constexpr int kLoopMs = 200;
 constexpr std::chrono::seconds kLongestPause(60);
-// Some seconds of a flood of 10 000 readings a second.
+// Some seconds of a flood of 10 000 readings a second, but for large payloads.
 constexpr std::size_t kQueue = 50'000;
+constexpr std::size_t kQueueBytes = 64U << 20U;
 // A packet of SUBSCRIBE stays far below the 256 MB of the protocol, and below
 // what brokers take by default.
 constexpr std::size_t kTopicsAtOnce = 100;
@@ -195,6 +196,14 @@ void MqttClient::SetUp(const MqttOptions& options) {
       library_, [](mosquitto*, void* self, const mosquitto_message* message) {
         static_cast<MqttClient*>(self)->OnMessage(*message);
       });
+  // An error of TLS is but a number otherwise, whatever is wrong with which
+  // certificate.
+  mosquitto_log_callback_set(
+      library_, [](mosquitto*, void* self, int level, const char* text) {
+        if (level == MOSQ_LOG_ERR) {
+          static_cast<MqttClient*>(self)->refused_ = text;
+        }
+      });
 }
 
 MqttClient::~MqttClient() {
@@ -260,7 +269,7 @@ int MqttClient::Connect() {
 
 void MqttClient::SayLost(const std::string& why) {
   if (connected_.exchange(false)) {
-    events_.Push(MqttEvent{MqttEvent::Kind::kLost, {}, why, false});
+    events_.Push(MqttEvent{MqttEvent::Kind::kLost, {}, {}, false});
   }
   if (std::exchange(said_, why) != why) {
     log_(LogLevel::kWarning,
@@ -284,11 +293,13 @@ void MqttClient::OnConnect(int code) {
 }
 
 void MqttClient::OnMessage(const mosquitto_message& message) {
-  if (!events_.TryPush(
-          MqttEvent{MqttEvent::Kind::kMessage, message.topic,
-                    std::string(static_cast<const char*>(message.payload),
-                                static_cast<std::size_t>(message.payloadlen)),
-                    message.retain})) {
+  MqttEvent event{MqttEvent::Kind::kMessage, message.topic,
+                  std::string(static_cast<const char*>(message.payload),
+                              static_cast<std::size_t>(message.payloadlen)),
+                  message.retain};
+  const std::size_t size = event.size();
+  if ((waiting_ += size) > kQueueBytes || !events_.TryPush(std::move(event))) {
+    waiting_ -= size;
     ++dropped_;
   }
 }
@@ -296,8 +307,10 @@ void MqttClient::OnMessage(const mosquitto_message& message) {
 void MqttClient::Take(std::vector<MqttEvent>& events,
                       std::chrono::milliseconds timeout) {
   events_.PopAll(events, timeout);
-  taken_ += static_cast<std::uint64_t>(std::ranges::count(
-      events, MqttEvent::Kind::kConnected, &MqttEvent::kind));
+  for (const MqttEvent& event : events) {
+    taken_ += event.kind == MqttEvent::Kind::kConnected ? 1U : 0U;
+    waiting_ -= event.size();
+  }
 }
 
 void MqttClient::Subscribe(const std::vector<std::string>& topics) {

@@ -49,13 +49,14 @@ struct MqttEvent {
   enum class Kind : std::uint8_t { kConnected, kLost, kMessage };
   Kind kind{Kind::kMessage};
   std::string topic;
-  std::string payload;  ///< For kLost: why.
+  std::string payload;
   bool retained{false};
+  std::size_t size() const { return topic.size() + payload.size(); }
 };
 
 /// A connection to a broker that is made again whenever it is lost, after 1, 2,
 /// 4 ... 60 s. A thread of its own speaks with the broker; messages wait in
-/// a bounded queue, and are dropped and counted beyond it.
+/// a queue of at most 50 000 and 64 MiB, and are dropped and counted beyond it.
 class MqttClient {
  public:
   /// @param will makes the message that the broker publishes when this client
@@ -110,6 +111,7 @@ class MqttClient {
   std::atomic<std::uint64_t> connections_{0};
   std::uint64_t taken_{0};  // Connections; of the thread that takes.
   std::atomic<std::uint64_t> dropped_{0};
+  std::atomic<std::size_t> waiting_{0};  // Bytes in the queue.
   std::string refused_;  // Why the broker refused; of the thread.
   std::string said_;     // Last line logged; of the thread.
   std::jthread thread_;

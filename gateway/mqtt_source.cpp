@@ -28,6 +28,14 @@ const json* Find(const json& object, const std::string& key,
   return nullptr;
 }
 
+std::vector<std::string> NamesOf(const auto& topics) {
+  std::vector<std::string> names;
+  for (const auto& [name, tags] : topics) {
+    names.push_back(name);
+  }
+  return names;
+}
+
 }  // namespace
 
 importer::Said ReadPayload(const LiveTopic& topic, std::string_view payload,
@@ -101,24 +109,14 @@ MqttSource::MqttSource(const MqttOptions& options, LogSink log)
 }
 
 void MqttSource::Use(const LiveTable& table) {
-  const auto former = std::exchange(topics_, {});
-  std::vector<std::string> added;
+  auto former = std::exchange(topics_, {});
   for (const LiveTopic& topic : table.topics) {
-    auto& tags = topics_[topic.topic];
-    if (tags.empty() && !former.contains(topic.topic)) {
-      added.push_back(topic.topic);
-    }
-    tags.push_back(topic);
-  }
-  std::vector<std::string> gone;
-  for (const auto& [topic, tags] : former) {
-    if (!topics_.contains(topic)) {
-      gone.push_back(topic);
-    }
+    topics_[topic.topic].push_back(topic);
+    former.erase(topic.topic);
   }
   if (client_.connected()) {
-    client_.Unsubscribe(gone);
-    client_.Subscribe(added);
+    client_.Unsubscribe(NamesOf(former));
+    client_.Subscribe(NamesOf(topics_));
   }
 }
 
@@ -127,14 +125,9 @@ bool MqttSource::Poll(std::chrono::milliseconds timeout,
   client_.Take(events_, timeout);
   for (const MqttEvent& event : events_) {
     switch (event.kind) {
-      case MqttEvent::Kind::kConnected: {
-        std::vector<std::string> topics;
-        for (const auto& [topic, tags] : topics_) {
-          topics.push_back(topic);
-        }
-        client_.Subscribe(topics);
+      case MqttEvent::Kind::kConnected:
+        client_.Subscribe(NamesOf(topics_));
         break;
-      }
       case MqttEvent::Kind::kLost:
         handlers.ended(kSource);
         break;

@@ -117,8 +117,7 @@ Outgoing SparkplugNode::Next(const char* type, const std::string& device,
 
 Outgoing SparkplugNode::Birth() {
   seq_ = 0;
-  lives_.clear();
-  told_.clear();
+  devices_.clear();
   Payload payload;
   AddMetric("bdSeq", sparkplug::INT64, payload).set_long_value(bd_seq_ % 256);
   AddMetric("Node Control/Rebirth", sparkplug::BOOLEAN, payload)
@@ -143,11 +142,11 @@ std::vector<Outgoing> SparkplugNode::Tell(const Outgoing& message) {
   Json state = Json::parse(message.payload);
   const bool is_valve = state.contains("valve_id");
   const bool gone = is_valve && !state.contains("state");
-  const std::string device =
+  const std::string name =
       is_valve ? TopicLevel(state["valve_id"].get<std::string>()) : "";
-  const auto lives = lives_.try_emplace(device, !is_valve).first;
-  const bool birth =
-      is_valve && !lives->second && (!gone || !told_.contains(device));
+  auto& [lives, told] =
+      devices_.try_emplace(name, Device{!is_valve, {}}).first->second;
+  const bool birth = !lives && (!gone || told.empty());
   Payload payload;
   if (!is_valve) {
     Show(state, {"Monitor", sparkplug::STRING, "monitor"}, payload);
@@ -159,7 +158,6 @@ std::vector<Outgoing> SparkplugNode::Tell(const Outgoing& message) {
       Show(state, shown, payload);
     }
   }
-  std::vector<std::string>& told = told_[device];
   told.resize(static_cast<std::size_t>(payload.metrics_size()));
   Payload changed;
   for (std::size_t i = 0; i < told.size(); ++i) {
@@ -170,16 +168,16 @@ std::vector<Outgoing> SparkplugNode::Tell(const Outgoing& message) {
     }
   }
   std::vector<Outgoing> out;
-  if (changed.metrics_size() > 0 && (birth || lives->second)) {
+  if (changed.metrics_size() > 0 && (birth || lives)) {
     out.push_back(Next(birth      ? "DBIRTH"
                        : is_valve ? "DDATA"
                                   : "NDATA",
-                       device, std::move(changed)));
+                       name, std::move(changed)));
   }
-  if (gone && (birth || lives->second)) {
-    out.push_back(Next("DDEATH", device, {}));
+  if (gone && (birth || lives)) {
+    out.push_back(Next("DDEATH", name, {}));
   }
-  lives->second = !gone;
+  lives = !gone;
   return out;
 }
 

@@ -42,8 +42,11 @@ class SparkplugNode {
   std::string node_;
   std::atomic<std::uint64_t> bd_seq_;
   std::uint64_t seq_{0};
-  std::map<std::string, bool> lives_;                     // By device.
-  std::map<std::string, std::vector<std::string>> told_;  // Its metrics.
+  struct Device {
+    bool lives{false};
+    std::vector<std::string> told;  // Its metrics; empty before a birth.
+  };
+  std::map<std::string, Device> devices_;  // "": the node.
 };
 
 }  // namespace fdi::gateway

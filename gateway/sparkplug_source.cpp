@@ -165,7 +165,7 @@ void SparkplugHost::Take(const MqttEvent& event, Clock::time_point now,
     handlers.wrong(event.topic, why);
     return;
   }
-  if (nodes_.size() >= kMaxSources) {
+  if (nodes_.size() >= kMaxSources && !nodes_.contains(message.node)) {
     std::erase_if(nodes_, [](const auto& node) { return !node.second.born; });
   }
   Node& node = nodes_[message.node];
@@ -227,9 +227,7 @@ std::string SparkplugHost::Follow(const Message& message, Node& node,
   std::string why;
   if (message.type == "NBIRTH") {
     // Devices give birth after their node. One that does not falls silent.
-    std::erase_if(sources_, [&](const auto& source) {
-      return source.first.starts_with(message.node + "/");
-    });
+    EndNode(message.node, node, {});
     node.born = true;
     node.wanted = false;
     node.bd_seq = BdSeqOf(payload);
@@ -253,24 +251,30 @@ std::string SparkplugHost::Follow(const Message& message, Node& node,
   node.next_seq =
       ((payload.has_seq() ? payload.seq() : node.next_seq) + 1) % 256;
   if (message.type == "DDEATH") {
-    sources_.erase(message.source);
+    Forget(message.source, message.source, {});
     handlers.ended(message.source);
   }
   return {};
 }
 
-void SparkplugHost::EndNode(
-    const std::string& name, Node& node,
-    const std::function<void(std::string_view)>& ended) {
+void SparkplugHost::EndNode(const std::string& name, Node& node,
+                            const Ended& ended) {
   node.born = false;
-  std::erase_if(sources_, [&](const auto& source) {
-    const bool its =
-        source.first == name || source.first.starts_with(name + "/");
-    if (its && ended) {
-      ended(source.first);
+  Forget(name, name, ended);
+  Forget(name + '/', name + "/\xFF", ended);  // Names are UTF-8: no 0xFF.
+}
+
+// The sources from `first` to `last`, both included.
+void SparkplugHost::Forget(const std::string& first, const std::string& last,
+                           const Ended& ended) {
+  auto at = sources_.lower_bound(first);
+  while (at != sources_.end() && at->first <= last) {
+    kept_ -= at->second.size();
+    if (ended) {
+      ended(at->first);
     }
-    return its;
-  });
+    at = sources_.erase(at);
+  }
 }
 
 void SparkplugHost::Lose(const ReadingHandlers& handlers) {
@@ -293,7 +297,8 @@ std::string SparkplugHost::TagOf(const std::string& source,
 
 // @returns false if there are too many metrics with it.
 bool SparkplugHost::Learn(const Message& message) {
-  Source& source = sources_[message.source] = {};
+  Forget(message.source, message.source, {});
+  Source& source = sources_[message.source];
   for (const sparkplug::Metric& metric : message.payload.metrics()) {
     const std::string tag = TagOf(message.source, metric.name());
     if (!tag.empty()) {
@@ -303,11 +308,8 @@ bool SparkplugHost::Learn(const Message& message) {
       source.names[metric.alias()] = tag.empty() ? "" : metric.name();
     }
   }
-  std::size_t kept = 0;
-  for (const auto& [name, each] : sources_) {
-    kept += each.metrics.size() + each.names.size();
-  }
-  return kept <= kMaxMetrics;
+  kept_ += source.size();
+  return kept_ <= kMaxMetrics;
 }
 
 // False if another source that lives has the tag.

@@ -68,6 +68,7 @@ class SparkplugHost {
     std::unordered_map<std::uint64_t, std::string> names;
     std::int64_t stamp_ns{0};  // Its clock when it was heard last.
     Clock::time_point heard;
+    std::size_t size() const { return metrics.size() + names.size(); }
   };
   struct Message {
     std::string_view type;
@@ -83,8 +84,10 @@ class SparkplugHost {
             const ReadingHandlers& handlers);
   std::string TagOf(const std::string& source, const std::string& name) const;
   bool Owns(const std::string& source, const std::string& tag);
-  void EndNode(const std::string& name, Node& node,
-               const std::function<void(std::string_view)>& ended);
+  using Ended = std::function<void(std::string_view)>;
+  void EndNode(const std::string& name, Node& node, const Ended& ended);
+  void Forget(const std::string& first, const std::string& last,
+              const Ended& ended);
   void Ask(const std::string& name, Node& node, Clock::time_point now);
 
   std::string prefix_;
@@ -93,6 +96,7 @@ class SparkplugHost {
   std::set<std::string, std::less<>> tags_;
   std::map<std::string, Node> nodes_;
   std::map<std::string, Source> sources_;  // Nodes and devices that live.
+  std::size_t kept_{0};                    // The sum of their sizes.
   std::unordered_map<std::string, std::string> owners_;  // Sources, by tag.
   Clock::time_point beat_;
 };

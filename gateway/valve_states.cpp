@@ -73,10 +73,6 @@ std::string DescriptionOf(std::string_view answer) {
 
 }  // namespace
 
-std::string TopicPrefix(const std::string& site) {
-  return "fdi/" + TopicLevel(site) + "/";
-}
-
 std::string TopicLevel(std::string_view valve_id) {
   std::string level;
   for (const char c : valve_id) {
@@ -111,6 +107,18 @@ void ValveStates::Add(const Json& record, Clock::time_point now) {
   }
 }
 
+void ValveStates::TakeKept(const MqttEvent& event) {
+  std::string_view level = event.topic;
+  constexpr std::string_view kState = "/state";
+  if (!event.retained || event.payload.empty() || !level.starts_with(prefix_)) {
+    return;
+  }
+  level.remove_prefix(prefix_.size());
+  if (level.ends_with(kState)) {
+    Expect(ValveOfLevel(level.substr(0, level.size() - kState.size())));
+  }
+}
+
 std::vector<Outgoing> ValveStates::Due(std::int64_t now_ns,
                                        Clock::time_point now, bool missing) {
   std::vector<Outgoing> due;
@@ -136,15 +144,11 @@ std::vector<Outgoing> ValveStates::Due(std::int64_t now_ns,
   }
   for (const std::string& valve_id : expected_) {
     if (missing && !known.contains(valve_id)) {
-      Tell(prefix_ + TopicLevel(valve_id) + "/state",
-           {{"valve_id", valve_id},
-            {"group", GroupOf(valve_id)},
-            {"about",
-             findings::AboutJson(findings::IdentityOf(identities_, valve_id))},
-            {"health", "CHECK_FUNCTION"},
-            {"reason", "no monitor tells of it"},
-            {"alarms", AlarmsOf(valve_id)}},
-           Json(), now, due);
+      Json state = KnownOf(valve_id);
+      state["health"] = "CHECK_FUNCTION";
+      state["reason"] = "no monitor tells of it";
+      Tell(prefix_ + TopicLevel(valve_id) + "/state", std::move(state), Json(),
+           now, due);
     }
   }
   valves_ = known.size();
@@ -193,16 +197,17 @@ Json ValveStates::AlarmOf(const storage::Alarm& alarm) const {
            alarm.shelf ? time(alarm.shelf->until_ns) : Json()}};
 }
 
-Json ValveStates::AlarmsOf(const std::string& valve_id) const {
-  const auto found = alarms_.find(valve_id);
-  return found != alarms_.end() ? found->second
-         : has_history_         ? Json::array()
-                                : Json();
-}
-
-Json ValveStates::GroupOf(const std::string& valve_id) const {
-  const auto found = groups_.find(valve_id);
-  return found == groups_.end() ? Json() : Json(found->second);
+// All that is known of a valve beside what monitors tell.
+Json ValveStates::KnownOf(const std::string& valve_id) const {
+  const auto group = groups_.find(valve_id);
+  const auto alarms = alarms_.find(valve_id);
+  return {{"valve_id", valve_id},
+          {"group", group == groups_.end() ? Json() : Json(group->second)},
+          {"about",
+           findings::AboutJson(findings::IdentityOf(identities_, valve_id))},
+          {"alarms", alarms != alarms_.end() ? alarms->second
+                     : has_history_          ? Json::array()
+                                             : Json()}};
 }
 
 Json ValveStates::StateOf(const Json& row, bool monitored) const {
@@ -244,27 +249,25 @@ Json ValveStates::StateOf(const Json& row, bool monitored) const {
   const auto when = [&](bool shown, Json value) {
     return shown ? std::move(value) : Json();
   };
-  return {{"valve_id", valve_id},
-          {"group", GroupOf(valve_id)},
-          {"about",
-           findings::AboutJson(findings::IdentityOf(identities_, valve_id))},
-          {"health", health},
-          {"reason", reason},
-          {"state", state},
-          {"fault", row["fault"]},
-          {"name", when(alarm && !fault.empty(), words.name)},
-          {"description",
-           when(!DescriptionOf(fault).empty(), DescriptionOf(fault))},
-          {"certainty", row["certainty"]},
-          {"look_alikes", row["look_alikes"]},
-          {"strength_pct", when(row["strength"].is_number(),
-                                std::round(1000.0 * strength) / 10.0)},
-          {"severity", when(alarm, std::string(SeverityName(words.severity)))},
-          {"priority", when(alarm, PriorityOf(words.severity))},
-          {"since_utc", row["since_utc"]},
-          {"check", when(alarm && !fault.empty(), words.check)},
-          {"model_set", row["model_set"]},
-          {"alarms", AlarmsOf(valve_id)}};
+  Json known = KnownOf(valve_id);
+  known.update(
+      {{"health", health},
+       {"reason", reason},
+       {"state", state},
+       {"fault", row["fault"]},
+       {"name", when(alarm && !fault.empty(), words.name)},
+       {"description",
+        when(!DescriptionOf(fault).empty(), DescriptionOf(fault))},
+       {"certainty", row["certainty"]},
+       {"look_alikes", row["look_alikes"]},
+       {"strength_pct", when(row["strength"].is_number(),
+                             std::round(1000.0 * strength) / 10.0)},
+       {"severity", when(alarm, std::string(SeverityName(words.severity)))},
+       {"priority", when(alarm, PriorityOf(words.severity))},
+       {"since_utc", row["since_utc"]},
+       {"check", when(alarm && !fault.empty(), words.check)},
+       {"model_set", row["model_set"]}});
+  return known;
 }
 
 void ValveStates::Tell(const std::string& topic, Json state, const Json& as_of,

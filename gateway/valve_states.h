@@ -18,8 +18,6 @@
 
 namespace fdi::gateway {
 
-/// "fdi/SITE/": the topics of one plant.
-std::string TopicPrefix(const std::string& site);
 /// A valve in a topic: /, +, # and % as %2F, ...; and back.
 std::string TopicLevel(std::string_view valve_id);
 std::string ValveOfLevel(std::string_view level);
@@ -38,19 +36,22 @@ class ValveStates {
   ValveStates(report::FaultTexts texts, const std::string& site)
       : texts_(texts),
         table_(std::move(texts), true),
-        prefix_(TopicPrefix(site)) {}
+        prefix_("fdi/" + TopicLevel(site) + "/") {}
 
   /// @param record as WatchRecord::object; of any topic.
   void Add(const report::Json& record, Clock::time_point now);
   void Remove(const std::string& valve_id) { table_.Remove(valve_id); }
-  /// A valve that ought to be there: one of the plant's table, or one of which
-  /// the broker still tells from before the start.
+  /// A valve that ought to be there.
   void Expect(const std::string& valve_id) { expected_.insert(valve_id); }
-  void SetGroup(const std::string& valve_id, const std::string& group) {
+  /// States that a broker has kept from an earlier run: their valves may be
+  /// gone, but ought to be there.
+  std::string kept_topics() const { return prefix_ + "+/state"; }
+  void TakeKept(const MqttEvent& event);
+  /// Where and what the valve is; `about` of its state is
+  /// findings::AboutJson().
+  void Describe(const std::string& valve_id, const std::string& group,
+                const ValveIdentity& identity) {
     groups_[valve_id] = group;
-  }
-  /// Who the valve is; `about` of its state is findings::AboutJson().
-  void SetIdentity(const std::string& valve_id, const ValveIdentity& identity) {
     identities_[valve_id] = identity;
   }
   /// The alarms of all valves that somebody has still to see or that stand.
@@ -77,8 +78,7 @@ class ValveStates {
   };
   report::Json StateOf(const report::Json& row, bool monitored) const;
   report::Json AlarmOf(const storage::Alarm& alarm) const;
-  report::Json AlarmsOf(const std::string& valve_id) const;
-  report::Json GroupOf(const std::string& valve_id) const;
+  report::Json KnownOf(const std::string& valve_id) const;
   void Tell(const std::string& topic, report::Json state,
             const report::Json& as_of, Clock::time_point now,
             std::vector<Outgoing>& due);

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <limits>
 
 #include "base/text.h"
 #include "base/time_units.h"
@@ -111,10 +113,7 @@ void Assembler::Replace(std::vector<LiveValve> valves) {
     if (old == by_id.end()) {
       continue;
     }
-    valve.begun = old->second->begun;
-    valve.next_ns = old->second->next_ns;
-    valve.seq = old->second->seq;
-    valve.mode = old->second->mode;
+    static_cast<Progress&>(valve) = *old->second;
     for (Slot& slot : valve.slots) {
       const auto same =
           std::ranges::find_if(old->second->slots, [&](const Slot& other) {
@@ -142,7 +141,7 @@ Taken Assembler::Take(const TagReading& reading, const ArrivalTime& now) {
     ++tag.counts.bad;
     return Taken::kBadStamp;
   }
-  const std::size_t source = SourceOf(reading.source);
+  NamedSource& source = SourceOf(reading.source);
   Speak(source, stamp_ns, now);
   tag.counts.stamp_ns = std::max(tag.counts.stamp_ns, stamp_ns);
   if (std::exchange(tag.counts.silent, false) &&
@@ -160,8 +159,8 @@ Taken Assembler::Take(const TagReading& reading, const ArrivalTime& now) {
       held = Held{.quality = SignalQuality::kBad};
     }
     held->stamp_ns = stamp_ns;
-    held->connection = sources_[source].connection;
-    slot.source = source;
+    held->connection = source.second.connection;
+    slot.source = &source;
     if (valve.begun && stamp_ns <= valve.next_ns - options_.period_ns) {
       late = true;
       if (slot.held && stamp_ns < slot.held->stamp_ns) {
@@ -219,37 +218,35 @@ void Assembler::Alive(std::string_view source,
                       const ArrivalTime& now) {
   const std::int64_t stamp = stamp_ns.value_or(now.utc_ns);
   if (stamp >= kFirstStampNs && stamp <= now.utc_ns + kAheadNs) {
-    const std::size_t index = SourceOf(source);
-    sources_[index].beats = true;
-    Speak(index, stamp, now);
+    NamedSource& found = SourceOf(source);
+    found.second.beats = true;
+    Speak(found, stamp, now);
   }
 }
 
 void Assembler::End(std::string_view name) {
-  for (Source& source : sources_) {
-    if (source.name == name && !source.ended) {
-      source.ended = true;
-      source.cut_ns = source.newest_ns;
-      ++source.connection;
-    }
+  const auto found = sources_.find(name);
+  if (found != sources_.end() && !found->second.ended) {
+    Source& source = found->second;
+    source.ended = true;
+    source.cut_ns = source.newest_ns;
+    ++source.connection;
   }
 }
 
-std::size_t Assembler::SourceOf(std::string_view name) {
-  const auto found = std::ranges::find(sources_, name, &Source::name);
-  if (found != sources_.end()) {
-    return static_cast<std::size_t>(found - sources_.begin());
-  }
-  sources_.emplace_back().name = name;
-  return sources_.size() - 1;
+Assembler::NamedSource& Assembler::SourceOf(std::string_view name) {
+  const auto found = sources_.find(name);
+  return found != sources_.end()
+             ? *found
+             : *sources_.try_emplace(std::string(name)).first;
 }
 
-void Assembler::Speak(std::size_t index, std::int64_t stamp_ns,
+void Assembler::Speak(NamedSource& named, std::int64_t stamp_ns,
                       const ArrivalTime& now) {
-  Source& source = sources_[index];
+  auto& [name, source] = named;
   const std::int64_t since_ns = now.steady_ns - source.heard_ns;
   if (std::exchange(source.silent, false)) {
-    Note(NoteKind::kSourceBack, source.name, since_ns);
+    Note(NoteKind::kSourceBack, name, since_ns);
   }
   if (source.newest_ns == 0) {
     source.newest_ns = stamp_ns;
@@ -258,8 +255,8 @@ void Assembler::Speak(std::size_t index, std::int64_t stamp_ns,
   // After a lost connection a step is no leap, because time has passed.
   const std::int64_t leap_ns = std::max(kLeapNs, 10 * options_.period_ns);
   if (step_ns > leap_ns && step_ns > 2 * since_ns) {
-    Note(NoteKind::kClockLeaps, source.name, step_ns);
-    BeginGap(index, source.newest_ns, stamp_ns);
+    Note(NoteKind::kClockLeaps, name, step_ns);
+    BeginGap(named, source.newest_ns, stamp_ns);
   }
   if (step_ns >= -options_.lateness_ns) {
     source.behind = 0;
@@ -269,8 +266,8 @@ void Assembler::Speak(std::size_t index, std::int64_t stamp_ns,
     source.behind_since_ns = source.behind_since_ns.value_or(now.steady_ns);
     if (source.behind >= kBackReadings ||
         now.steady_ns - *source.behind_since_ns >= options_.lateness_ns) {
-      Note(NoteKind::kClockBack, source.name, step_ns);
-      RunBack(index, stamp_ns);
+      Note(NoteKind::kClockBack, name, step_ns);
+      RunBack(named, stamp_ns);
     }
   }
   if (step_ns > 0) {
@@ -285,11 +282,11 @@ void Assembler::Speak(std::size_t index, std::int64_t stamp_ns,
   source.heard_ns = now.steady_ns;
 }
 
-void Assembler::BeginGap(std::size_t source, std::int64_t from_ns,
+void Assembler::BeginGap(const NamedSource& source, std::int64_t from_ns,
                          std::int64_t to_ns) {
   for (Valve& valve : valves_) {
     if (std::ranges::any_of(valve.slots, [&](const Slot& slot) {
-          return slot.source == source;
+          return slot.source == &source;
         })) {
       valve.gap_from_ns = from_ns;
       valve.gap_to_ns = to_ns;
@@ -299,8 +296,8 @@ void Assembler::BeginGap(std::size_t source, std::int64_t from_ns,
 
 // The clock of the source was set back. Its earlier readings have stamps that
 // are yet to come, so the valves start again with its present readings.
-void Assembler::RunBack(std::size_t index, std::int64_t stamp_ns) {
-  Source& source = sources_[index];
+void Assembler::RunBack(NamedSource& named, std::int64_t stamp_ns) {
+  Source& source = named.second;
   source.newest_ns = stamp_ns;
   source.settled_ns = stamp_ns;
   source.cut_ns = stamp_ns;
@@ -309,7 +306,7 @@ void Assembler::RunBack(std::size_t index, std::int64_t stamp_ns) {
   for (Valve& valve : valves_) {
     bool concerned = false;
     for (Slot& slot : valve.slots) {
-      if (slot.source == index) {
+      if (slot.source == &named) {
         concerned = true;
         std::erase_if(slot.pending, [&](const Held& held) {
           return held.stamp_ns > stamp_ns;
@@ -328,19 +325,13 @@ void Assembler::RunBack(std::size_t index, std::int64_t stamp_ns) {
 }
 
 void Assembler::Advance(const ArrivalTime& now, const Sink& sink) {
-  for (Source& source : sources_) {
-    const std::int64_t since_ns = now.steady_ns - source.heard_ns;
-    if (!source.silent && (source.ended || since_ns > Silence(source))) {
-      source.silent = true;
-      Note(NoteKind::kSourceSilent, source.name, since_ns);
-    }
-  }
+  Settle(now);
   for (Valve& valve : valves_) {
     std::int64_t trail_ns = std::numeric_limits<std::int64_t>::max();
     std::int64_t clock_ns = std::numeric_limits<std::int64_t>::min();
     for (const Slot& slot : valve.slots) {
-      if (slot.source != kNone) {
-        const Source& source = sources_[slot.source];
+      if (slot.source != nullptr) {
+        const Source& source = slot.source->second;
         if (!source.ended) {
           trail_ns = std::min(trail_ns, source.settled_ns);
         }
@@ -357,8 +348,33 @@ void Assembler::Advance(const ArrivalTime& now, const Sink& sink) {
             : trail_ns - 1;
     WriteUpTo(std::max(known_ns, clock_ns - options_.lateness_ns), valve, sink);
   }
-  for (Source& source : sources_) {
+  for (auto& [name, source] : sources_) {
     source.settled_ns = source.newest_ns;
+  }
+}
+
+// A source that falls silent is said, and forgotten unless a tag waits for its
+// next word: whoever makes up names must not fill the memory.
+void Assembler::Settle(const ArrivalTime& now) {
+  for (auto& [name, source] : sources_) {
+    source.read = false;
+  }
+  for (const Valve& valve : valves_) {
+    for (const Slot& slot : valve.slots) {
+      if (slot.source != nullptr) {
+        slot.source->second.read = true;
+      }
+    }
+  }
+  for (auto at = sources_.begin(); at != sources_.end();) {
+    auto& [name, source] = *at;
+    const std::int64_t since_ns = now.steady_ns - source.heard_ns;
+    const bool silent = source.ended || since_ns > Silence(source);
+    if (silent && source.read && !source.silent) {
+      Note(NoteKind::kSourceSilent, name, since_ns);
+    }
+    source.silent = source.silent || silent;
+    at = source.silent && !source.read ? sources_.erase(at) : std::next(at);
   }
 }
 
@@ -366,8 +382,8 @@ void Assembler::Finish(const Sink& sink) {
   for (Valve& valve : valves_) {
     std::int64_t lead_ns = std::numeric_limits<std::int64_t>::min();
     for (const Slot& slot : valve.slots) {
-      if (slot.source != kNone) {
-        lead_ns = std::max(lead_ns, sources_[slot.source].newest_ns);
+      if (slot.source != nullptr) {
+        lead_ns = std::max(lead_ns, slot.source->second.newest_ns);
       }
     }
     WriteUpTo(lead_ns, valve, sink);
@@ -472,7 +488,7 @@ std::optional<Assembler::Held> Assembler::Current(std::int64_t instant_ns,
     }
     return held;
   }
-  const Source& source = sources_[slot.source];
+  const Source& source = slot.source->second;
   const std::int64_t until_ns = held.connection == source.connection
                                     ? source.newest_ns + Silence(source)
                                     : source.cut_ns;
@@ -480,17 +496,17 @@ std::optional<Assembler::Held> Assembler::Current(std::int64_t instant_ns,
   return instant_ns <= until_ns ? std::optional(held) : std::nullopt;
 }
 
-void Assembler::ForEachTag(
-    const std::function<void(const std::string&, const TagCounts&)>& each)
-    const {
+std::map<std::string, TagCounts> Assembler::tags() const {
+  std::map<std::string, TagCounts> tags;
   for (const auto& [name, tag] : tags_) {
-    each(name, tag.counts);
+    tags[name] = tag.counts;
   }
+  return tags;
 }
 
 std::pair<std::size_t, std::size_t> Assembler::sources() const {
   const auto alive = std::ranges::count_if(
-      sources_, [](const Source& source) { return !source.silent; });
+      sources_, [](const auto& source) { return !source.second.silent; });
   return {static_cast<std::size_t>(alive), sources_.size()};
 }
 

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <deque>
 #include <functional>
-#include <limits>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -136,16 +136,13 @@ class Assembler {
 
   /// True if a valve has this tag.
   bool Knows(std::string_view tag) const { return tags_.contains(tag); }
-  /// Calls with each tag and its counts, in no order.
-  void ForEachTag(const std::function<void(const std::string&,
-                                           const TagCounts&)>& each) const;
-  /// Sources that are alive, and all.
+  std::map<std::string, TagCounts> tags() const;
+  /// Sources that are alive, and those with others that a tag waits for.
   std::pair<std::size_t, std::size_t> sources() const;
   std::size_t valves() const { return valves_.size(); }
 
  private:
   struct Source {
-    std::string name;
     std::int64_t newest_ns{0};   // Stamp of its last word.
     std::int64_t settled_ns{0};  // The same at the last Advance().
     std::int64_t heard_ns{0};    // Steady time of it.
@@ -153,12 +150,14 @@ class Assembler {
     std::uint32_t connection{0};
     bool ended{false};
     bool silent{false};
+    bool read{false};       // It was the last to speak of some tag.
     bool beats{false};      // It says that it lives.
     double step_ns{0.0};    // Between its words, the mean,
     double spread_ns{0.0};  // and the mean deviation from that.
     std::optional<std::int64_t> behind_since_ns;  // Steady.
     int behind{0};                                // Readings in a row.
   };
+  using NamedSource = std::pair<const std::string, Source>;
   struct Held {
     std::int64_t stamp_ns{0};
     double value{0.0};  // For a mode, its number.
@@ -173,13 +172,11 @@ class Assembler {
     std::optional<ColumnMapping> mapping;  // Nothing: the mode.
     std::string tag;
     TagCounts* counts{nullptr};
-    std::size_t source{kNone};
+    NamedSource* source{nullptr};
     std::optional<Held> held;
     std::deque<Held> pending;  // One for each instant that is not written.
   };
-  struct Valve {
-    LiveValve valve;
-    std::vector<Slot> slots;
+  struct Progress {
     bool begun{false};
     std::int64_t next_ns{0};
     std::uint64_t seq{0};
@@ -189,18 +186,24 @@ class Assembler {
     std::int64_t gap_from_ns{0};
     std::int64_t gap_to_ns{0};
   };
+  struct Valve : Progress {
+    LiveValve valve;
+    std::vector<Slot> slots;
+  };
   struct TextHash {
     using is_transparent = void;
     std::size_t operator()(std::string_view text) const {
       return std::hash<std::string_view>()(text);
     }
   };
-  static constexpr std::size_t kNone = std::numeric_limits<std::size_t>::max();
 
-  std::size_t SourceOf(std::string_view name);
-  void Speak(std::size_t source, std::int64_t stamp_ns, const ArrivalTime& now);
-  void RunBack(std::size_t source, std::int64_t stamp_ns);
-  void BeginGap(std::size_t source, std::int64_t from_ns, std::int64_t to_ns);
+  NamedSource& SourceOf(std::string_view name);
+  void Speak(NamedSource& source, std::int64_t stamp_ns,
+             const ArrivalTime& now);
+  void RunBack(NamedSource& source, std::int64_t stamp_ns);
+  void BeginGap(const NamedSource& source, std::int64_t from_ns,
+                std::int64_t to_ns);
+  void Settle(const ArrivalTime& now);
   std::optional<Held> HeldOf(const Valve& valve, const Slot& slot,
                              const TagReading& reading) const;
   void Keep(Slot& slot, const Held& held) const;
@@ -217,7 +220,7 @@ class Assembler {
   AssemblerOptions options_;
   Notes notes_;
   std::vector<Valve> valves_;
-  std::vector<Source> sources_;
+  std::unordered_map<std::string, Source, TextHash, std::equal_to<>> sources_;
   std::unordered_map<std::string, Tag, TextHash, std::equal_to<>> tags_;
 };
 

@@ -87,6 +87,9 @@ void JudgeTiming(Sniffed& found) {
   if (found.compressed) {
     how = found.map.long_table ? "s:linear:10min" : "s:hold:10min";
     period = std::max(period, 1.0);
+    found.choices.push_back(
+        "resample: linear is right after a swinging door, hold after a dead "
+        "band, which the file does not say");
   } else if (period > 1.0 && period <= 10.0 && times.size() < 1200) {
     how += ":" + NumberText(3.0 * period) + "s";
     period = 1.0;
@@ -249,7 +252,8 @@ std::string FileToml(const Sniffed& found) {
     text += "missing = " + TomlList(map.no_reading) + Choice(found, "missing");
   }
   if (!found.resample.empty()) {
-    text += "resample = " + TomlText(found.resample) + "\n";
+    text +=
+        "resample = " + TomlText(found.resample) + Choice(found, "resample");
   }
   return text;
 }

@@ -5,6 +5,8 @@
 namespace fdi::monitor {
 namespace {
 
+constexpr std::size_t kMaxKinds = 10'000;
+
 std::string IdName(LogId id) {
   return "M" + std::to_string(static_cast<int>(id));
 }
@@ -29,6 +31,15 @@ bool LogLimit::Admit(std::string_view kind, std::uint64_t& not_shown) {
   const MutexLock lock(mutex_);
   auto place = windows_.find(kind);
   if (place == windows_.end()) {
+    if (windows_.size() >= kMaxKinds && now - swept_ >= options_.interval) {
+      swept_ = now;
+      std::erase_if(windows_, [&](const auto& window) {
+        return now - window.second.begin >= options_.interval;
+      });
+    }
+    if (windows_.size() >= kMaxKinds) {
+      return false;
+    }
     place = windows_.emplace(std::string(kind), Window{}).first;
   }
   Window& window = place->second;

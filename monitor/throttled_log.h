@@ -59,7 +59,9 @@ struct LogLimitOptions {
   std::chrono::milliseconds interval{10'000};
 };
 
-/// Counts lines by kind and decides which to show. Thread safe.
+/// Counts lines by kind and decides which to show. It remembers 10 000 kinds
+/// and shows no more of them in an interval, because others may make up their
+/// names. Thread safe.
 class LogLimit {
  public:
   explicit LogLimit(const LogLimitOptions& options) : options_(options) {}
@@ -78,6 +80,7 @@ class LogLimit {
   LogLimitOptions options_;
   Mutex mutex_;
   std::map<std::string, Window, std::less<>> windows_ GUARDED_BY(mutex_);
+  std::chrono::steady_clock::time_point swept_ GUARDED_BY(mutex_);
 };
 
 /// Writes lines with the ids above: the first of each id immediately, and then

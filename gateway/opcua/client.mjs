@@ -13,10 +13,11 @@ import {parseArgs} from 'node:util';
 
 console.log = console.error;  // The library talks there; stdout has readings.
 const opcua = await import('node-opcua-client');
+const {OPCUACertificateManager} = await import('node-opcua-certificate-manager');
 
 const usage = 'usage: client.mjs PLANT.toml --endpoint opc.tcp://HOST:PORT ' +
   '[--node "ns=1;s={tag}"] [--user NAME] [--security Basic256Sha256] ' +
-  '[--interval MS] [--stamps source|server]';
+  '[--interval MS] [--stamps source|server] [--pki FOLDER]';
 const {values: options, positionals} = parseArgs({allowPositionals: true,
   options: {
     endpoint: {type: 'string'},
@@ -27,6 +28,7 @@ const {values: options, positionals} = parseArgs({allowPositionals: true,
     security: {type: 'string'},
     interval: {type: 'string', default: '250'},
     stamps: {type: 'string', default: 'source'},
+    pki: {type: 'string', default: `${process.env.FDI_DATA ?? 'fdi-data'}/opcua-client`},
   }});
 if (positionals.length !== 1 || !options.endpoint) {
   console.error(usage);
@@ -45,6 +47,8 @@ for (const signal of ['SIGTERM', 'SIGINT']) process.on(signal, () => stop('stopp
 process.stdout.on('error', () => stop('nobody reads the readings'));
 let reload = () => {};
 process.on('SIGHUP', () => reload('the table is read again'));
+// The library throws beside all promises when a session ends while it subscribes.
+process.on('uncaughtException', error => reload(error.message.split('\n')[0]));
 
 // One program reads the table, so that a tag here is a tag there.
 function readTags() {
@@ -97,7 +101,7 @@ async function subscribe(session, tags, heard) {
   const subscription = await session.createSubscription2({
     requestedPublishingInterval: intervalMs, requestedMaxKeepAliveCount: 4,
     requestedLifetimeCount: 100, publishingEnabled: false});
-  const byHandle = new Map();
+  const byHandle = new Map(), refused = [];
   subscription.on('raw_notification', ({notificationData}) => {
     heard();
     const items = (notificationData ?? []).flatMap(data => data.monitoredItems ?? []);
@@ -110,9 +114,11 @@ async function subscribe(session, tags, heard) {
       const now = newestMs + performance.now() - saidAt;
       lines.push(JSON.stringify({alive: new Date(now).toISOString()}));
     }
+    // In the time of the server: a later stamp would end the wait for its readings.
+    if (newestMs > 0)
+      lines.push(...refused.splice(0).map(tag => JSON.stringify({tag, t: new Date(newestMs), q: 'bad'})));
     write(lines);
   });
-  const refused = [];
   for (let begin = 0; begin < tags.length; begin += itemsAtOnce) {
     const some = tags.slice(begin, begin + itemsAtOnce);
     const group = await subscription.monitorItems(
@@ -126,7 +132,6 @@ async function subscribe(session, tags, heard) {
         refused.push(some[i]), say(`tag ${some[i]}: ${item.statusCode.name}`);
     });
   }
-  write(refused.map(tag => JSON.stringify({tag, q: 'bad'})));
   if (byHandle.size === 0) throw Error('the server has none of the tags');
   await subscription.setPublishingMode(true);
   say(`${byHandle.size} of ${tags.length} tags`);
@@ -138,6 +143,9 @@ async function follow(tags) {
   const client = opcua.OPCUAClient.create({
     applicationName: 'fdi gateway', endpointMustExist: false,
     connectionStrategy: {maxRetry: 0},
+    // A server is who somebody has trusted; the default of the library trusts anybody.
+    clientCertificateManager: options.security && new OPCUACertificateManager({
+      rootFolder: options.pki, automaticallyAcceptUnknownCertificate: false}),
     securityMode: opcua.MessageSecurityMode[options.security ? 'SignAndEncrypt' : 'None'],
     securityPolicy: opcua.SecurityPolicy[options.security ?? 'None'],
   });
@@ -174,9 +182,14 @@ async function follow(tags) {
   return subscribed;
 }
 
-for (let pauseS = 1; !why; pauseS = Math.min(60, 2 * pauseS)) {
-  if (await follow(readTags())) pauseS = 1, ++count.reconnects;
-  await Promise.race([stopped, wait(pauseS)]);
+try {
+  for (let pauseS = 1; !why; pauseS = Math.min(60, 2 * pauseS)) {
+    if (await follow(readTags())) pauseS = 1, ++count.reconnects;
+    await Promise.race([stopped, wait(pauseS)]);
+  }
+} catch (error) {  // A table that cannot be read.
+  stop(error.message.split('\n')[0]);
+  say(why);
 }
 await Promise.race([drained, wait(1)]);
 process.exit(why === 'stopped' ? 0 : 1);

@@ -14,7 +14,6 @@
 #include "base/time_text.h"
 #include "diagnosis/records/valve_glob.h"
 #include "gateway/duties.h"
-#include "gateway/live_table.h"
 #include "gateway/mqtt_client.h"
 #include "gateway/sparkplug_node.h"
 #include "gateway/valve_states.h"
@@ -44,29 +43,6 @@ struct OutOptions {
   std::string site{"plant"};
   std::string valves{"*"};
   std::string http;
-};
-
-// States that the broker has kept from an earlier run: these valves may be
-// gone.
-class Former {
- public:
-  explicit Former(const std::string& prefix) : prefix_(prefix) {}
-  std::string pattern() const { return prefix_ + "+/state"; }
-  void Take(const MqttEvent& event) {
-    constexpr std::string_view kState = "/state";
-    if (event.retained && event.topic.starts_with(prefix_) &&
-        event.topic.ends_with(kState) && !event.payload.empty()) {
-      valves_.push_back(ValveOfLevel(
-          std::string_view(event.topic)
-              .substr(prefix_.size(),
-                      event.topic.size() - prefix_.size() - kState.size())));
-    }
-  }
-  const std::vector<std::string>& valves() const { return valves_; }
-
- private:
-  std::string prefix_;
-  std::vector<std::string> valves_;
 };
 
 // The alarms as operators have left them, from the history of a monitor on this
@@ -119,29 +95,45 @@ class Outlet {
   virtual void End(const Outgoing& farewell) = 0;
 };
 
+// To a broker; with --sparkplug as an edge node.
 class BrokerOutlet : public Outlet {
  public:
   BrokerOutlet(const OutOptions& options, const Outgoing& will,
                const LogSink& log)
       : client_(
-            options.mqtt, [will] { return will; }, log),
-        former_(TopicPrefix(options.site)) {
+            options.mqtt, [this, will] { return node_ ? node_->Will() : will; },
+            log) {
+    if (!options.mqtt.sparkplug.empty()) {
+      node_.emplace(options.mqtt.sparkplug, options.site);
+    }
     client_.Start();
   }
   bool Publish(const Outgoing& message) override {
-    return client_.Publish(message);
+    if (!node_) {
+      return client_.Publish(message);
+    }
+    bool sent = false;
+    for (const Outgoing& part : node_->Tell(message)) {
+      sent = client_.Publish(part);
+    }
+    return sent;
   }
   bool Ready(ValveStates& states) override {
     client_.Take(events_, std::chrono::milliseconds(0));
+    bool begin = false;
     for (const MqttEvent& event : events_) {
-      former_.Take(event);
       if (event.kind == MqttEvent::Kind::kConnected) {
-        client_.Subscribe({former_.pattern()});
-        states.Forget();
+        client_.Subscribe({node_ ? node_->commands() : states.kept_topics()});
+        begin = true;
       }
+      states.TakeKept(event);
+      begin = begin || (node_ && SparkplugNode::AsksForBirth(event.payload));
     }
-    for (const std::string& valve_id : former_.valves()) {
-      states.Expect(valve_id);
+    if (begin) {
+      if (node_) {
+        client_.Publish(node_->Birth());
+      }
+      states.Forget();
     }
     return client_.connected();
   }
@@ -150,60 +142,12 @@ class BrokerOutlet : public Outlet {
     return Clock::now() - start_ >= kAcquainted;
   }
   void End(const Outgoing& farewell) override {
-    client_.Publish(farewell);
+    client_.Publish(node_ ? node_->Death() : farewell);
     client_.Stop();
   }
 
  private:
-  MqttClient client_;
-  Former former_;
-  std::vector<MqttEvent> events_;
-  Clock::time_point start_{Clock::now()};
-};
-
-// The same states as an edge node of Sparkplug B.
-class SparkplugOutlet : public Outlet {
- public:
-  SparkplugOutlet(const OutOptions& options, const LogSink& log)
-      : node_(options.mqtt.sparkplug, options.site),
-        client_(
-            options.mqtt, [this] { return node_.Will(); }, log) {
-    client_.Start();
-  }
-  bool Publish(const Outgoing& message) override {
-    bool sent = false;
-    for (const Outgoing& part : node_.Tell(message)) {
-      sent = client_.Publish(part);
-    }
-    return sent;
-  }
-  bool Ready(ValveStates& states) override {
-    client_.Take(events_, std::chrono::milliseconds(0));
-    bool birth = false;
-    for (const MqttEvent& event : events_) {
-      if (event.kind == MqttEvent::Kind::kConnected) {
-        client_.Subscribe({node_.commands()});
-        birth = true;
-      }
-      birth = birth || (event.kind == MqttEvent::Kind::kMessage &&
-                        SparkplugNode::AsksForBirth(event.payload));
-    }
-    if (birth) {
-      client_.Publish(node_.Birth());
-      states.Forget();
-    }
-    return client_.connected();
-  }
-  bool KnowsAll() const override {
-    return Clock::now() - start_ >= kAcquainted;
-  }
-  void End(const Outgoing& /*farewell*/) override {
-    client_.Publish(node_.Death());
-    client_.Stop();
-  }
-
- private:
-  SparkplugNode node_;
+  std::optional<SparkplugNode> node_;
   MqttClient client_;
   std::vector<MqttEvent> events_;
   Clock::time_point start_{Clock::now()};
@@ -254,9 +198,6 @@ std::unique_ptr<Outlet> OpenOutlet(const OutOptions& options,
   if (!options.lines.empty()) {
     return std::make_unique<LineOutlet>(options.lines);
   }
-  if (!options.mqtt.sparkplug.empty()) {
-    return std::make_unique<SparkplugOutlet>(options, log);
-  }
   return std::make_unique<BrokerOutlet>(options, will, log);
 }
 
@@ -265,20 +206,11 @@ void ExpectTable(const OutOptions& options, ValveStates& states) {
   if (options.plant.empty()) {
     return;
   }
-  const LiveTable table = ReadLiveTable(options.plant, false);
-  for (const importer::LiveValve& valve : table.valves) {
-    if (GlobMatches(options.valves, valve.id)) {
-      states.Expect(valve.id);
-      states.SetGroup(valve.id, valve.group);
-    }
-  }
   for (const importer::PlantRow& row :
        importer::ReadPlantTable(options.plant).rows) {
-    states.SetIdentity(row.name, row);
-  }
-  for (const RefusedRow& row : table.refused) {
-    if (GlobMatches(options.valves, row.name)) {
+    if (!row.name.empty() && GlobMatches(options.valves, row.name)) {
       states.Expect(row.name);
+      states.Describe(row.name, row.group, row);
     }
   }
 }
@@ -321,12 +253,10 @@ int RunOut(const OutOptions& options, const report::Context& context) {
     }
     duties.Tick([&] {
       return std::vector<Metric>{
-          {"valves", "Valves that are told of.",
-           static_cast<double>(states.valves())},
-          {"published_total", "Messages that went out.",
-           static_cast<double>(published)},
+          {"valves", "Valves that are told of.", states.valves()},
+          {"published_total", "Messages that went out.", published},
           {"broker_connected", "1 while there is a connection.",
-           connected ? 1.0 : 0.0}};
+           connected ? 1U : 0U}};
     });
   }
   outlet->End(farewell);

@@ -80,10 +80,11 @@ grep -q "row_refused valve=V4.*x_unit is" gateway.log || fail "V4 is not refused
 grep -q "^samples: *360" gateway.txt || fail "$(cat gateway.txt)"
 rm "$FDI_DATA"/runs.db* "$FDI_DATA"/history.db*
 
-# Live: V3 is silent from its sixth second on.
-start --record --model-set quick
+# Live: V3 is silent from its sixth second on. The monitor reads one group.
+sed -i '1s/$/\ngroup = "A"/' plant.toml
+start --record --model-set quick --partition A
 mkfifo pipe
-"$bin/fdi-gateway" --domain "$domain" in --plant plant.toml --lines pipe \
+"$bin/fdi-gateway" --domain "$domain" in --plant plant.toml --by-group --lines pipe \
   >gateway.txt 2>live.log &
 gateway=$!
 exec 3>pipe
@@ -98,20 +99,24 @@ feed() {  # The readings up to now.
   done
 }
 fed=-1
-while [ $fed -lt 16 ]; do
-  feed
-  sleep 0.3
-done
+feed_until() {  # ROW
+  while [ $fed -lt "$1" ]; do
+    feed
+    sleep 0.3
+  done
+}
+feed_until 16
 grep -q "source_silent name=plc-V3" live.log || fail "V3 is not said to be silent"
 ! grep -q "source_silent name=plc-V[12]" live.log || fail "V1 or V2 is silent"
 await 20 grep -q "valve=V3.*missing_signal\|missing_signal.*valve=V3" monitor.log
 ! grep "missing_signal" monitor.log | grep -q "valve=V[12]" ||
   fail "V1 or V2 lacks signals"
 
-# A valve less, and the others go on.
-sed -i '/"V2"/d; s/^name = "V4"/name = "V2"\nx_unit = "%"\n[[loop]]\n&/' plant.toml
+# A valve less, one in another group, and the others go on.
+sed -i '/"V2"/d; s/^name = "V4"/name = "V2"\ngroup = "B"\n[[loop]]\n&/' plant.toml
 kill -HUP $gateway
 await 20 grep -q "table_read.*refused=2" live.log
+feed_until $((fed + 6))
 exec 3>&-
 wait $gateway || fail "the gateway ended with $?"
 gateway=
@@ -120,4 +125,9 @@ seen=$(sqlite3 -readonly "$FDI_DATA/runs.db" \
   "select group_concat(valve_id || ' ' || (samples > 12)) from
    (select valve_id, sum(samples) samples from run group by 1 order by 1)")
 [ "$seen" = "V1 1,V2 1,V3 0" ] || fail "recorded: $seen"
+last_of() {  # VALVE
+  sqlite3 -readonly "$FDI_DATA/runs.db" \
+    "select max(last_stamp_ns) / 1000000000 from run where valve_id = '$1'"
+}
+[ $(($(last_of V1) - $(last_of V2))) -ge 4 ] || fail "V2 is read beyond its group"
 echo "lines: the same by file and by lines; V3 silent alone"

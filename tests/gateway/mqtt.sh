@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # A broker, `fdi-gateway in` and `out`, a monitor: readings come by topics, the
-# findings go out; the broker is killed and comes back.
+# findings go out; the broker's certificate expires, it refuses, is killed and comes back.
 # Usage: mqtt.sh FOLDER-OF-PROGRAMS      77 without mosquitto.
 set -euo pipefail
 PATH=$PATH:/usr/sbin:/usr/local/sbin
@@ -58,6 +58,31 @@ name = "V1"
 [[loop]]
 name = "V2"
 END
+# A certificate of the broker that has expired is said, and a new one goes.
+openssl req -x509 -newkey rsa:2048 -nodes -keyout ca.key -out ca.pem -subj /CN=ca 2>/dev/null
+openssl req -newkey rsa:2048 -nodes -keyout broker.key -out broker.csr -subj /CN=127.0.0.1 \
+  -addext subjectAltName=IP:127.0.0.1 2>/dev/null
+certify() {  # DAYS
+  openssl x509 -req -in broker.csr -CA ca.pem -CAkey ca.key -copy_extensions copy -days "$1" \
+    -out broker.pem 2>/dev/null
+}
+certify -1
+printf 'listener %s 127.0.0.1\nuser %s\nallow_anonymous true\ncertfile broker.pem\nkeyfile broker.key\n' \
+  $port "$(id -un)" >broker.conf
+mosquitto -c broker.conf >broker.out 2>&1 &
+broker=$!
+"$bin/fdi-gateway" --domain "$domain" in --plant plant.toml --mqtt "mqtts://127.0.0.1:$port" \
+  --ca ca.pem 2>expired.log &
+in=$!
+await 20 'broker_lost.*certificate verify failed' expired.log
+certify 1
+kill -HUP $broker
+await 20 broker_connected expired.log
+kill $in
+wait $in || fail "in ended with $?"
+kill $broker
+wait $broker || true
+
 start_broker
 start --model-set quick
 echo wrong >password

@@ -3,6 +3,8 @@
 
 #include <array>
 #include <semaphore>
+#include <thread>
+#include <utility>
 #include <vector>
 
 #include <arpa/inet.h>
@@ -113,6 +115,19 @@ class Broker {
     constexpr std::array<char, 4> kConnack{0x20, 2, 0, 0};
     EXPECT_EQ(send(client_, kConnack.data(), kConnack.size(), 0), 4);
   }
+  void Publish(std::size_t size) {  // Of 16 KiB to 2 MiB, with topic "t".
+    const std::size_t rest = size + 3;
+    std::string packet{0x30,
+                       static_cast<char>(rest | 0x80U),
+                       static_cast<char>((rest >> 7U) | 0x80U),
+                       static_cast<char>(rest >> 14U),
+                       0,
+                       1,
+                       't'};
+    packet.append(size, 'x');
+    EXPECT_EQ(send(client_, packet.data(), packet.size(), MSG_NOSIGNAL),
+              static_cast<ssize_t>(packet.size()));
+  }
   void Drop() { close(std::exchange(client_, -1)); }
   std::string url() const {
     return "mqtt://127.0.0.1:" + std::to_string(port_);
@@ -149,6 +164,28 @@ TEST(MqttClient, NothingIsPublishedOnAConnectionBeforeItIsTaken) {
   said.acquire();
   EXPECT_FALSE(client.connected());
   EXPECT_FALSE(client.Publish(message));
+}
+
+TEST(MqttClient, LargePayloadsFillNoMemory) {
+  Broker broker;
+  MqttOptions options;
+  options.url = broker.url();
+  MqttClient client(options, {}, [](LogLevel, std::string_view) {});
+  client.Start();
+  broker.Accept();
+  for (int i = 0; i < 70; ++i) {
+    broker.Publish((1U << 20U) - 1);
+  }
+  std::vector<MqttEvent> events;
+  for (int i = 0; i < 600 && client.dropped() < 6; ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  }
+  EXPECT_EQ(client.dropped(), 6U);
+  client.Take(events, std::chrono::seconds(60));
+  EXPECT_EQ(events.size(), 65U);  // The first is the connection.
+  broker.Publish(1U << 20U);
+  client.Take(events, std::chrono::seconds(60));
+  EXPECT_EQ(events.size(), 1U);
 }
 
 }  // namespace

@@ -456,6 +456,18 @@ TEST_F(SparkplugHostTest, MetricsThatSomebodyMakesUpEndNoNode) {
                                             "more than 500 000 metrics")));
   Take("NBIRTH/ghost0", aliases);  // In place of what it had.
   EXPECT_EQ(wrong_.size(), 1U);
+  // Whatever ends makes room for another.
+  for (int i = 0; i < 3; ++i) {
+    const std::string name = "ghost" + std::to_string(i);
+    Take("NDEATH/" + name, Sent());
+    Take("NBIRTH/other", NodeBirth(3));
+    aliases.set_seq(1);
+    Take("DBIRTH/other/D", aliases);
+    Take("DBIRTH/other/D", (aliases.set_seq(2), aliases));
+    Take("DDEATH/other/D", Sent(3));
+    Take("NBIRTH/" + name, (aliases.set_seq(0), aliases));
+  }
+  EXPECT_EQ(wrong_.size(), 1U);
   Take("DDATA/N/D", Data(2, 7, 6.0));
   EXPECT_EQ(Only().value, 6.0);
 }

@@ -176,12 +176,23 @@ TEST_F(ValveStatesTest, AValveThatNobodyTellsOfAnyMore) {
   EXPECT_THAT(state["reason"], HasSubstr("no monitor tells of it"));
 }
 
+TEST_F(ValveStatesTest, AStateThatTheBrokerKeptIsThatOfAValve) {
+  using Kind = MqttEvent::Kind;
+  states_.TakeKept({Kind::kMessage, "fdi/north/FV%2F1/event", "{}", true});
+  states_.TakeKept({Kind::kMessage, "fdi/north/FV%2F1/state", "", true});
+  states_.TakeKept({Kind::kMessage, "fdi/north/FV%2F1/state", "{}", false});
+  states_.TakeKept({Kind::kMessage, "fdi/south/FV%2F1/state", "{}", true});
+  states_.TakeKept({Kind::kMessage, "fdi/north/state", "{}", true});
+  EXPECT_EQ(states_.Due(0, now_).size(), 1U);  // The monitor's.
+  states_.TakeKept({Kind::kMessage, "fdi/north/FV%2F1/state", "{}", true});
+  EXPECT_EQ(StateTold()["health"], "CHECK_FUNCTION");
+}
+
 TEST_F(ValveStatesTest, AMissingValveWaitsUntilMonitorsWereHeard) {
   states_.Expect("FV/1");
-  states_.SetGroup("FV/1", "hall 1");
   ValveIdentity identity;
   identity.description = "Feed";
-  states_.SetIdentity("FV/1", identity);
+  states_.Describe("FV/1", "hall 1", identity);
   EXPECT_EQ(states_.Due(0, now_, false).size(), 1U);  // The monitor's.
   EXPECT_EQ(StateTold()["group"], "hall 1");
   EXPECT_EQ(StateTold()["about"]["description"], "Feed");

@@ -2,7 +2,8 @@
 # A simulated server on loopback, a client of it that prints readings, and
 # `fdi-gateway in --lines -` feed a monitor. The server is gone for 40 samples, has readings that are bad
 # and a time in manual; the monitor has to find the fault, and the gateway to
-# count what was lost.
+# count what was lost. The OPC UA server lacks one tag, has another of a wrong type,
+# and numbers its namespaces otherwise when it is back.
 # Usage: gateway.sh PROGRAMS opcua NODE_MODULES | PROGRAMS modbus
 # 77 without what it takes.
 set -euo pipefail
@@ -63,12 +64,53 @@ p2_unit = "bar g"
 t1 = "TT101.PV"
 f = "FT101.PV"
 f_unit = "l/s"
+pv = "GONE.PV"
+sp = "NOTE.SP"
 END
-  node opcua_server.mjs valve.csv $port 2>server.log &
-  server=$!
   export FDI_GATEWAY=$bin/fdi-gateway
   run=(node client.mjs plant.toml --endpoint "opc.tcp://127.0.0.1:$port"
-    --interval 0)
+    --interval 0 --node 'nsu=urn:plant;s={tag}')
+  # A server that nobody has trusted, one whose certificate has expired, and another.
+  certify() {  # DAYS
+    openssl req -newkey rsa:2048 -nodes -keyout plant.key -out plant.csr \
+      -subj /CN=plant -addext "subjectAltName=URI:urn:$(hostname):NodeOPCUA-Server,IP:127.0.0.1" \
+      -addext keyUsage=digitalSignature,nonRepudiation,keyEncipherment,dataEncipherment \
+      -addext extendedKeyUsage=serverAuth,clientAuth 2>/dev/null
+    openssl x509 -req -in plant.csr -signkey plant.key -copy_extensions copy -days "$1" \
+      -out plant.pem 2>/dev/null
+  }
+  trust() { mv "$FDI_DATA"/opcua-client/rejected/* "$FDI_DATA/opcua-client/trusted/certs"; }
+  serve() {
+    node opcua_server.mjs valve.csv $port "$@" 2>server.log &
+    server=$!
+    await ready server.log
+  }
+  end_server() {
+    kill -9 $server
+    wait $server 2>/dev/null || true
+  }
+  certify -1
+  serve plant.pem plant.key
+  # What is thrown beside all promises is but the end of a connection.
+  echo "setTimeout(() => { throw Error('thrown'); }, 2000);" >thrown.mjs
+  node --import ./thrown.mjs "${run[@]:1}" --security Basic256Sha256 >>secure.txt 2>>secure.log &
+  gateway=$!
+  await BadCertificateUntrusted secure.log
+  trust
+  await BadCertificateTimeInvalid secure.log
+  [ ! -s secure.txt ] || fail "readings of a server that is not trusted"
+  end_server
+  certify 1
+  : >secure.log
+  serve plant.pem plant.key
+  await BadCertificateUntrusted secure.log
+  trust
+  await '"q":"good"' secure.txt
+  kill -9 $gateway
+  wait $gateway 2>/dev/null || true
+  end_server
+  serve
+  sleep 3  # The clock of the server is behind, which the tag that it lacks must not hide.
 else
   sed 's/^name = .*/name = "FV-101"/; s/"{loop}/"FIC101/' \
     "$modbus/plant.toml" >plant.toml
@@ -101,6 +143,11 @@ await "^ended" in.txt
 grep -q "^ended 0" in.txt || fail "$(cat in.txt in.log)"
 stop
 
+if [ "$way" = opcua ]; then
+  grep -q "tag GONE.PV: BadNodeIdUnknown" gateway.log || fail "GONE.PV: $(cat gateway.log)"
+  grep -q "reading_refused tag=NOTE.SP .*'ask the operator' is neither a number" in.log ||
+    fail "NOTE.SP: $(cat in.log)"
+fi
 number() { sed -n "s/^$1: *//p" in.txt; }
 runs() {  # COLUMNS, of what was recorded
   sqlite3 -readonly "$FDI_DATA/runs.db" \

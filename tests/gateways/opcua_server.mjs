@@ -1,7 +1,9 @@
 // A simulated OPC UA server: gives the rows of a CSV table of fdi-simulator, in
 // the tags and units of gateway.sh, one a second of the source
-// time and every 10 ms. Goes on while somebody subscribes to all tags.
-// Usage: opcua_server.mjs CSV PORT
+// time and every 10 ms. Goes on while somebody subscribes to all tags. Its
+// namespace urn:plant has another number after each start, and the tag NOTE.SP a
+// text.
+// Usage: opcua_server.mjs CSV PORT [CERTIFICATE KEY]
 import {readFileSync} from 'node:fs';
 
 console.log = console.error;
@@ -29,7 +31,7 @@ const down = [80, 120];     // rows that the server does not live to see
 const within = (at, [from, to]) => at >= from && at < to;
 
 const startMs = 1000 * Math.floor(Date.now() / 1000);
-let variables;
+let variables, starts = 0;
 function give(at) {
   const stamp = new Date(startMs + 1000 * at);
   const set = (name, dataType, value, status = StatusCodes.Good) =>
@@ -42,18 +44,22 @@ function give(at) {
       StatusCodes.Good);
   }
   set('FIC101.MODE', DataType.Int32, within(at, manual) ? 0 : 1);
+  set('NOTE.SP', DataType.String, 'ask the operator');
 }
 
 async function start() {
-  const server = new OPCUAServer({port: Number(process.argv[3]), host: '127.0.0.1',
+  const [port, certificateFile, privateKeyFile] = process.argv.slice(3);
+  const server = new OPCUAServer({port: Number(port), host: '127.0.0.1', certificateFile, privateKeyFile,
     serverCapabilities: {minSupportedSampleRate: 0}});
   await server.initialize();
-  const space = server.engine.addressSpace.getOwnNamespace();
+  for (let i = 0; i < starts; ++i) server.engine.addressSpace.registerNamespace(`urn:other:${i}`);
+  ++starts;
+  const space = server.engine.addressSpace.registerNamespace('urn:plant');
   variables = {};
-  for (const name of [...Object.keys(tags), 'FIC101.MODE'])
+  for (const name of [...Object.keys(tags), 'FIC101.MODE', 'NOTE.SP'])
     variables[name] = space.addVariable({browseName: name, nodeId: `s=${name}`,
       organizedBy: server.engine.addressSpace.rootFolder.objects,
-      dataType: name.endsWith('MODE') ? 'Int32' : 'Double', minimumSamplingInterval: 0});
+      dataType: {MODE: 'Int32', SP: 'String'}[name.split('.')[1]] ?? 'Double', minimumSamplingInterval: 0});
   return server;
 }
 const subscribed = server => {

@@ -101,11 +101,7 @@ class AssemblerTest : public ::testing::Test {
     return seconds;
   }
   TagCounts CountsOf(const std::string& tag) const {
-    TagCounts found;
-    assembler_->ForEachTag([&](const std::string& name, const TagCounts& c) {
-      found = name == tag ? c : found;
-    });
-    return found;
+    return assembler_->tags()[tag];
   }
 
   std::optional<Assembler> assembler_;
@@ -321,6 +317,24 @@ TEST_F(AssemblerTest, AStampOf1970OrOfNextYearIsRefused) {
   EXPECT_EQ(CountsOf("V1.OP").bad, 2U);
 }
 
+TEST_F(AssemblerTest, TextThatIsNoNumberEndsTheReadingBeforeIt) {
+  Make({ValveNamed("V1")});
+  SayAll(1.0, "V1");
+  now_s_ = 2.0;
+  EXPECT_EQ(assembler_->Take({.tag = "V1.ZT",
+                              .source = "",
+                              .stamp_ns = At(2.0),
+                              .value = {},
+                              .word = "41 percent"},
+                             Now()),
+            Taken::kBadValue);
+  Say(2.0, "V1.OP", 30.0);
+  Say(3.0, "V1.OP", 30.0);
+  Advance(3.0);
+  EXPECT_THAT(With("V1", Signal::kX), ElementsAre(1.0));
+  EXPECT_THAT(With("V1", Signal::kCv), ElementsAre(1.0, 2.0));
+}
+
 TEST_F(AssemblerTest, AFloodOfOneTagIsBoundedAndCostsNoOther) {
   Make({ValveNamed("V1")});
   for (int i = 0; i < 50'000; ++i) {
@@ -332,6 +346,25 @@ TEST_F(AssemblerTest, AFloodOfOneTagIsBoundedAndCostsNoOther) {
   Advance(2.1);
   EXPECT_THAT(With("V1", Signal::kCv), ElementsAre(2.0));
   EXPECT_DOUBLE_EQ(samples_.back().second[Signal::kX], 71.0);
+}
+
+TEST_F(AssemblerTest, NamesOfSourcesThatSomebodyMakesUpAreForgotten) {
+  Make({ValveNamed("V1")});
+  for (int s = 1; s <= 100; ++s) {
+    for (int k = 0; k < 100; ++k) {
+      const std::string name = std::to_string(100 * s + k);
+      Say(s, "V1.ZT", 29.0, "reads " + name);
+      assembler_->Alive("lives " + name, At(s), Now());
+    }
+    SayAll(s, "V1", "plc");
+    Advance(s);
+  }
+  EXPECT_LE(assembler_->sources().second, 1000U);
+  EXPECT_EQ(With("V1", Signal::kX).size(), 99U);
+  EXPECT_THAT(notes_, IsEmpty());
+  Advance(110.0);  // What tags wait for is not forgotten.
+  EXPECT_EQ(assembler_->sources(), (std::pair<std::size_t, std::size_t>(0, 1)));
+  EXPECT_THAT(notes_, ElementsAre(std::pair(NoteKind::kSourceSilent, "plc")));
 }
 
 TEST_F(AssemblerTest, AHeaderOfTwoValvesIsReadByBoth) {
@@ -390,6 +423,19 @@ TEST_F(AssemblerTest, AValveOfAnotherTableGoesOn) {
   EXPECT_THAT(With("V1", Signal::kX), ElementsAre(1.0, 2.0));
   EXPECT_EQ(samples_.back().second.seq, 1U);
   EXPECT_EQ(CountsOf("V1.OP").readings, 3U);
+}
+
+TEST_F(AssemblerTest, ASilentValveIsNotToldAgainByAnotherTable) {
+  Make({ValveNamed("V1"), ValveNamed("V2")});
+  SayAll(1.0, "V1", "plc1");
+  for (int s = 1; s <= 20; ++s) {
+    if (s == 12) {
+      assembler_->Replace({ValveNamed("V1"), ValveNamed("V2")});
+    }
+    SayAll(s, "V2", "plc2");
+    Advance(s);
+  }
+  EXPECT_THAT(With("V1", Signal::kCv, false), ElementsAre(4.0, 5.0, 6.0));
 }
 
 TEST_F(AssemblerTest, TheEndWritesWhatWasSaid) {

@@ -1477,6 +1477,8 @@ TEST(KindsTest, ATableByExceptionIsHeld) {
   const Sniffed found = Sniff(text, "plant.csv", Utc());
   EXPECT_TRUE(found.compressed);
   EXPECT_EQ(found.resample, "1s:hold:10min");
+  EXPECT_THAT(MapText(found, "plant.csv"),
+              HasSubstr("resample = \"1s:hold:10min\"  # choice: linear is "));
 }
 
 // A position that is polled every fifth second stands in the rows between.

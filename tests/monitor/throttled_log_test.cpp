@@ -34,5 +34,21 @@ TEST(LogLimitTest, HoldsBackEachEventForItselfAndSaysHowMany) {
   EXPECT_EQ(lines[5], "fault_event valve=V3");
 }
 
+TEST(LogLimitTest, KindsThatSomebodyMakesUpFillNoMemory) {
+  constexpr std::chrono::milliseconds kInterval(500);
+  LogLimit limit({1, kInterval});
+  std::uint64_t not_shown = 0;
+  int shown = 0;
+  const auto begin = std::chrono::steady_clock::now();
+  for (int i = 0; i < 30'000; ++i) {
+    shown += limit.Admit(std::to_string(i), not_shown) ? 1 : 0;
+  }
+  if (std::chrono::steady_clock::now() - begin < kInterval) {
+    EXPECT_EQ(shown, 10'000);
+  }
+  std::this_thread::sleep_for(kInterval);
+  EXPECT_TRUE(limit.Admit("another", not_shown));
+}
+
 }  // namespace
 }  // namespace fdi::monitor
