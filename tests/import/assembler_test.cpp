@@ -462,7 +462,7 @@ TEST_F(AssemblerTest, ZerosOfAllSignalsAreNoReading) {
   SayAll(6, "V1");
   Advance(9);
   EXPECT_THAT(With("V1", Signal::kX, false), ElementsAre(1.0));
-  EXPECT_EQ(samples_[1].sample.quality[Index(Signal::kX)], SignalQuality::kBad);
+  EXPECT_EQ(samples_[1].second.quality[Index(Signal::kX)], SignalQuality::kBad);
 }
 
 }  // namespace
