@@ -79,8 +79,12 @@ void CalmLog::Warn(
     std::string_view event, const std::string& about,
     std::initializer_list<std::pair<std::string_view, std::string>> fields) {
   std::uint64_t not_shown = 0;
-  if (!limit_.Admit(std::string(event) + ' ' + about.substr(0, kLongestLine),
-                    not_shown)) {
+  monitor::LogLimit& limit =
+      limits_
+          .try_emplace(std::string(event),
+                       monitor::LogLimitOptions{1, std::chrono::minutes(1)})
+          .first->second;
+  if (!limit.Admit(about.substr(0, kLongestLine), not_shown)) {
     return;
   }
   std::string line = EventLine(event, fields).substr(0, kLongestLine);

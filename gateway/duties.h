@@ -3,6 +3,7 @@
 #include <chrono>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -58,7 +59,8 @@ class CalmLog {
 
  private:
   LogSink log_;
-  monitor::LogLimit limit_{{1, std::chrono::minutes(1)}};
+  // Each event has its own, so that names that somebody makes up silence one.
+  std::map<std::string, monitor::LogLimit> limits_;
 };
 
 }  // namespace fdi::gateway

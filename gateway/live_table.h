@@ -16,6 +16,8 @@ struct LiveTopic {
   std::string tag;
   std::string value_key;  ///< In the JSON of a payload; empty: "value" or "v".
   std::string time_key;   ///< The same; empty: "time", "ts" or "t".
+
+  friend bool operator==(const LiveTopic&, const LiveTopic&) = default;
 };
 
 struct RefusedRow {

@@ -285,6 +285,7 @@ void MqttClient::OnConnect(int code) {
     return;
   }
   said_.clear();
+  refused_.clear();
   ++connections_;
   connected_ = true;
   log_(LogLevel::kInfo,

@@ -112,11 +112,20 @@ void MqttSource::Use(const LiveTable& table) {
   auto former = std::exchange(topics_, {});
   for (const LiveTopic& topic : table.topics) {
     topics_[topic.topic].push_back(topic);
-    former.erase(topic.topic);
+  }
+  // A topic that is as it was is left alone: its broker would send again what
+  // it has retained.
+  auto changed = topics_;
+  std::erase_if(changed, [&](const auto& topic) {
+    const auto before = former.find(topic.first);
+    return before != former.end() && before->second == topic.second;
+  });
+  for (const auto& [name, tags] : topics_) {
+    former.erase(name);
   }
   if (client_.connected()) {
     client_.Unsubscribe(NamesOf(former));
-    client_.Subscribe(NamesOf(topics_));
+    client_.Subscribe(NamesOf(changed));
   }
 }
 

@@ -32,6 +32,8 @@ constexpr std::int64_t kLeapNs = 60 * kNsPerSecond;
 // clock runs back; so many readings in a row do.
 constexpr int kBackReadings = 1000;
 constexpr int kToldEmpty = 3;
+// In which no valve goes from open to shut.
+constexpr std::int64_t kFewSeconds = 2 * kNsPerSecond;
 // Words that come at random are twelve mean deviations late once in 15 000
 // times (exponential steps: exp(-1 - 12 * 2/e)).
 constexpr double kLate = 12.0;
@@ -453,7 +455,13 @@ Sample Assembler::SampleAt(std::int64_t instant_ns, Valve& valve) {
     }
   }
   sample.mode = valve.mode;
-  if (IsAllZero(sample, valve.valve.map.columns)) {
+  if (sample.present != 0) {
+    const bool zeros = IsAllZero(sample, valve.valve.map.columns);
+    const bool jumps = options_.period_ns <= kFewSeconds && valve.open;
+    valve.zeros = zeros && (valve.zeros || jumps);
+    valve.open = IsOpen(sample);
+  }
+  if (valve.zeros) {
     sample.present = 0;
     sample.values.fill(0.0);
     sample.quality.fill(SignalQuality::kBad);

@@ -188,6 +188,8 @@ class Assembler {
   };
   struct Valve : Progress {
     LiveValve valve;
+    bool open{false};   // IsOpen() in the last instant that had readings.
+    bool zeros{false};  // Since an open valve, all its signals are 0.
     std::vector<Slot> slots;
   };
   struct TextHash {

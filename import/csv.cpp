@@ -150,19 +150,29 @@ std::string_view WithoutFlag(std::string_view cell) {
 
 bool IsAllZero(const Sample& sample,
                const std::vector<ColumnMapping>& columns) {
+  const bool shuts = std::ranges::any_of(columns, [](const ColumnMapping& m) {
+    return m.signal == Signal::kCv && m.sense == Sense::kOpening;
+  });
   std::size_t zeros = 0;
-  bool shut = false;
-  for (const ColumnMapping& m : columns) {
-    if (!sample.Has(m.signal)) {
+  for (std::size_t i = 0; i < kSignalCount && shuts; ++i) {
+    const auto signal = static_cast<Signal>(i);
+    if (!sample.Has(signal)) {
       continue;
     }
-    if (sample[m.signal] != Converted(m, 0.0)) {
+    // What the map does not name is read as it stands.
+    const auto m = std::ranges::find(columns, signal, &ColumnMapping::signal);
+    if (sample[signal] != (m == columns.end() ? 0.0 : Converted(*m, 0.0))) {
       return false;
     }
     ++zeros;
-    shut = shut || (m.signal == Signal::kCv && m.sense == Sense::kOpening);
   }
-  return zeros >= 3 && shut;
+  return zeros >= 3;
+}
+
+bool IsOpen(const Sample& sample) {
+  constexpr double kOpen = 90.0;  // % of closing
+  return sample.Has(Signal::kCv) && sample[Signal::kCv] < kOpen &&
+         (!sample.Has(Signal::kX) || sample[Signal::kX] < kOpen);
 }
 
 CsvReader::CsvReader(CsvOptions options)

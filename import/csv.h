@@ -150,10 +150,12 @@ struct ColumnMap {
 };
 
 /// True if everything that `sample` has, three signals or more, is 0 in its
-/// source, and that would be a shut valve: some systems write zeros into all
-/// columns where they have no reading, and of a valve that is really shut
-/// nothing is judged.
+/// source, where that is a shut valve.
 bool IsAllZero(const Sample& sample, const std::vector<ColumnMapping>& columns);
+/// True if CV and X are open by a tenth, which no valve shuts between two
+/// samples of a few seconds. Zeros beside it are no readings: some systems
+/// write them where they have none.
+bool IsOpen(const Sample& sample);
 
 /// Settings of the CSV readers.
 struct CsvOptions {

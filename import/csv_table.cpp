@@ -187,7 +187,10 @@ CsvTable TableReader::Read() {
     OrderTags();
   }
   CheckOrder();
-  DropZeros();
+  // Where values come by exception, the row before may be minutes older.
+  if (!options().map.resampling && !options().map.long_table) {
+    DropZeros();
+  }
   if (options().check_values) {
     CheckValues();
   }
@@ -609,21 +612,31 @@ void TableReader::DropImpossible(const ColumnMapping& m) {
       ") taken as no reading");
 }
 
+// A valve that is really shut comes there and back through other readings.
 void TableReader::DropZeros() {
+  const auto& columns = options().map.columns;
   std::size_t count = 0;
-  for (CsvRow& row : rows_) {
-    Sample& sample = row.labelled.sample;
-    if (IsAllZero(sample, options().map.columns)) {
-      for (const ColumnMapping& m : options().map.columns) {
-        Drop(m.signal, sample);
-      }
-      ++count;
+  std::size_t begin = 0;
+  for (std::size_t k = 0; k <= rows_.size(); ++k) {
+    if (k < rows_.size() && IsAllZero(rows_[k].labelled.sample, columns)) {
+      continue;
     }
+    if (begin > 0 && begin < k && k < rows_.size() &&
+        IsOpen(rows_[begin - 1].labelled.sample) &&
+        IsOpen(rows_[k].labelled.sample)) {
+      count += k - begin;
+      for (std::size_t i = begin; i < k; ++i) {
+        for (std::size_t s = 0; s < kSignalCount; ++s) {
+          Drop(static_cast<Signal>(s), rows_[i].labelled.sample);
+        }
+      }
+    }
+    begin = k + 1;
   }
   if (count > 0) {
-    table_.notes.push_back(std::to_string(count) + " of " +
-                           std::to_string(rows_.size()) +
-                           " rows are 0 in all columns, taken as no reading");
+    table_.notes.push_back(
+        std::to_string(count) + " of " + std::to_string(rows_.size()) +
+        " rows are 0 in all columns between open ones, taken as no reading");
   }
 }
 

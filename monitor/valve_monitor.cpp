@@ -174,7 +174,7 @@ void ValveMonitor::Hear(Intake intake, std::uint64_t writer, TimePoint received,
   writer_ = writer;
   received_ = received;
   stale_counted_ = received;
-  // Before the sample is judged, which may end the episode.
+  // An episode that this sample has ended keeps the time of its end.
   if (stale_ && episode_open()) {
     outlet.OnSilence(id_, std::nullopt);
   }

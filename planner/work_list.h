@@ -25,7 +25,7 @@ struct PlannedLoop {
   std::string valve_id;
   ValveIdentity about{};
   std::string finding{};  ///< Why its record could not be used, if known.
-  /// What the audit said of its record as it was onboarded, at that time.
+  /// The audit's verdict on the record that it was onboarded from.
   std::optional<LoopAudits::Window> verdict{};
 };
 

@@ -111,7 +111,7 @@ std::string CoverageText(const Json& coverage) {
          " by nothing.";
 }
 
-// What nothing has judged may be anything.
+// Loops that nothing has judged may have any fault.
 std::string NothingText(const Json& coverage) {
   return coverage["nothing"] != coverage["loops"]
              ? "Nothing to do."

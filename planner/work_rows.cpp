@@ -579,6 +579,7 @@ std::vector<LoopAudits::Window> RowReader::Audits(
   std::vector<LoopAudits::Window> audits = query_.audits.windows;
   for (const PlannedLoop& loop : query_.loops) {
     if (!loop.verdict || loop.verdict->end_ns < query_.since_ns ||
+        !GlobMatches(query_.valve_glob, loop.valve_id) ||
         std::ranges::find(query_.audits.windows, loop.valve_id,
                           &LoopAudits::Window::loop) !=
             query_.audits.windows.end()) {
@@ -586,6 +587,9 @@ std::vector<LoopAudits::Window> RowReader::Audits(
     }
     storage::EpisodeFilter later;
     later.since_ns = loop.verdict->end_ns + kNsPerDay;
+    if (loop.valve_id.find_first_of("*?[") == std::string::npos) {
+      later.valve_glob = loop.valve_id;
+    }
     const auto times = history == nullptr ? std::vector<storage::CoverageTime>{}
                                           : history->Coverage(later);
     if (std::ranges::none_of(times, [&loop](const auto& time) {

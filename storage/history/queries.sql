@@ -150,7 +150,7 @@ UPDATE episode SET cleared_ns = max(?1, ended_ns), unconfirmed_ns = NULL
 WHERE valve_id = ?2 AND unconfirmed_ns IS NOT NULL AND ended_ns IS NOT NULL
 -- The valve fell silent while its episode is open, or (NULL) sends again.
 -- name: set_silence
-UPDATE episode SET unconfirmed_ns = ?1
+UPDATE episode SET unconfirmed_ns = max(coalesce(unconfirmed_ns, ?1), ?1)
 WHERE valve_id = ?2 AND ended_ns IS NULL AND cleared_ns IS NULL
 -- Somebody acknowledged it, knowing of its end.
 -- name: end_by_hand

@@ -448,20 +448,26 @@ TEST_F(AssemblerTest, TheEndWritesWhatWasSaid) {
   EXPECT_THAT(With("V1", Signal::kX), ElementsAre(1.0, 2.0));
 }
 
-// Zeros of all signals are no reading of a valve that jumps shut and back.
+// Zeros of all signals are no reading of a valve that jumps shut and back; one
+// that comes there by way of other readings is shut.
 TEST_F(AssemblerTest, ZerosOfAllSignalsAreNoReading) {
   Make({ValveNamed("V1")});
+  const auto zeros = [&](double s) {
+    for (const char* tag : {"V1.OP", "V1.ZT", "V1.PT"}) {
+      Say(s, tag, 0.0);
+    }
+  };
   SayAll(0, "V1");
-  for (const char* tag : {"V1.OP", "V1.ZT", "V1.PT"}) {
-    Say(1, tag, 0.0);
-  }
-  SayAll(2, "V1");
-  Say(3, "V1.OP", 0.0);
-  Say(3, "V1.ZT", 0.0);
-  Say(3, "V1.PT", 2.0);
-  SayAll(6, "V1");
+  zeros(1);
+  zeros(2);
+  SayAll(3, "V1");
+  Say(4, "V1.OP", 0.0);
+  Say(4, "V1.ZT", 5.0);
+  zeros(5);
+  zeros(7);
+  SayAll(8, "V1");
   Advance(9);
-  EXPECT_THAT(With("V1", Signal::kX, false), ElementsAre(1.0));
+  EXPECT_THAT(With("V1", Signal::kX, false), ElementsAre(1.0, 2.0));
   EXPECT_EQ(samples_[1].second.quality[Index(Signal::kX)], SignalQuality::kBad);
 }
 

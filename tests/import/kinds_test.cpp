@@ -1373,8 +1373,9 @@ TEST(KindsTest, RowsThatAreZeroInAllColumnsAreNoReadings) {
   for (std::size_t k = 0; k < samples.size(); ++k) {
     EXPECT_EQ(samples[k].sample.Has(Signal::kX), k / 10 != 3) << k;
   }
-  EXPECT_THAT(opening.notes, Contains("10 of 120 rows are 0 in all columns, "
-                                      "taken as no reading"));
+  EXPECT_THAT(opening.notes,
+              Contains("10 of 120 rows are 0 in all columns between open ones, "
+                       "taken as no reading"));
   EXPECT_TRUE(table("closing").runs.front().samples[30].sample.Has(Signal::kX));
 }
 

@@ -669,6 +669,12 @@ TEST(RecordVerdictTest, ThinSaysWhatIsStillNeeded) {
   EXPECT_EQ(JudgeRecord(held, 1.0).sentence.substr(0, 77),
             "usable: 1.00 h of healthy data, of which X 0.03 h, F 1.00 h rest "
             "on readings,");
+  for (std::size_t k = 0; k < 3600; ++k) {
+    held[0].samples[k].sample.quality[Index(Signal::kCv)] =
+        k % 4 == 0 ? SignalQuality::kGood : SignalQuality::kUncertain;
+  }
+  EXPECT_EQ(JudgeRecord(held, 1.0).sentence.substr(0, 61),
+            "thin: 1.00 h, of which only CV 0.25 h, X 0.03 h, F 1.00 h res");
   const RecordVerdict still = JudgeRecord(record(3600, 2.0), 1.0);
   EXPECT_EQ(still.word, "thin");
   EXPECT_NE(still.sentence.find("stays within 2.0 %, one more operating point"),

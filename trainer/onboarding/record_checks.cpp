@@ -356,11 +356,12 @@ void CheckFit(const std::vector<TrainingRun>& runs,
       ScatterOfX(runs) < kFixed * simulation.x_rmse_pct) {
     throw DataError(
         "X is a fixed curve of CV, and the simulated valve is off by " +
-        Text(simulation.x_rmse_pct) +
-        " % (RMSE): the positioner has a characteristic of its own, of which "
-        "it is not known what faults do to it. Map the command behind the "
-        "curve as [signal.CV] (the positioner's set point), or give the "
-        "positioner a linear characteristic and the curve to the trim");
+        Text(simulation.x_rmse_pct) + " % (RMSE), expected at most " +
+        Text(kCurve) +
+        " %: the positioner has a characteristic of its own, of which it is "
+        "not known what faults do to it; map the command behind the curve as "
+        "[signal.CV] (the positioner's set point). If the curve is a straight "
+        "line, CV or X has another span: try raw and span in --map");
   }
   // Where the command hardly moves, a flow that does is that of the pressures,
   // and following the command does not make the simulation the worse model.

@@ -15,10 +15,10 @@ struct RecordVerdict {
 };
 
 /// Thin is a record of less than 25 minutes, or with less than 25 minutes of
-/// readings of X and of F each (the rest is held or filled in), one in which
-/// the command stays within 5 %, outliers aside, and one whose parts the models
-/// of the rest do not know: they alarm there, or judge less than half of it.
-/// The set would alarm where the valve works in another way.
+/// readings of CV, or of both X and F (the rest is held or filled in), one in
+/// which the command stays within 5 %, outliers aside, and one whose parts the
+/// models of the rest do not know: they alarm there, or judge less than half of
+/// it. The set would alarm where the valve works in another way.
 ///
 /// @param hours of healthy data in `runs`
 /// @param coverage of parts that the models did not see; null: not scored.
