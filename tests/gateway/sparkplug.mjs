@@ -34,10 +34,11 @@ function edge(address, group, node, csv, number = 5) {
   const devices = {V1: Object.keys(columns), V2: Object.keys(columns).filter(name => name !== 'ZT')};
   const aliasOf = (device, name) => 10 * (device === 'V1' ? 1 : 2) + columns[name];
   const bdSeq = {name: 'bdSeq', type: 'UInt64', value: Number(number)};
-  let seq = 0, row = 0, quiet = false, told = {};
+  let seq = 0, quiet = false, told = {};
   // Rows are a second apart in the time of its clock, and the last one is of now.
   const rate = Number(process.env.PLANT_RATE ?? 1), beganMs = Number(process.env.PLANT_BEGAN_MS ?? Date.now());
   const sinceMs = () => rate * (Date.now() - beganMs);
+  const present = () => rows[Math.floor(sinceMs() / 1000) % rows.length];
   const clock = () => Math.round(beganMs - 1000 * (rows.length - rows.length / rate) + sinceMs());
 
   // Packets of MQTT 3.1.1: type, length in groups of 7 bits, body.
@@ -61,9 +62,9 @@ function edge(address, group, node, csv, number = 5) {
       metrics: metrics.map(metric => ({timestamp, ...metric}))});
     send(0x30, text(topic(type, device)), Buffer.from(payload));
   };
-  const metricsOf = (device, names, birth) => names.map(name => ({alias: aliasOf(device, name),
-    type: 'Double', value: Number(rows[row][columns[name]]), ...birth ? {name: `${device}.${name}`} : {}}));
-  const bear = device => publish('DBIRTH', device, metricsOf(device, devices[device], true));
+  const metricsOf = (device, names, row, birth) => names.map(name => ({alias: aliasOf(device, name),
+    type: 'Double', value: Number(row[columns[name]]), ...birth ? {name: `${device}.${name}`} : {}}));
+  const bear = device => publish('DBIRTH', device, metricsOf(device, devices[device], present(), true));
   const births = () => {
     seq = 0;
     publish('NBIRTH', '', [bdSeq, {name: 'Node Control/Rebirth', type: 'Boolean', value: false}]);
@@ -99,11 +100,11 @@ function edge(address, group, node, csv, number = 5) {
   });
   setInterval(() => {
     if (quiet) return;
-    row = Math.floor(sinceMs() / 1000) % rows.length;
+    const row = present();
     for (const [device, names] of Object.entries(devices)) {
-      const changed = names.filter(name => told[device + name] !== rows[row][columns[name]]);
-      for (const name of changed) told[device + name] = rows[row][columns[name]];
-      if (changed.length > 0 && !names.dead) publish('DDATA', device, metricsOf(device, changed));
+      const changed = names.filter(name => told[device + name] !== row[columns[name]]);
+      for (const name of changed) told[device + name] = row[columns[name]];
+      if (changed.length > 0 && !names.dead) publish('DDATA', device, metricsOf(device, changed, row));
     }
   }, 1000 / rate);
 }
