@@ -159,7 +159,7 @@ bool IsAllZero(const Sample& sample,
     if (!sample.Has(signal)) {
       continue;
     }
-    // What the map does not name is read as it stands.
+    // A signal that the map does not name is read as it stands.
     const auto m = std::ranges::find(columns, signal, &ColumnMapping::signal);
     if (sample[signal] != (m == columns.end() ? 0.0 : Converted(*m, 0.0))) {
       return false;

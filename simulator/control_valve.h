@@ -87,7 +87,7 @@ class ValveDynamics final : public OdeSystem {
                         : parameters_.actuator.highest_travel;
   }
   bool is_electric() const { return is_electric_; }
-  /// What the motor of an electric actuator does next.
+  /// The next state of the motor of an electric actuator.
   Motion MotorMotion(const double* x) const;
   /// Rod position behind the play for an actuator position z, along the
   /// travel that the air causes.

@@ -175,7 +175,7 @@ check_plant() {
   list=$(fdi-store valves list)
   grep -q 'FIC103 .*no_response' <<<"$list" || fail "FIC103 answers: $list"
   grep -q 'FIC101 .*undetermined' <<<"$list" || fail "FIC101: $list"
-  # What onboarding found is on the list before anything else has judged it.
+  # A finding of onboarding is on the list before anything else has judged it.
   fdi-store worklist | grep >/dev/null 'FIC103 ' || fail "nothing of FIC103"
   worst=$(fdi-store worklist --audit-windows 3 --csv | sed -n 2p)
   grep -q 'FIC103.*no_response' <<<"$worst" || fail "not the worst: $worst"

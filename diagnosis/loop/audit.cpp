@@ -296,7 +296,7 @@ bool Hunts(std::span<const double> op, std::span<const double> x,
   if (!oscillation || oscillation->regularity <= kRegular) {
     return false;
   }
-  // What wanders is unlike itself a period ago.
+  // A wandering position is unlike itself a period ago.
   CorrelationSums again;
   const auto period =
       static_cast<std::size_t>(std::lround(oscillation->period));

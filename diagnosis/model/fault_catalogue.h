@@ -65,7 +65,8 @@ struct FaultFacts {
   /// A negative strength has no effect that can be seen: a valve has little
   /// play to lose.
   bool negative_hidden{false};
-  /// Of a part that only a pneumatic actuator has: air, spring, transducer.
+  /// Acts on a part that only a pneumatic actuator has: air, spring,
+  /// transducer.
   bool of_air{false};
   /// Needs water: of no other medium is it known when it evaporates.
   bool of_water{false};

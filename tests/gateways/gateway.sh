@@ -91,7 +91,7 @@ END
   }
   certify -1
   serve plant.pem plant.key
-  # What is thrown beside all promises is but the end of a connection.
+  # An error that no promise catches is but the end of a connection.
   echo "setTimeout(() => { throw Error('thrown'); }, 2000);" >thrown.mjs
   node --import ./thrown.mjs "${run[@]:1}" --security Basic256Sha256 >>secure.txt 2>>secure.log &
   gateway=$!

@@ -306,7 +306,8 @@ TEST_F(WorkListCostsTest, FiguresStandInTheRowAndInColumnsOfTheirOwn) {
   EXPECT_TRUE(row["about"].is_null());
 }
 
-// Of a later version, or damaged: the list has its rows all the same.
+// Costs of a later version, or damaged ones: the list has its rows all the
+// same.
 TEST_F(WorkListCostsTest, CostsThatCannotBeReadAreLeftOutAndSaidSo) {
   query_.stop_ns = kDetected + 20 * kNsPerDay;
   for (const char* const costs :

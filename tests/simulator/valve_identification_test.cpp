@@ -40,12 +40,13 @@ std::vector<InputRow> BusyInputs(std::size_t count, std::uint64_t seed,
 // Records the readings of such a valve's transmitters, noise on.
 HealthyRecord Recording(const ValveParameters& parameters, std::size_t count,
                         std::uint64_t seed, bool interpolated = false,
-                        double jitter_pct = 0.8) {
+                        double jitter_pct = 0.8, double period_s = 1.0) {
   ValveSimulationConfig config;
   config.parameters = parameters;
   config.excitation = RecordedExcitation{BusyInputs(count, seed, jitter_pct)};
   config.continuous_inputs = interpolated;
-  config.duration_s = static_cast<double>(count);
+  config.period_s = period_s;
+  config.duration_s = static_cast<double>(count) * period_s;
   config.seed = seed;
   ValveSimulation simulation(config);
   HealthyRecord record;
@@ -147,20 +148,7 @@ TEST(ValveIdentificationTest, FindsTheSpeedOfAMotorInSlowRows) {
   nominal.actuator.drive = ActuatorDrive::kElectric;
   ValveParameters truth = nominal;
   truth.actuator.stroke_time_s = 200.0;
-  HealthyRecord record;
-  ValveSimulationConfig config;
-  config.parameters = truth;
-  config.excitation = RecordedExcitation{BusyInputs(600, 3, 0.8)};
-  config.period_s = 30.0;
-  config.duration_s = 600.0 * config.period_s;
-  ValveSimulation simulation(config);
-  while (!simulation.finished()) {
-    const Sample s = simulation.Step().sample;
-    record.rows.push_back(
-        {{s[Signal::kCv], s[Signal::kP1], s[Signal::kP2], s[Signal::kT1]},
-         s[Signal::kX],
-         s[Signal::kF]});
-  }
+  const HealthyRecord record = Recording(truth, 600, 3, false, 0.8, 30.0);
   const ValveFit fit = FitValve({record}, nominal, {.period_s = 30.0});
   ExpectRecovered(fit, "actuator.stroke_time_s", 200.0, 0.1);
 }

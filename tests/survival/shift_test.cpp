@@ -508,8 +508,8 @@ class ShiftTest : public MonitorFixture {
     std::erase_if(hook, [&active](const auto& item) {
       return item.second["unconfirmed"] == true && !active.contains(item.first);
     });
-    // What ended with its data stays on the bus until the valve is normal
-    // again.
+    // A fault that ended with its data stays on the bus until the valve is
+    // normal again.
     Alarms bus = FromBus();
     std::erase_if(bus, [&active](const auto& item) {
       return item.second["unconfirmed"] == true && !active.contains(item.first);
