@@ -115,7 +115,8 @@ void Assembler::Replace(std::vector<LiveValve> valves) {
     if (old == by_id.end()) {
       continue;
     }
-    static_cast<Progress&>(valve) = *old->second;
+    const Progress& before = *old->second;
+    static_cast<Progress&>(valve) = before;
     for (Slot& slot : valve.slots) {
       const auto same =
           std::ranges::find_if(old->second->slots, [&](const Slot& other) {

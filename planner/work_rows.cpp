@@ -223,7 +223,7 @@ class RowReader {
   void AddOrders();
   void AddStop();
   std::vector<WorkRow> Ranked() &&;
-  std::vector<DoneFinding> TakeDone() &&;
+  std::vector<DoneFinding> TakeDone();
 
  private:
   std::optional<Repair> RepairAfter(const std::string& valve,
@@ -399,7 +399,7 @@ void RowReader::AddEpisodes(storage::History& history) {
   }
 }
 
-std::vector<DoneFinding> RowReader::TakeDone() && {
+std::vector<DoneFinding> RowReader::TakeDone() {
   std::ranges::stable_sort(
       done_, std::greater<>(),
       [](const DoneFinding& each) { return each.by.at_ns; });
@@ -755,7 +755,7 @@ std::vector<WorkRow> ReadRows(storage::History* history,
   }
   rows.AddOrders();
   rows.AddStop();
-  done = std::move(rows).TakeDone();
+  done = rows.TakeDone();
   return std::move(rows).Ranked();
 }
 
