@@ -62,11 +62,15 @@ END
 openssl req -x509 -newkey rsa:2048 -nodes -keyout ca.key -out ca.pem -subj /CN=ca 2>/dev/null
 openssl req -newkey rsa:2048 -nodes -keyout broker.key -out broker.csr -subj /CN=127.0.0.1 \
   -addext subjectAltName=IP:127.0.0.1 2>/dev/null
-certify() {  # DAYS
-  openssl x509 -req -in broker.csr -CA ca.pem -CAkey ca.key -copy_extensions copy -days "$1" \
+# OpenSSL 3.4 and later refuse an end before the start, and take both as dates.
+expired=(-days -1)
+! openssl x509 -help 2>&1 | grep -q -- -not_after ||
+  expired=(-not_before 20200101000000Z -not_after 20200102000000Z)
+certify() {  # OPTION...
+  openssl x509 -req -in broker.csr -CA ca.pem -CAkey ca.key -copy_extensions copy "$@" \
     -out broker.pem 2>/dev/null
 }
-certify -1
+certify "${expired[@]}"
 printf 'listener %s 127.0.0.1\nuser %s\nallow_anonymous true\ncertfile broker.pem\nkeyfile broker.key\n' \
   $port "$(id -un)" >broker.conf
 mosquitto -c broker.conf >broker.out 2>&1 &
@@ -75,7 +79,7 @@ broker=$!
   --ca ca.pem 2>expired.log &
 in=$!
 await 20 'broker_lost.*certificate verify failed' expired.log
-certify 1
+certify -days 1
 kill -HUP $broker
 await 20 broker_connected expired.log
 kill $in

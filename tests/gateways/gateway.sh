@@ -71,14 +71,18 @@ END
   run=(node client.mjs plant.toml --endpoint "opc.tcp://127.0.0.1:$port"
     --interval 0 --node 'nsu=urn:plant;s={tag}')
   # A server that nobody has trusted, one whose certificate has expired, and another.
-  certify() {  # DAYS
+  certify() {  # OPTION...
     openssl req -newkey rsa:2048 -nodes -keyout plant.key -out plant.csr \
       -subj /CN=plant -addext "subjectAltName=URI:urn:$(hostname):NodeOPCUA-Server,IP:127.0.0.1" \
       -addext keyUsage=digitalSignature,nonRepudiation,keyEncipherment,dataEncipherment \
       -addext extendedKeyUsage=serverAuth,clientAuth 2>/dev/null
-    openssl x509 -req -in plant.csr -signkey plant.key -copy_extensions copy -days "$1" \
+    openssl x509 -req -in plant.csr -signkey plant.key -copy_extensions copy "$@" \
       -out plant.pem 2>/dev/null
   }
+  # OpenSSL 3.4 and later refuse an end before the start, and take both as dates.
+  expired=(-days -1)
+  ! openssl x509 -help 2>&1 | grep -q -- -not_after ||
+    expired=(-not_before 20200101000000Z -not_after 20200102000000Z)
   trust() { mv "$FDI_DATA"/opcua-client/rejected/* "$FDI_DATA/opcua-client/trusted/certs"; }
   serve() {
     node opcua_server.mjs valve.csv $port "$@" 2>server.log &
@@ -89,7 +93,7 @@ END
     kill -9 $server
     wait $server 2>/dev/null || true
   }
-  certify -1
+  certify "${expired[@]}"
   serve plant.pem plant.key
   # An error that no promise catches is but the end of a connection.
   echo "setTimeout(() => { throw Error('thrown'); }, 2000);" >thrown.mjs
@@ -100,7 +104,7 @@ END
   await BadCertificateTimeInvalid secure.log
   [ ! -s secure.txt ] || fail "readings of a server that is not trusted"
   end_server
-  certify 1
+  certify -days 1
   : >secure.log
   serve plant.pem plant.key
   await BadCertificateUntrusted secure.log
