@@ -65,7 +65,7 @@ class TextLines {
   std::size_t end_{0};
   std::size_t count_{0};
   bool packed_{false};
-  std::vector<Part> parts_;  // Of a folder.
+  std::vector<Part> parts_;  // A folder has them.
 };
 
 }  // namespace fdi

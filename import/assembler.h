@@ -185,11 +185,11 @@ class Assembler {
     // Nothing is known of the time between, exclusive.
     std::int64_t gap_from_ns{0};
     std::int64_t gap_to_ns{0};
+    bool open{false};   // IsOpen() in the last instant that had readings.
+    bool zeros{false};  // Since an open valve, all its signals are 0.
   };
   struct Valve : Progress {
     LiveValve valve;
-    bool open{false};   // IsOpen() in the last instant that had readings.
-    bool zeros{false};  // Since an open valve, all its signals are 0.
     std::vector<Slot> slots;
   };
   struct TextHash {

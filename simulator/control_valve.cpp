@@ -212,13 +212,13 @@ double ValveDynamics::ErrorRate(const double* x) const {
 }
 
 double ValveDynamics::Signal(const double* x) const {
-  if (held_signal_) {
-    return *held_signal_;
-  }
   if (is_electric_) {
     return motion_ == Motion::kRising    ? 1.0
            : motion_ == Motion::kFalling ? -1.0
                                          : 0.0;
+  }
+  if (held_signal_) {
+    return *held_signal_;
   }
   const PositionerParameters& p = parameters_.positioner;
   double signal = p.gain * Error(x);

@@ -471,5 +471,23 @@ TEST_F(AssemblerTest, ZerosOfAllSignalsAreNoReading) {
   EXPECT_EQ(samples_[1].second.quality[Index(Signal::kX)], SignalQuality::kBad);
 }
 
+TEST_F(AssemblerTest, ZerosAreNoReadingsAfterTheTableIsReadAgain) {
+  Make({ValveNamed("V1")});
+  const auto zeros = [&](int from, int to) {
+    for (int s = from; s <= to; ++s) {
+      for (const char* tag : {"V1.OP", "V1.ZT", "V1.PT"}) {
+        Say(s, tag, 0.0);
+      }
+    }
+  };
+  SayAll(0, "V1");
+  zeros(1, 6);
+  Advance(6);
+  assembler_->Replace({ValveNamed("V1")});
+  zeros(7, 9);
+  Advance(12);
+  EXPECT_THAT(With("V1", Signal::kX), ElementsAre(0.0));
+}
+
 }  // namespace
 }  // namespace fdi::importer

@@ -331,6 +331,16 @@ TEST(ControlValveTest, AMotorStopsWhereTheRodIsBlocked) {
   EXPECT_NEAR(valve.state().rod, 0.32 - 6.0 / 60.0, 2e-3);
 }
 
+// Its switch is no sampled positioner, which would run on beyond a stop.
+TEST(ControlValveTest, AMotorIsNotSampled) {
+  ValveParameters parameters = Electric();
+  parameters.positioner.sampling_period_s = 5.0;
+  ControlValve valve(parameters, 1.0);
+  valve.Settle(InputsAt(0.99));
+  Hold(valve, 1.2, 20);
+  EXPECT_NEAR(valve.state().actuator, 1.0, 1e-6);
+}
+
 // With the spring that closes and air that opens, the travel is mirrored; a
 // motor has neither.
 TEST(ControlValveTest, AMotorHasNoSpringSide) {
