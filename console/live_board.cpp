@@ -17,8 +17,6 @@ namespace {
 constexpr std::size_t kMarks = 64;
 constexpr std::size_t kGapsOfValve = 32;
 constexpr std::size_t kGapsWaiting = 256;
-// After as many periods a valve is STALE.
-constexpr double kGapPeriods = 3.0;
 constexpr std::size_t kEarlierSources = 3;
 constexpr std::int64_t kSparkStepNs = 1'000'000'000;
 

@@ -9,6 +9,7 @@
 #include "base/printable.h"
 #include "base/time_units.h"
 #include "console/api.h"
+#include "diagnosis/model/verdict.h"
 #include "report/findings/finding.h"
 #include "storage/models/models.h"
 #include "storage/models/plant_loops.h"
@@ -16,7 +17,6 @@
 namespace fdi::console {
 namespace {
 
-constexpr double kStalePeriods = 3.0;
 constexpr std::chrono::milliseconds kPingPeriod{5000};
 
 Json Status(const Api& api, const httplib::Request& request) {
@@ -59,7 +59,7 @@ Json Status(const Api& api, const httplib::Request& request) {
           {"write", !api.sources.monitors && api.access.MayWrite(request)},
           {"user", visitor ? Json(visitor->name) : Json()},
           {"role", visitor ? Json(RoleName(visitor->role)) : Json()},
-          {"stale_after_s", kStalePeriods * period_s},
+          {"stale_after_s", kGapPeriods * period_s},
           {"counters", std::move(counters)},
           {"valves",
            {{"known", valves.size()},

@@ -12,8 +12,6 @@ namespace fdi::monitor {
 namespace {
 
 constexpr double kResumeWindowS = 60.0;
-// After a silence of as many periods a valve is STALE.
-constexpr double kGapPeriods = 3.0;
 
 std::int64_t Ns(double seconds) {
   return std::llround(seconds * 1e9);

@@ -4,18 +4,39 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "base/mutex.h"
+#include "diagnosis/decision/alarm_budget.h"
 #include "diagnosis/model/model_set.h"
 #include "diagnosis/model/verdict.h"
 #include "diagnosis/records/episode_look.h"
 #include "diagnosis/records/fault_event.h"
 #include "diagnosis/records/service_records.h"
 #include "diagnosis/records/strength_point.h"
-#include "monitor/alarm_gate.h"
 #include "monitor/trace.h"
 
 namespace fdi::monitor {
+
+/// The budget of alarms as it is now; it is made anew as hours come. Thread
+/// safe.
+class AlarmGate {
+ public:
+  void Set(std::shared_ptr<const AlarmBudget> budget) {
+    const MutexLock lock(mutex_);
+    budget_ = std::move(budget);
+  }
+  /// Null: every episode is an alarm.
+  std::shared_ptr<const AlarmBudget> Get() const {
+    const MutexLock lock(mutex_);
+    return budget_;
+  }
+
+ private:
+  mutable Mutex mutex_;
+  std::shared_ptr<const AlarmBudget> budget_ GUARDED_BY(mutex_);
+};
 
 /// Settings of the evidence kept beside an episode, in the time of samples.
 struct TraceOptions {

@@ -151,7 +151,6 @@ HealthHour& HealthBook::At(const HealthHour& key, const Sample& sample,
 // Nothing is compared over a gap or with what another source said.
 void HealthBook::AddCounts(const Sample& sample, double period_s,
                            HealthHour& hour) {
-  constexpr double kGapPeriods = 3.0;
   const std::int64_t moved_ns =
       sample.stamp_ns - std::exchange(stamp_ns_, sample.stamp_ns);
   if (moved_ns <= 0 || sample.source_id != source_id_ ||

@@ -10,7 +10,6 @@
 namespace fdi::monitor {
 namespace {
 
-constexpr double kStalePeriods = 3.0;
 // A superseded source that has sent so many samples is not one that was just
 // restarted. Either source is there until it was silent as long as costs an
 // unknown valve its place (PipelineOptions::place_timeout), or until the valve
@@ -71,7 +70,7 @@ LookWorker::Physics ValveMonitor::Physics() const {
 bool ValveMonitor::RestartsEngine(const Sample& sample) const {
   const std::int64_t moved = sample.stamp_ns - stamp_ns_;
   const std::int64_t longest =
-      decision_ ? std::llround(kStalePeriods * models_->sample_period_s * 1e9)
+      decision_ ? std::llround(kGapPeriods * models_->sample_period_s * 1e9)
                 : kMaxPeriodNs;
   return sample.source_id != source_id_ || sample.epoch != epoch_ ||
          moved <= 0 || moved > longest;
@@ -191,7 +190,7 @@ ValveMonitor::TimePoint::duration ValveMonitor::SourcePatience() const {
   return std::max<TimePoint::duration>(
       kSourcePatience,
       std::chrono::duration_cast<TimePoint::duration>(
-          std::chrono::duration<double>(kStalePeriods * period_s())));
+          std::chrono::duration<double>(kGapPeriods * period_s())));
 }
 
 ValveOutcome ValveMonitor::StepLoop(const Sample& sample, bool superseded,
@@ -397,7 +396,7 @@ bool ValveMonitor::Adopt(const std::optional<EngineParts>& parts,
 }
 
 bool ValveMonitor::CheckStale(TimePoint now, EpisodeOutlet& outlet) {
-  const std::chrono::duration<double> limit(kStalePeriods * period_s());
+  const std::chrono::duration<double> limit(kGapPeriods * period_s());
   if (!seen_ || ended_ || stale_ || now - received_ <= limit) {
     return false;
   }

@@ -88,11 +88,11 @@ bool IsShut(double x, double cv) {
 Floor::Floor(const ModelSet& models)
     : limits_(models.floor ? &*models.floor : nullptr),
       first_(static_cast<std::size_t>(
-          std::max(FaultIndex(models, kFirstFinding), 0))) {
+          std::max(FaultIndex(models, kFirstFinding), 0))),
+      travel_share_(limits_ != nullptr ? limits_->deviation_samples : 1),
+      flow_shares_(limits_ != nullptr ? limits_->flow_samples : 1, kTests) {
   if (limits_ != nullptr) {
     rod_.emplace(*limits_);
-    shares_.assign(kTests, Sustained(limits_->flow_samples));
-    shares_[0] = Sustained(limits_->deviation_samples);
   }
 }
 
@@ -103,9 +103,8 @@ void Floor::Restart() {
   flow_ = {};
   findings_ = 0;
   beginning_ = 0;
-  for (Sustained& share : shares_) {
-    share.Restart();
-  }
+  travel_share_.Restart();
+  flow_shares_.Restart();
   share_ = 0.0;
 }
 
@@ -149,7 +148,9 @@ void Floor::Count(int finding, bool beyond, double share, double size,
                   int needed, std::int64_t stamp_ns) {
   const auto at = static_cast<std::size_t>(finding - kTravelDeviation);
   Test& test = tests_[at];
-  share_ = std::max(share_, shares_[at].Push(std::max(0.0, share)));
+  share = std::max(0.0, share);  // Not NaN.
+  share_ = at == 0 ? travel_share_.Push(share, 0, share_)
+                   : flow_shares_.Push(share, at, share_);
   test.since_ns = beyond && test.length == 0 ? stamp_ns : test.since_ns;
   test.length = beyond ? std::min(test.length + 1, needed) : 0;
   test.size = std::clamp(size, -1.0, 1.0);
@@ -187,7 +188,7 @@ void Floor::PushTravel(const Sample& sample) {
   Test& test = tests_[0];
   if (test.length > 0 && std::signbit(test.size) != std::signbit(deviation)) {
     test.length = 0;
-    shares_[0].Restart();
+    travel_share_.Restart();
   }
   Count(kTravelDeviation, std::abs(deviation) > limits_->deviation,
         std::abs(deviation) / limits_->deviation, 0.01 * deviation,

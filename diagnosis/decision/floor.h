@@ -3,7 +3,6 @@
 #include <array>
 #include <cstdint>
 #include <optional>
-#include <vector>
 
 #include "diagnosis/model/model_set.h"
 #include "diagnosis/model/sample.h"
@@ -135,7 +134,8 @@ class Floor {
   Repeat flow_;
   FaultSet findings_{0};
   FaultSet beginning_{0};
-  std::vector<Sustained> shares_;  // by test; empty: no floor
+  Sustained travel_share_;
+  Sustained flow_shares_;  // by test
   double share_{0.0};
 };
 

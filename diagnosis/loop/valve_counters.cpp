@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <numeric>
+#include <span>
 #include <utility>
 
 #include "base/time_units.h"
-#include "diagnosis/loop/step_response.h"
 
 namespace fdi::loop {
 namespace {
@@ -42,6 +44,59 @@ std::optional<double> MeanSize(std::int64_t sum, std::int64_t number,
   return number > 0 ? std::optional(static_cast<double>(sum) /
                                     static_cast<double>(number) * quantum)
                     : std::nullopt;
+}
+
+/// The answer of a rod to a step of its command. Times in samples from the
+/// first one with the new command, interpolated: good to a sample.
+struct StepResponse {
+  double realised{0.0};   ///< x_∞ − x_0, as x.
+  double delay{0.0};      ///< Td: until 2 % of it.
+  double t63{0.0};        ///< T63: until 63.2 % of it.
+  double t86{0.0};        ///< T86: until 86.5 % of it.
+  double overshoot{0.0};  ///< Largest excess, in shares of it.
+};
+
+constexpr double kMoved = 0.02;  // Share of the realised step.
+
+// When x has come to `level` from `begin`, 0 to 1 of the way [samples].
+double Crossing(std::span<const float> x, double begin, double level) {
+  double before = 0.0;
+  for (std::size_t k = 0; k < x.size(); ++k) {
+    const double now =
+        level != begin ? (double{x[k]} - begin) / (level - begin) : 1.0;
+    if (now >= 1.0) {
+      return k == 0 ? 0.0
+                    : static_cast<double>(k) - (now - 1.0) / (now - before);
+    }
+    before = now;
+  }
+  return static_cast<double>(x.size());
+}
+
+/// @param x     from the first sample with the new command on; not empty.
+/// @param begin x_0, before the step. x_∞ is the mean of the last quarter of x.
+///
+/// Source: ISA-75.25.01 (times of the realised step).
+StepResponse ResponseOf(std::span<const float> x, double begin) {
+  const std::span<const float> rest =
+      x.last(std::max<std::size_t>(1, x.size() / 4));
+  const double end = std::accumulate(rest.begin(), rest.end(), 0.0) /
+                     static_cast<double>(rest.size());
+  StepResponse response;
+  response.realised = end - begin;
+  const auto time = [&](double share) {
+    return Crossing(x, begin, begin + share * response.realised);
+  };
+  response.delay = time(kMoved);
+  response.t63 = time(1.0 - std::exp(-1.0));
+  response.t86 = time(1.0 - std::exp(-2.0));
+  for (const float value : x) {
+    if (response.realised != 0.0) {
+      response.overshoot = std::max(response.overshoot,
+                                    (double{value} - end) / response.realised);
+    }
+  }
+  return response;
 }
 
 }  // namespace

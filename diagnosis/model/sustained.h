@@ -1,28 +1,59 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
+#include <cstdint>
+#include <limits>
 #include <vector>
 
 namespace fdi {
 
-/// The least of the last `samples` values: a detection needs that many in a row
-/// beyond a limit. Zeros at the start keep fewer from counting.
+/// The least of the last `samples` values of each of some series: a detection
+/// needs that many in a row beyond a limit. Values of `none` at the start keep
+/// fewer from counting. All series together take few lines of the cache.
 class Sustained {
  public:
-  explicit Sustained(int samples)
-      : last_(static_cast<std::size_t>(samples), 0.0) {}
+  explicit Sustained(int samples, std::size_t series = 1, double none = 0.0)
+      : none_(none),
+        last_(static_cast<std::size_t>(samples) * series, none),
+        next_(series) {}
 
-  void Restart() { std::fill(last_.begin(), last_.end(), 0.0); }
-  double Push(double value) {
-    last_[next_] = value;
-    next_ = (next_ + 1) % last_.size();
-    return *std::min_element(last_.begin(), last_.end());
+  void Restart() { std::fill(last_.begin(), last_.end(), none_); }
+  /// Returns the least one, or `most` if that is more: most samples of most
+  /// tests do not even have a newest value that is.
+  double Push(double value, std::size_t series = 0,
+              double most = -std::numeric_limits<double>::infinity()) {
+    Keep(value, series);
+    return value > most ? Least(1.0, series, most) : most;
+  }
+  /// The same of the sizes of the values, which count only if all are on the
+  /// side of zero of the newest one.
+  double PushSigned(double value, std::size_t series, double most) {
+    Keep(value, series);
+    return std::abs(value) > most
+               ? Least(std::copysign(1.0, value), series, most)
+               : most;
   }
 
  private:
-  std::vector<double> last_;
-  std::size_t next_{0};
+  void Keep(double value, std::size_t series) {
+    std::uint16_t& next = next_[series];
+    last_[next * next_.size() + series] = value;
+    next = static_cast<std::uint16_t>(
+        (next + 1U) * next_.size() < last_.size() ? next + 1U : 0U);
+  }
+  double Least(double side, std::size_t series, double most) const {
+    double least = std::numeric_limits<double>::infinity();
+    for (std::size_t k = series; k < last_.size(); k += next_.size()) {
+      least = std::min(least, side * last_[k]);
+    }
+    return std::max(least, most);
+  }
+
+  double none_;
+  std::vector<double> last_;  // A row for each sample.
+  std::vector<std::uint16_t> next_;
 };
 
 }  // namespace fdi

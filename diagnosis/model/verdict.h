@@ -37,10 +37,14 @@ constexpr bool OutOfOrder(Intake intake) {
          intake == Intake::kSuperseded;
 }
 
+/// A valve that has sent nothing for more sample periods than these has a gap in
+/// its samples, and is stale.
+inline constexpr double kGapPeriods = 3.0;
+
 /// Tells how far the diagnosis can be relied upon, independent of the state.
 enum class Quality : std::uint8_t {
   kLive,
-  kStale,  ///< No sample for 3 periods; set by the monitor's clock.
+  kStale,  ///< No sample for kGapPeriods; set by the monitor's clock.
   kBadInput,
   kSettling,
   kInhibited,

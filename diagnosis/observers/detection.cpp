@@ -10,9 +10,25 @@
 namespace fdi {
 namespace {
 
+constexpr double kNoEnergy = -std::numeric_limits<double>::infinity();
+
 // exp(t), by our own function on either side of zero.
 double Growth(double t) {
   return t > 0.0 ? 1.0 / Exp(-t) : Exp(t);
+}
+
+// The share of its limit that a residual or a mean has; below 0: of the lower
+// one. That of NaN is 0.
+double ShareOf(double value, double lower, double upper) {
+  return value > 0.0 ? value / upper : value < 0.0 ? -value / lower : 0.0;
+}
+
+std::size_t WindowsOf(const ModelSet& models) {
+  std::size_t windows = 0;
+  for (const ChannelSpec& channel : models.channels) {
+    windows += channel.windows.size();
+  }
+  return windows;
 }
 
 }  // namespace
@@ -27,8 +43,10 @@ double CertainResidual(const ObserverBank& bank, int channel, double margin) {
 Detection::Detection(const ModelSet& models)
     : models_(&models),
       windows_(models),
-      shares_(models.channels.size() * kTestsPerChannel,
-              Sustained(models.decision.detection_samples)) {}
+      shares_(models.decision.detection_samples,
+              models.channels.size() + WindowsOf(models)),
+      energies_(models.decision.detection_samples, WindowsOf(models),
+                kNoEnergy) {}
 
 void Detection::Restart() {
   windows_.Restart();
@@ -37,9 +55,9 @@ void Detection::Restart() {
 
 void Detection::Interrupt() {
   runs_.fill({});
-  for (Sustained& share : shares_) {
-    share.Restart();
-  }
+  pending_ = 0;
+  shares_.Restart();
+  energies_.Restart();
   share_ = 0.0;
 }
 
@@ -60,22 +78,29 @@ bool Detection::Push(const ObserverBank& bank, const Sample& sample,
   windows_.Push({certain.data(), channels},
                 sample.Has(Signal::kCv) ? sample[Signal::kCv] : kNan);
   bool abnormal = false;
+  double energy_share = kNoEnergy;
+  std::size_t first_window = 0;
   share_ = 0.0;
   for (std::size_t c = 0; c < channels; ++c) {
+    const ChannelSpec& channel = models_->channels[c];
+    const std::size_t first = first_window;
+    first_window += channel.windows.size();
     const int index = static_cast<int>(c);
     const bool unread = bank.active(index) && !bank.measured(index);
     const bool held_out = unread && !held.empty() && !std::isnan(held[c]);
     if (unread && !held_out) {
       continue;  // Neither goes on nor interrupts.
     }
-    const ChannelSpec& channel = models_->channels[c];
     std::size_t test = c * kTestsPerChannel;
     const double residual = held_out ? held[c] : certain[c];
     const bool below = residual < channel.lower_threshold;
     const bool above = residual > channel.upper_threshold;
     abnormal = abnormal || below || above;
-    Count(test++, below, residual / channel.lower_threshold, stamp_ns);
-    Count(test++, above, residual / channel.upper_threshold, stamp_ns);
+    Count(test++, below, stamp_ns);
+    Count(test++, above, stamp_ns);
+    share_ = shares_.PushSigned(
+        ShareOf(residual, channel.lower_threshold, channel.upper_threshold), c,
+        share_);
     if (held_out) {
       continue;
     }
@@ -84,17 +109,21 @@ bool Detection::Push(const ObserverBank& bank, const Sample& sample,
       const ResidualWindow& window = windows_.window(c, w);
       const ResidualWindow& command = windows_.command(c, w);
       const bool applies = Applies(limits, window, command);
-      const auto count = [&](bool beyond, double share) {
-        Count(test++, applies && beyond, applies ? share : 0.0, stamp_ns);
-      };
-      const double energy = window.log_rms() - UpperLogRms(limits, command);
-      count(window.mean() < limits.lower_mean,
-            window.mean() / limits.lower_mean);
-      count(window.mean() > limits.upper_mean,
-            window.mean() / limits.upper_mean);
-      count(energy > 0.0, Growth(energy));
+      const double mean = applies ? window.mean() : 0.0;
+      const double energy =
+          applies ? window.log_rms() - UpperLogRms(limits, command) : kNoEnergy;
+      Count(test++, mean < limits.lower_mean, stamp_ns);
+      Count(test++, mean > limits.upper_mean, stamp_ns);
+      Count(test++, energy > 0.0, stamp_ns);
+      share_ = shares_.PushSigned(
+          ShareOf(mean, limits.lower_mean, limits.upper_mean),
+          channels + first + w, share_);
+      // In this order of max() a NaN counts as none.
+      energy_share =
+          energies_.Push(std::max(kNoEnergy, energy), first + w, energy_share);
     }
   }
+  share_ = std::max(share_, Growth(energy_share));
   return abnormal;
 }
 
@@ -106,25 +135,21 @@ bool Detection::Restore(SnapshotReader& reader) {
   return windows_.Restore(reader);
 }
 
-void Detection::Count(std::size_t test, bool beyond, double share,
-                      std::int64_t stamp_ns) {
+// Hardly any run is not empty, and to read all of them takes long.
+void Detection::Count(std::size_t test, bool beyond, std::int64_t stamp_ns) {
+  if (!beyond && pending_ == 0) {
+    return;
+  }
   Run& run = runs_[test];
-  // In this order a NaN counts as 0.
-  share_ = std::max(share_, shares_[test].Push(std::max(0.0, share)));
+  pending_ += (beyond ? 1 : 0) - (run.length > 0 ? 1 : 0);
   run.since_ns = beyond && run.length == 0 ? stamp_ns : run.since_ns;
   run.length = beyond ? run.length + 1 : 0;
 }
 
-bool Detection::pending() const {
-  const std::size_t tests = models_->channels.size() * kTestsPerChannel;
-  return std::ranges::any_of(std::span(runs_).first(tests),
-                             [](const Run& run) { return run.length > 0; });
-}
-
 std::uint32_t Detection::beyond() const {
   std::uint32_t channels = 0;
-  for (std::size_t t = 0; t < models_->channels.size() * kTestsPerChannel;
-       ++t) {
+  const std::size_t tests = models_->channels.size() * kTestsPerChannel;
+  for (std::size_t t = 0; pending() && t < tests; ++t) {
     if (runs_[t].length >= models_->decision.detection_samples) {
       channels |= std::uint32_t{1} << (t / kTestsPerChannel);
     }
@@ -135,7 +160,7 @@ std::uint32_t Detection::beyond() const {
 std::optional<std::int64_t> Detection::stamp_ns() const {
   std::optional<std::int64_t> stamp;
   const std::size_t tests = models_->channels.size() * kTestsPerChannel;
-  for (const Run& run : std::span(runs_).first(tests)) {
+  for (const Run& run : std::span(runs_).first(pending() ? tests : 0)) {
     if (run.length >= models_->decision.detection_samples) {
       stamp = std::min(stamp.value_or(run.since_ns), run.since_ns);
     }

@@ -49,7 +49,7 @@ class Detection {
   bool Restore(SnapshotReader& reader);
 
   /// True if some residual or window was beyond its limit, if only just.
-  bool pending() const;
+  bool pending() const { return pending_ > 0; }
 
   /// The channels, by bit, with a run beyond a limit that is n_d long.
   std::uint32_t beyond() const;
@@ -69,13 +69,14 @@ class Detection {
   // Below and above of the residual; of each window below, above and energy.
   static constexpr std::size_t kTestsPerChannel = 2 + 3 * kMaxWindows;
 
-  void Count(std::size_t test, bool beyond, double share,
-             std::int64_t stamp_ns);
+  void Count(std::size_t test, bool beyond, std::int64_t stamp_ns);
 
   const ModelSet* models_;
   ResidualWindows windows_;
   std::array<Run, kTestsPerChannel * kMaxChannels> runs_{};
-  std::vector<Sustained> shares_;  // by test
+  int pending_{0};      // runs that are not empty
+  Sustained shares_;    // by channel, then by window; below 0: below
+  Sustained energies_;  // by window: logarithms of their shares
   double share_{0.0};
 };
 

@@ -70,7 +70,8 @@ bool LoneReadings::Restore(SnapshotReader& reader) {
 
 const Sample& LoneReadings::Step(ObserverBank& bank, const Sample& sample) {
   const Sides held = std::exchange(held_, 0);
-  residuals_.fill(kNan);
+  const std::size_t channels = models_->channels.size();
+  std::fill_n(residuals_.begin(), channels, kNan);
   wrong_ = 0;
   // An UNCERTAIN past would keep the deciding reading from being judged.
   for (std::size_t k = 0; held != 0 && k < held_count_; ++k) {
@@ -92,7 +93,7 @@ const Sample& LoneReadings::Step(ObserverBank& bank, const Sample& sample) {
       again | TakeRare(has_past_ ? beyond & Jumped() & ~beyond_ : 0);
   beyond_ = beyond;
   has_past_ = true;
-  for (std::size_t c = 0; c < now_.size(); ++c) {
+  for (std::size_t c = 0; c < channels; ++c) {
     last_[c] = std::isnan(now_[c]) ? last_[c] : now_[c];
   }
   if (lone != 0) {

@@ -13,10 +13,16 @@
 
 namespace fdi::monitor {
 
-// The thread is the last member, so it ends before the queues that it uses are
+// The thread is the last member, so it ends before the queue that it uses is
 // destroyed.
 LookWorker::~LookWorker() {
   stop_.request_stop();
+}
+
+std::size_t LookWorker::waiting() const {
+  const MutexLock lock(mutex_);
+  return static_cast<std::size_t>(
+      std::ranges::count(waiting_, Rank::kNaming, &Look::rank));
 }
 
 LookWorker::Physics LookWorker::PhysicsOf(const ModelSet& models) const {
@@ -36,26 +42,32 @@ LookWorker::Physics LookWorker::PhysicsOf(const ModelSet& models) const {
 std::future<LookWorker::Answer> LookWorker::Submit(std::string valve_id,
                                                    Physics physics,
                                                    LookTask task) {
-  Look look{std::move(valve_id), std::move(physics), std::move(task)};
+  const LookOccasion why = task.occasion;
+  const Rank rank =
+      why == LookOccasion::kGrowth ? Rank::kGrowth
+      : why == LookOccasion::kEpisode || why == LookOccasion::kSecond
+          ? Rank::kNaming
+          : Rank::kRoutine;
+  Look look{rank, std::move(valve_id), std::move(physics), std::move(task)};
   std::future<Answer> answer = look.answer.get_future();
   const MutexLock lock(mutex_);
-  const bool naming = look.task.occasion == LookOccasion::kEpisode ||
-                      look.task.occasion == LookOccasion::kSecond;
-  const bool growth = look.task.occasion == LookOccasion::kGrowth;
-  std::deque<Look>& waiting = naming ? waiting_ : growth ? growth_ : routine_;
+  const auto [begin, end] =
+      std::ranges::equal_range(waiting_, look.rank, {}, &Look::rank);
   // A newer look at a valve makes one that still waits pointless. Looks for
   // growth are points of a curve, each of which counts.
   const auto same =
-      growth ? waiting.end()
-             : std::ranges::find(waiting, look.valve_id, &Look::valve_id);
-  if (same != waiting.end()) {
+      look.rank == Rank::kGrowth
+          ? end
+          : std::ranges::find(begin, end, look.valve_id, &Look::valve_id);
+  if (same != end) {
     // A promise that is destroyed without a value makes get() throw
     // std::future_error in the diagnosis thread, so a look that is replaced is
     // answered with nothing first.
     same->answer.set_value(std::nullopt);
     *same = std::move(look);
-  } else if (waiting.size() < (naming ? capacity_ : kMaxRoutineLooks)) {
-    waiting.push_back(std::move(look));
+  } else if (static_cast<std::size_t>(end - begin) <
+             (look.rank == Rank::kNaming ? capacity_ : kMaxRoutineLooks)) {
+    waiting_.insert(end, std::move(look));
     arrival_.notify_one();
   } else {
     look.answer.set_value(std::nullopt);
@@ -73,10 +85,6 @@ void LookWorker::Stop() {
   thread_.Join();
 }
 
-std::deque<LookWorker::Look>& LookWorker::First() {
-  return !waiting_.empty() ? waiting_ : !routine_.empty() ? routine_ : growth_;
-}
-
 void LookWorker::TakeLooks() {
   // Samples come first. Linux keeps this value by thread, whatever POSIX says
   // of processes; if it refuses, the looks compete with the rest.
@@ -84,13 +92,12 @@ void LookWorker::TakeLooks() {
   setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), kNice);
   const std::stop_token stop = stop_.get_token();
   MutexLock lock(mutex_);
-  const auto due = [this]() REQUIRES(mutex_) { return !First().empty(); };
+  const auto due = [this]() REQUIRES(mutex_) { return !waiting_.empty(); };
   // A wait that a stop ends returns due(), which is true while looks are
   // waiting. Without the second condition a stop would take them all first.
   while (arrival_.wait(lock, stop, due) && !stop.stop_requested()) {
-    std::deque<Look>& first = First();
-    Look look = std::move(first.front());
-    first.pop_front();
+    Look look = std::move(waiting_.front());
+    waiting_.pop_front();
     lock.unlock();
     Answer answer = Take(look);
     const bool taken = answer.has_value();

@@ -60,22 +60,20 @@ class LookWorker {
   /// Ends the thread, at once between two hypotheses; gives up waiting looks.
   void Stop();
   /// Looks at episodes that wait for the thread. Any thread.
-  std::size_t waiting() const {
-    const MutexLock lock(mutex_);
-    return waiting_.size();
-  }
+  std::size_t waiting() const;
   /// The thread ended with an exception, which Stop() throws. Any thread.
   bool failed() const { return thread_.failed(); }
 
  private:
+  enum class Rank : std::uint8_t { kNaming, kRoutine, kGrowth };
   struct Look {
+    Rank rank;
     std::string valve_id;
     Physics physics;
     LookTask task;
     std::promise<Answer> answer{};
   };
 
-  std::deque<Look>& First() REQUIRES(mutex_);
   void TakeLooks();
   Answer Take(const Look& look) const;
 
@@ -86,9 +84,7 @@ class LookWorker {
   std::stop_source stop_;
   mutable Mutex mutex_;
   std::condition_variable_any arrival_;
-  std::deque<Look> waiting_ GUARDED_BY(mutex_);
-  std::deque<Look> routine_ GUARDED_BY(mutex_);
-  std::deque<Look> growth_ GUARDED_BY(mutex_);
+  std::deque<Look> waiting_ GUARDED_BY(mutex_);  // By rank, then as asked for.
   Worker thread_;
 };
 

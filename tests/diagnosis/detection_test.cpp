@@ -106,6 +106,20 @@ TEST(DetectionTest, AShareIsHeldForAsLongAsADetectionTakes) {
   EXPECT_NEAR(shares[209], 0.8, 0.05);
 }
 
+// One limit now and the other one next is no run beyond either.
+TEST(DetectionTest, ASharePassesOneLimitAllTheTime) {
+  ModelSet models = *SharedPlant();
+  models.decision.detection_samples = 3;
+  const double limit = models.channels[1].upper_threshold;
+  ValveEngine engine(std::make_shared<const ModelSet>(models));
+  for (std::uint64_t k = 0; k < 260; ++k) {
+    Sample sample = PlantSample(k);
+    sample.values[Index(Signal::kF)] +=
+        k < 200 ? 0.0 : (k % 2 == 0 ? 0.8 : -0.8) * limit;
+    EXPECT_LT(engine.Step(sample).share, 0.5) << k;
+  }
+}
+
 // An error of the model at one end of the range, where CV never stayed in
 // training, is no drift; at the usual place it is.
 TEST(DetectionTest, WindowHoldsForTheCommandsItWasFittedTo) {
