@@ -112,6 +112,16 @@ await 20 grep -q "valve=V3.*missing_signal\|missing_signal.*valve=V3" monitor.lo
 ! grep "missing_signal" monitor.log | grep -q "valve=V[12]" ||
   fail "V1 or V2 lacks signals"
 
+# A table that is too long for the writers of the first one is refused.
+mv plant.toml kept.toml
+{
+  cat kept.toml
+  for i in $(seq 200); do printf '[[loop]]\nname = "W%d"\n' "$i"; done
+} >plant.toml
+kill -HUP $gateway
+await 20 grep -q "table_refused.*203 valves.*room for 106" live.log
+mv kept.toml plant.toml
+
 # A valve less, one in another group, and the others go on.
 sed -i '/"V2"/d; s/^name = "V4"/name = "V2"\ngroup = "B"\n[[loop]]\n&/' plant.toml
 kill -HUP $gateway
