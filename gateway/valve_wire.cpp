@@ -155,7 +155,7 @@ void ValveWire::Publish(const std::string& valve_id, const Sample& sample) {
 }
 
 // As `fdi-simulator replay` does. A set that cannot be read is the monitor's to
-// refuse.
+// refuse, and no reason to withhold the samples of any valve.
 void ValveWire::ConvertFlow(const std::string& valve_id, Sample& sample) {
   if (!sample.Has(Signal::kF)) {
     return;
@@ -163,12 +163,18 @@ void ValveWire::ConvertFlow(const std::string& valve_id, Sample& sample) {
   auto known = flows_.find(valve_id);
   if (known == flows_.end()) {
     known = flows_.emplace(valve_id, std::nullopt).first;
-    const storage::DataDirectory data{context_.options.data_dir};
-    if (std::filesystem::exists(data.models())) {
-      storage::ModelStore store(data.models());
-      if (const auto set = store.AssignedModelSet(valve_id)) {
-        known->second.emplace(simulator::FlowTargetOf(store.Load(*set)));
+    try {
+      const storage::DataDirectory data{context_.options.data_dir};
+      if (std::filesystem::exists(data.models())) {
+        storage::ModelStore store(data.models());
+        if (const auto set = store.AssignedModelSet(valve_id)) {
+          known->second.emplace(simulator::FlowTargetOf(store.Load(*set)));
+        }
       }
+    } catch (const std::exception& error) {
+      context_.log(LogLevel::kWarning,
+                   EventLine("flow_not_converted",
+                             {{"valve", valve_id}, {"reason", error.what()}}));
     }
   }
   if (known->second) {

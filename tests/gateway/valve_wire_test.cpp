@@ -1,6 +1,8 @@
 // The samples of all valves by one participant, with a reader of one group.
 #include "gateway/valve_wire.h"
 
+#include <fstream>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -74,6 +76,18 @@ TEST_F(ValveWireTest, AGroupWithoutAValveHasNoWriter) {
   EXPECT_TRUE(Has(2, 1, 1));
   EXPECT_THAT(samples_, ElementsAre("V1", "V3"));
   EXPECT_THAT(ends_, ElementsAre("V1"));
+}
+
+TEST_F(ValveWireTest, ModelsThatCannotBeReadWithholdNoSample) {
+  std::ofstream(directory_.path() / "models.db") << std::string(4096, 'x');
+  wire_.Use({Row("V1", "A")});
+  ASSERT_TRUE(Has(0, 0, 1));
+  wire_.AwaitReader();
+  Sample sample;
+  sample.Set(Signal::kF, 42.0);
+  wire_.Publish("V1", sample);
+  EXPECT_TRUE(log_.WaitFor("flow_not_converted valve=V1"));
+  EXPECT_TRUE(Has(1, 0, 1));
 }
 
 }  // namespace
