@@ -54,6 +54,10 @@ samples() {  # DATA: of all runs, by valve.
   done
 }
 
+! "$bin/fdi-gateway" --domain "$domain" out --lines no/such 2>out.log ||
+  fail "out writes to a folder that is not there"
+grep -q "no/such cannot be written: No such file" out.log || fail "$(cat out.log)"
+
 # By file and by lines.
 base=$(($(date +%s) - 7200))
 for valve in $valves; do
