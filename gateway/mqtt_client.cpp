@@ -56,16 +56,6 @@ const char* OrNull(const std::string& text) {
   return text.empty() ? nullptr : text.c_str();
 }
 
-void LibraryOnce() {
-  static const int initialised = mosquitto_lib_init();
-  static_cast<void>(initialised);
-}
-
-std::string NewClientId() {
-  std::random_device random;
-  return "fdi-gateway-" + std::to_string(random());
-}
-
 }  // namespace
 
 void MqttOptions::AddTo(CLI::App& verb) {
@@ -152,8 +142,10 @@ MqttClient::MqttClient(const MqttOptions& options,
   RequireFile(options.ca, "--ca");
   RequireFile(options.certificate, "--certificate");
   RequireFile(options.key, "--key");
-  LibraryOnce();
-  library_ = mosquitto_new(NewClientId().c_str(), true, this);
+  [[maybe_unused]] static const int once = mosquitto_lib_init();
+  const std::string id =
+      "fdi-gateway-" + std::to_string(std::random_device()());
+  library_ = mosquitto_new(id.c_str(), true, this);
   if (library_ == nullptr) {
     throw std::bad_alloc();
   }
