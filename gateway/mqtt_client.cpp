@@ -170,6 +170,9 @@ void MqttClient::SetUp(const MqttOptions& options) {
     check(mosquitto_username_pw_set(library_, address_.user.c_str(),
                                     OrNull(password)),
           "--mqtt");
+  } else if (!options.password.empty()) {
+    throw ConfigError(
+        "--password-file: no user; expected --mqtt mqtt://USER@HOST");
   }
   if (address_.tls) {
     check(mosquitto_tls_set(library_, OrNull(options.ca.string()),
@@ -177,8 +180,9 @@ void MqttClient::SetUp(const MqttOptions& options) {
                             OrNull(options.certificate.string()),
                             OrNull(options.key.string()), nullptr),
           "--ca, --certificate, --key");
-  } else if (!options.ca.empty() || !options.certificate.empty()) {
-    throw ConfigError("--ca and --certificate are of mqtts://");
+  } else if (!options.ca.empty() || !options.certificate.empty() ||
+             !options.key.empty()) {
+    throw ConfigError("--ca, --certificate and --key are of mqtts://");
   }
   mosquitto_connect_callback_set(
       library_, [](mosquitto*, void* self, int code) {
