@@ -360,8 +360,17 @@ std::string ReadTextFile(const std::filesystem::path& path) {
   return ToUtf8(std::move(bytes), SourceOf(path));
 }
 
-TextLines::TextLines(std::string_view text, std::string source)
-    : source_(std::move(source)),
+std::string LinePlaces::At(std::size_t line) const {
+  Part part{name, 1, 1};
+  if (parts) {
+    const auto next = std::ranges::upper_bound(*parts, line, {}, &Part::first);
+    part = next == parts->begin() ? part : *std::prev(next);
+  }
+  return part.file + ':' + std::to_string(line - part.first + part.line);
+}
+
+TextLines::TextLines(std::string_view text, LinePlaces places)
+    : places_(std::move(places)),
       text_(text),
       end_(text.size()),
       count_(static_cast<std::size_t>(std::ranges::count(text, '\n'))) {
@@ -483,8 +492,10 @@ std::vector<std::string> TagsOf(const std::vector<std::filesystem::path>& files,
 // Each file is read twice, so that a folder of many does not take their memory.
 TextLines TextLines::OfFolder(const std::filesystem::path& folder) {
   TextLines joined;
-  joined.source_ = SourceOf(folder);
-  joined.file_ = TemporaryFile(joined.source_);
+  joined.places_.name = SourceOf(folder);
+  const auto parts = std::make_shared<std::vector<LinePlaces::Part>>();
+  joined.places_.parts = parts;
+  joined.file_ = TemporaryFile(joined.places_.name);
   std::vector<Header> headers;
   const std::vector<std::filesystem::path> files = TablesIn(folder);
   std::ranges::transform(files, std::back_inserter(headers), HeaderOf);
@@ -496,7 +507,7 @@ TextLines TextLines::OfFolder(const std::filesystem::path& folder) {
   }
   text += '\n';
   const auto flush = [&] {
-    Append(text, *joined.file_, joined.source_);
+    Append(text, *joined.file_, joined.places_.name);
     joined.end_ += text.size();
     text.clear();
   };
@@ -504,8 +515,7 @@ TextLines TextLines::OfFolder(const std::filesystem::path& folder) {
   for (std::size_t i = 0; i < files.size(); ++i) {
     const TextLines table = OfFile(files[i]);
     joined.packed_ = joined.packed_ || table.packed();
-    joined.parts_.push_back(
-        {files[i].string(), count + 1, headers[i].line + 1});
+    parts->push_back({files[i].string(), count + 1, headers[i].line + 1});
     CsvCells record(sign);
     table.ForEach(
         [&](std::string_view line, std::size_t) {
@@ -527,25 +537,6 @@ TextLines TextLines::OfFolder(const std::filesystem::path& folder) {
   return joined;
 }
 
-std::string TextLines::WithPlace(std::string message) const {
-  const std::string begins = source_ + ":";
-  if (!message.starts_with(begins)) {
-    return message;
-  }
-  const std::size_t end = std::min(
-      message.find_first_not_of("0123456789", begins.size()), message.size());
-  const auto line = ParseWhole<std::size_t>(
-      std::string_view(message).substr(0, end).substr(begins.size()));
-  const auto part = std::find_if(
-      parts_.rbegin(), parts_.rend(),
-      [&](const Part& each) { return line && each.first <= *line; });
-  return part == parts_.rend()
-             ? message
-             : part->file + ":" +
-                   std::to_string(*line - part->first + part->line) +
-                   message.substr(end);
-}
-
 TextLines TextLines::OfFile(const std::filesystem::path& path) {
   const std::string source = SourceOf(path);
   std::error_code none;
@@ -556,14 +547,14 @@ TextLines TextLines::OfFile(const std::filesystem::path& path) {
   if (raw.file == nullptr) {
     auto own = std::make_shared<const std::string>(
         ToUtf8(std::move(raw.head), source));
-    TextLines lines(*own, source);
+    TextLines lines(*own, {source});
     lines.own_ = std::move(own);
     lines.packed_ = raw.packed;
     return lines;
   }
   const Encoding encoding = EncodingOf(raw.head, raw.utf8.valid(), source);
   TextLines lines;
-  lines.source_ = source;
+  lines.places_.name = source;
   lines.packed_ = raw.packed;
   const bool as_is = encoding == Encoding::kUtf8 && raw.has_lf;
   lines.file_ = as_is ? raw.file : Convert(raw, encoding, source);
@@ -585,7 +576,7 @@ TextLines TextLines::OfFile(const std::filesystem::path& path) {
 void TextLines::CountLines() {
   ForEach([&](std::string_view line, std::size_t number) {
     if (line.find('\0') != std::string_view::npos) {
-      throw DataError(source_ + ": is binary, not text: export it as CSV");
+      throw DataError(places_.name + ": is binary, not text: export it as CSV");
     }
     count_ = number;
     return true;
@@ -597,13 +588,13 @@ std::string_view TextLines::Block(std::size_t begin, std::size_t end,
   if (file_ == nullptr) {
     return text_.substr(begin, end - begin);
   }
-  buffer = ReadAt(*file_, begin, end - begin, source_);
+  buffer = ReadAt(*file_, begin, end - begin, places_.name);
   return buffer;
 }
 
 void TextLines::CheckLength(std::size_t length, std::size_t number) const {
   if (length > kLongestLine) {
-    throw DataError(source_ + ":" + std::to_string(number) +
+    throw DataError(places_.At(number) +
                     ": the line is longer than 2 MiB; expected a table with "
                     "a line break behind each row");
   }

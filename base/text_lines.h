@@ -11,6 +11,21 @@
 
 namespace fdi {
 
+/// Where the lines of a text are, for messages.
+struct LinePlaces {
+  /// A file of a folder that is read as one table.
+  struct Part {
+    std::string file;
+    std::size_t first;  ///< Line of its first row in the table,
+    std::size_t line;   ///< and in the file.
+  };
+  std::string name{"input"};                         ///< Of the file or folder.
+  std::shared_ptr<const std::vector<Part>> parts{};  ///< Null: one file.
+
+  /// "plant.csv:12"; of a folder the file and its own line.
+  std::string At(std::size_t line) const;
+};
+
 /// The lines of a text, read in passes. At most 16 MiB of a file are kept in
 /// memory: a longer one is read again in each pass, from a temporary file
 /// without a name if it has to be unpacked or converted to UTF-8. So a gzip of
@@ -22,7 +37,7 @@ class TextLines {
   using Take = std::function<bool(std::string_view, std::size_t)>;
 
   /// @param text has to outlive this.
-  explicit TextLines(std::string_view text, std::string source = "input");
+  explicit TextLines(std::string_view text, LinePlaces places = {});
   /// Lines of a file, or of stdin for `-`, as ReadTextFile() reads it. A folder
   /// with a file for each tag is one table with a first column `tag`: the name
   /// of the file without its extension, or that of its last column where this
@@ -38,18 +53,11 @@ class TextLines {
 
   /// True if the file was a gzip.
   bool packed() const { return packed_; }
-  /// `message`, in which "FOLDER:LINE:" becomes the file and line of a folder.
-  std::string WithPlace(std::string message) const;
+  const LinePlaces& places() const { return places_; }
   /// Size of the text.
   std::size_t bytes() const { return end_ - begin_; }
 
  private:
-  struct Part {
-    std::string file;
-    std::size_t first;  // Line of its first row,
-    std::size_t line;   // and that in the file.
-  };
-
   TextLines() = default;
   static TextLines OfFolder(const std::filesystem::path& folder);
   void CountLines();
@@ -57,7 +65,7 @@ class TextLines {
                          std::string& buffer) const;
   void CheckLength(std::size_t length, std::size_t number) const;
 
-  std::string source_;
+  LinePlaces places_;
   std::shared_ptr<const std::string> own_;
   std::string_view text_;  // Unless it is in file_.
   std::shared_ptr<std::FILE> file_;
@@ -65,7 +73,6 @@ class TextLines {
   std::size_t end_{0};
   std::size_t count_{0};
   bool packed_{false};
-  std::vector<Part> parts_;  // A folder has them.
 };
 
 }  // namespace fdi

@@ -1,7 +1,6 @@
 #include "gateway/intake.h"
 
 #include <chrono>
-#include <set>
 #include <utility>
 
 #include "base/error.h"
@@ -49,11 +48,12 @@ Intake::Intake(const IntakeOptions& options, ReadingSource& source,
                  [this](const AssemblyNote& note) { Say(note); }),
       wire_({table_.valves.size(), options.by_group, source.may_wait()},
             context, signals) {
-  Announce();
-  source_.Use(table_);
+  Use();
 }
 
-void Intake::Announce() {
+void Intake::Use() {
+  wire_.Use(table_.valves);
+  source_.Use(table_);
   for (const RefusedRow& row : table_.refused) {
     context_.log(LogLevel::kWarning,
                  EventLine("row_refused", {{"valve", row.name},
@@ -71,29 +71,21 @@ void Intake::Reload() {
       throw ConfigError(
           "resample has changed, which takes a new start of the gateway");
     }
+    if (table.valves.size() > wire_.room()) {
+      throw ConfigError(std::to_string(table.valves.size()) +
+                        " valves; this gateway was started with room for " +
+                        std::to_string(wire_.room()) +
+                        ", and more take a new start");
+    }
   } catch (const std::exception& error) {
     context_.log(LogLevel::kWarning,
                  EventLine("table_refused", {{"file", options_.plant.string()},
                                              {"reason", error.what()}}));
     return;
   }
-  std::set<std::pair<std::string, std::string>> stay;
-  const auto place = [this](const importer::LiveValve& valve) {
-    return std::pair(valve.id, options_.by_group ? valve.group : "");
-  };
-  for (const importer::LiveValve& valve : table.valves) {
-    stay.insert(place(valve));
-  }
-  for (const importer::LiveValve& valve : table_.valves) {
-    if (!stay.contains(place(valve))) {
-      wire_.End(valve.id);
-    }
-  }
   table_ = std::move(table);
   assembler_.Replace(table_.valves);
-  wire_.ForgetUnits();
-  source_.Use(table_);
-  Announce();
+  Use();
   context_.log(LogLevel::kInfo,
                EventLine("table_read",
                          {{"file", options_.plant.string()},
@@ -178,7 +170,7 @@ ReadingHandlers Intake::Handlers() {
 importer::Assembler::Sink Intake::Sink() {
   return [this](const importer::LiveValve& valve, const Sample& sample) {
     try {
-      wire_.Publish(valve.id, valve.group, sample);
+      wire_.Publish(valve.id, sample);
     } catch (const DataError& error) {
       calm_.Warn("sample_refused", valve.id,
                  {{"valve", valve.id}, {"reason", error.what()}});

@@ -37,7 +37,7 @@ class Intake {
   report::Json Summary() const;
 
  private:
-  void Announce();
+  void Use();
   void Reload();
   void Take(const importer::TagReading& reading);
   void Say(const importer::AssemblyNote& note);

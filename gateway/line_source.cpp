@@ -18,25 +18,19 @@ constexpr std::size_t kMaxLine = 64U << 10U;
 
 }  // namespace
 
-LineSource::LineSource(const std::string& path) {
-  if (path == "-") {
-    descriptor_ = STDIN_FILENO;
-    return;
-  }
-  descriptor_ = open(path.c_str(), O_RDONLY | O_CLOEXEC);
+LineSource::LineSource(const std::string& path)
+    : descriptor_(path == "-" ? dup(STDIN_FILENO)
+                              : open(path.c_str(), O_RDONLY | O_CLOEXEC)) {
   if (descriptor_ < 0) {
     if (errno == ENOENT) {
       throw NotFoundError("--lines: there is no " + path);
     }
     throw std::system_error(errno, std::generic_category(), path);
   }
-  own_ = true;
 }
 
 LineSource::~LineSource() {
-  if (own_) {
-    close(descriptor_);
-  }
+  close(descriptor_);
 }
 
 bool LineSource::Poll(std::chrono::milliseconds timeout,

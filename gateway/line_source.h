@@ -26,8 +26,7 @@ class LineSource final : public ReadingSource {
  private:
   void TakeLine(std::string_view line, const ReadingHandlers& handlers);
 
-  int descriptor_{-1};
-  bool own_{false};
+  int descriptor_;
   std::string buffer_;    // Bytes without a line end yet.
   bool skipping_{false};  // The rest of a line that is too long.
   importer::ReadingLines lines_;

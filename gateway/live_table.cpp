@@ -41,20 +41,6 @@ TagMatch Match(const PlantRow& row) {
   return match;
 }
 
-// PV and SP keep their own unit. As in a file, a value beyond the range by a
-// tenth is no reading.
-void AddOwnUnit(const PlantRow& row, const TagMatch& match, LoopTag tag,
-                Signal signal, importer::ColumnMap& map) {
-  importer::ColumnMapping& mapping = map.columns.emplace_back();
-  mapping.column = match[tag];
-  mapping.signal = signal;
-  if (const auto& range = row[tag].range) {
-    const double margin = 0.1 * (range->second - range->first);
-    mapping.lowest = range->first - margin;
-    mapping.highest = range->second + margin;
-  }
-}
-
 importer::ColumnMap ColumnsOf(const PlantRow& given, const TagMatch& match) {
   PlantRow row = given;
   const auto flow = row.FlowTag();
@@ -66,9 +52,10 @@ importer::ColumnMap ColumnsOf(const PlantRow& given, const TagMatch& match) {
   const bool pv_is_flow = row.FlowTag() == LoopTag::kPv;
   const bool has_sp = !match[LoopTag::kSp].empty();
   if (!match[LoopTag::kPv].empty() && (!pv_is_flow || has_sp)) {
-    AddOwnUnit(row, match, LoopTag::kPv, Signal::kPv, map);
+    map.columns.push_back(OwnUnitColumn(row, match, LoopTag::kPv, Signal::kPv));
     if (has_sp) {
-      AddOwnUnit(row, match, LoopTag::kSp, Signal::kSp, map);
+      map.columns.push_back(
+          OwnUnitColumn(row, match, LoopTag::kSp, Signal::kSp));
     }
   }
   return map;

@@ -56,16 +56,6 @@ const char* OrNull(const std::string& text) {
   return text.empty() ? nullptr : text.c_str();
 }
 
-void LibraryOnce() {
-  static const int initialised = mosquitto_lib_init();
-  static_cast<void>(initialised);
-}
-
-std::string NewClientId() {
-  std::random_device random;
-  return "fdi-gateway-" + std::to_string(random());
-}
-
 }  // namespace
 
 void MqttOptions::AddTo(CLI::App& verb) {
@@ -152,8 +142,10 @@ MqttClient::MqttClient(const MqttOptions& options,
   RequireFile(options.ca, "--ca");
   RequireFile(options.certificate, "--certificate");
   RequireFile(options.key, "--key");
-  LibraryOnce();
-  library_ = mosquitto_new(NewClientId().c_str(), true, this);
+  [[maybe_unused]] static const int once = mosquitto_lib_init();
+  const std::string id =
+      "fdi-gateway-" + std::to_string(std::random_device()());
+  library_ = mosquitto_new(id.c_str(), true, this);
   if (library_ == nullptr) {
     throw std::bad_alloc();
   }
@@ -178,6 +170,9 @@ void MqttClient::SetUp(const MqttOptions& options) {
     check(mosquitto_username_pw_set(library_, address_.user.c_str(),
                                     OrNull(password)),
           "--mqtt");
+  } else if (!options.password.empty()) {
+    throw ConfigError(
+        "--password-file: no user; expected --mqtt mqtt://USER@HOST");
   }
   if (address_.tls) {
     check(mosquitto_tls_set(library_, OrNull(options.ca.string()),
@@ -185,8 +180,9 @@ void MqttClient::SetUp(const MqttOptions& options) {
                             OrNull(options.certificate.string()),
                             OrNull(options.key.string()), nullptr),
           "--ca, --certificate, --key");
-  } else if (!options.ca.empty() || !options.certificate.empty()) {
-    throw ConfigError("--ca and --certificate are of mqtts://");
+  } else if (!options.ca.empty() || !options.certificate.empty() ||
+             !options.key.empty()) {
+    throw ConfigError("--ca, --certificate and --key are of mqtts://");
   }
   mosquitto_connect_callback_set(
       library_, [](mosquitto*, void* self, int code) {

@@ -25,12 +25,12 @@ namespace fdi::gateway {
 /// The address of a broker and the keys to it. Secrets come by files or by the
 /// environment, because everybody can see the arguments of a program.
 struct MqttOptions {
-  std::string url;           ///< mqtt[s]://[USER@]HOST[:PORT]
-  std::filesystem::path ca;  ///< PEM; empty: the authorities of the system.
-  std::filesystem::path certificate;  ///< For this client, with its key.
-  std::filesystem::path key;
-  std::filesystem::path password;  ///< A file; empty: FDI_MQTT_PASSWORD.
-  std::string sparkplug;           ///< A group; empty: topics of our own.
+  std::string url{};           ///< mqtt[s]://[USER@]HOST[:PORT]
+  std::filesystem::path ca{};  ///< PEM; empty: the authorities of the system.
+  std::filesystem::path certificate{};  ///< For this client, with its key.
+  std::filesystem::path key{};
+  std::filesystem::path password{};  ///< A file; empty: FDI_MQTT_PASSWORD.
+  std::string sparkplug{};           ///< A group; empty: topics of our own.
 
   /// Adds --mqtt, --sparkplug, --ca, --certificate, --key and --password-file.
   void AddTo(CLI::App& verb);

@@ -32,7 +32,6 @@ class MqttSource final : public ReadingSource {
             const ReadingHandlers& handlers) override;
   void Use(const LiveTable& table) override;
   std::uint64_t dropped() const override { return client_.dropped(); }
-  bool may_wait() const override { return false; }
 
  private:
   void TakeMessage(const MqttEvent& event, const ReadingHandlers& handlers);

@@ -38,7 +38,7 @@ class ReadingSource {
   virtual std::uint64_t dropped() const { return 0; }
   /// True if samples may wait for a reader that is behind, which holds up the
   /// source.
-  virtual bool may_wait() const = 0;
+  virtual bool may_wait() const { return false; }
 };
 
 }  // namespace fdi::gateway

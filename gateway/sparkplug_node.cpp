@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "base/time_text.h"
+#include "diagnosis/model/severity.h"
 #include "gateway/valve_states.h"
 
 namespace fdi::gateway {
@@ -20,9 +21,7 @@ constexpr std::int64_t kNsPerMs = 1'000'000;
 constexpr std::array<std::string_view, 5> kHealths{
     "NORMAL", "FAILURE", "CHECK_FUNCTION", "OFF_SPEC", "MAINTENANCE_REQUIRED"};
 // 250 to 1000 in equal steps, as gateway/opcua/valves.mjs has them.
-constexpr std::array<std::string_view, 4> kSeverities{"low", "medium", "high",
-                                                      "critical"};
-constexpr std::uint32_t kSeverityStep = 250;
+constexpr int kSeverityStep = 250;
 
 // The metrics, and the keys of the state that they show.
 struct Shown {
@@ -37,15 +36,10 @@ constexpr std::array<Shown, 9> kShown{{
     {"FaultName", sparkplug::STRING, "name"},
     {"Certainty", sparkplug::STRING, "certainty"},
     {"Strength", sparkplug::DOUBLE, "strength_pct"},
-    {"Severity", sparkplug::UINT16, "severity"},
+    {"Severity", sparkplug::UINT16, "priority"},
     {"Since", sparkplug::DATE_TIME, "since_utc"},
     {"Check", sparkplug::STRING, "check"},
 }};
-
-std::uint32_t IndexOf(const auto& words, const std::string& word) {
-  return static_cast<std::uint32_t>(std::ranges::find(words, word) -
-                                    words.begin());
-}
 
 sparkplug::Metric& AddMetric(const char* name, sparkplug::DataType type,
                              Payload& payload) {
@@ -68,10 +62,12 @@ void Show(const Json& state, const Shown& shown, Payload& payload) {
     metric.set_long_value(static_cast<std::uint64_t>(
         ParseTime(value.get<std::string>(), true) / kNsPerMs));
   } else if (shown.type == sparkplug::UINT16) {
-    metric.set_int_value(kSeverityStep *
-                         (IndexOf(kSeverities, value.get<std::string>()) + 1));
+    metric.set_int_value(static_cast<std::uint32_t>(
+        kSeverityStep * (kSeverityCount + 1 - value.get<int>())));
   } else {
-    metric.set_int_value(IndexOf(kHealths, value.get<std::string>()));
+    metric.set_int_value(static_cast<std::uint32_t>(
+        std::ranges::find(kHealths, value.get<std::string>()) -
+        kHealths.begin()));
   }
 }
 

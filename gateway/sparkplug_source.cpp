@@ -42,8 +42,8 @@ std::optional<std::uint64_t> BdSeqOf(const sparkplug::Payload& payload) {
 }
 
 bool IsGood(const sparkplug::Metric& metric) {
-  const auto& [keys, values] =
-      std::pair(metric.properties().keys(), metric.properties().values());
+  const auto& keys = metric.properties().keys();
+  const auto& values = metric.properties().values();
   const auto at = std::ranges::find(keys, "Quality") - keys.begin();
   if (at >= values.size()) {
     return true;

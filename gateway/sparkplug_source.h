@@ -112,7 +112,6 @@ class SparkplugSource final : public ReadingSource {
             const ReadingHandlers& handlers) override;
   void Use(const LiveTable& table) override;
   std::uint64_t dropped() const override { return client_.dropped(); }
-  bool may_wait() const override { return false; }
 
  private:
   SparkplugHost host_;

@@ -4,6 +4,8 @@
 #include <cctype>
 #include <chrono>
 #include <random>
+#include <set>
+#include <thread>
 #include <utility>
 
 #include "base/log.h"
@@ -24,11 +26,6 @@ constexpr milliseconds kPatience(2000);
 constexpr milliseconds kFound(5000);
 // Looks before a reader that is behind is said.
 constexpr int kStalled = 50;
-
-// A table that is read again may have more rows.
-int Room(std::size_t valves) {
-  return static_cast<int>(2 * valves + 100);
-}
 
 // The letters that --partition accepts.
 std::string PartitionOf(const std::string& group) {
@@ -59,23 +56,18 @@ ValveWire::ValveWire(const ValveWireOptions& options,
       signals_(signals),
       participant_(monitor::DdsOptionsOf(context.options,
                                          std::max(idl::DdsOptions{}.max_valves,
-                                                  Room(options.valves))),
-                   context.log, "fdi-gateway") {
-  if (!options_.by_group) {
-    WriterOf("");
-  }
-}
+                                                  static_cast<int>(room()))),
+                   context.log, "fdi-gateway") {}
 
 ValveWire::Writer& ValveWire::WriterOf(const std::string& group) {
-  const std::string partition =
-      options_.by_group && !group.empty() ? PartitionOf(group) : "";
+  const std::string partition = options_.by_group ? PartitionOf(group) : "";
   auto& writer = writers_[partition];
   if (!writer) {
     writer = std::make_unique<Writer>(
         participant_,
         idl::PublisherOptions{
             options_.lossless ? idl::Profile::kLossless : idl::Profile::kLive,
-            Room(options_.valves),
+            static_cast<int>(room()),
             partition.empty()
                 ? ParsePartitions(context_.options.partition, false)
                 : std::vector{partition}});
@@ -83,13 +75,39 @@ ValveWire::Writer& ValveWire::WriterOf(const std::string& group) {
   return *writer;
 }
 
+void ValveWire::Use(const std::vector<importer::LiveValve>& valves) {
+  const auto former = std::exchange(valves_, {});
+  std::set<const Writer*> used;
+  for (const importer::LiveValve& valve : valves) {
+    Writer& writer = WriterOf(valve.group);
+    used.insert(&writer);
+    const auto known = former.find(valve.id);
+    const bool stays = known != former.end() && known->second.writer == &writer;
+    valves_[valve.id] = {&writer,
+                         stays ? known->second.source_id : NewSourceId()};
+  }
+  for (const auto& [valve_id, valve] : former) {
+    const auto known = valves_.find(valve_id);
+    if (known == valves_.end() || known->second.writer != valve.writer) {
+      message_.valve_id = valve_id;
+      valve.writer->Unregister(message_);
+    }
+  }
+  Writers gone;
+  for (auto next = writers_.begin(); next != writers_.end();) {
+    const auto writer = next++;
+    if (!used.contains(writer->second.get())) {
+      gone.insert(writers_.extract(writer));
+    }
+  }
+  AwaitAcknowledged(gone);
+  flows_.clear();
+}
+
 void ValveWire::AwaitReader() {
   const auto end = std::chrono::steady_clock::now() + kFound;
   while (!signals_.stop_requested() && std::chrono::steady_clock::now() < end &&
          readers() == 0) {
-    if (writers_.empty()) {
-      return;  // Writers of groups come with their first samples.
-    }
     writers_.begin()->second->WaitForReaders(1, kLook);
   }
   if (readers() == 0) {
@@ -106,26 +124,26 @@ int ValveWire::readers() const {
   return most;
 }
 
-bool ValveWire::Publish(const std::string& valve_id, const std::string& group,
-                        const Sample& sample) {
-  auto known = valves_.find(valve_id);
-  if (known == valves_.end()) {
-    known =
-        valves_.emplace(valve_id, Valve{&WriterOf(group), NewSourceId()}).first;
-  }
+void ValveWire::Publish(const std::string& valve_id, const Sample& sample) {
+  const Valve& valve = valves_.at(valve_id);
   message_.valve_id = valve_id;
   message_.sample = sample;
-  message_.sample.source_id = known->second.source_id;
+  message_.sample.source_id = valve.source_id;
   ConvertFlow(valve_id, message_.sample);
   int looks = 0;
   while (!signals_.stop_requested()) {
-    if (known->second.writer->Write(message_, {}, kLook) ==
-        idl::WriteResult::kSent) {
+    const auto result = valve.writer->Write(message_, {}, kLook);
+    if (result == idl::WriteResult::kSent) {
       ++sent_;
-      return true;
+      return;
     }
     if (!options_.lossless) {
       break;
+    }
+    if (result == idl::WriteResult::kTooManyValves) {
+      // Its place is that of a valve whose end readers do not have yet, and
+      // Write() does not wait for that.
+      std::this_thread::sleep_for(kLook);
     }
     if (++looks == kStalled) {
       context_.log(LogLevel::kWarning,
@@ -134,11 +152,10 @@ bool ValveWire::Publish(const std::string& valve_id, const std::string& group,
     }
   }
   ++not_sent_;
-  return false;
 }
 
 // As `fdi-simulator replay` does. A set that cannot be read is the monitor's to
-// refuse.
+// refuse, and no reason to withhold the samples of any valve.
 void ValveWire::ConvertFlow(const std::string& valve_id, Sample& sample) {
   if (!sample.Has(Signal::kF)) {
     return;
@@ -146,12 +163,18 @@ void ValveWire::ConvertFlow(const std::string& valve_id, Sample& sample) {
   auto known = flows_.find(valve_id);
   if (known == flows_.end()) {
     known = flows_.emplace(valve_id, std::nullopt).first;
-    const storage::DataDirectory data{context_.options.data_dir};
-    if (std::filesystem::exists(data.models())) {
-      storage::ModelStore store(data.models());
-      if (const auto set = store.AssignedModelSet(valve_id)) {
-        known->second.emplace(simulator::FlowTargetOf(store.Load(*set)));
+    try {
+      const storage::DataDirectory data{context_.options.data_dir};
+      if (std::filesystem::exists(data.models())) {
+        storage::ModelStore store(data.models());
+        if (const auto set = store.AssignedModelSet(valve_id)) {
+          known->second.emplace(simulator::FlowTargetOf(store.Load(*set)));
+        }
       }
+    } catch (const std::exception& error) {
+      context_.log(LogLevel::kWarning,
+                   EventLine("flow_not_converted",
+                             {{"valve", valve_id}, {"reason", error.what()}}));
     }
   }
   if (known->second) {
@@ -159,17 +182,12 @@ void ValveWire::ConvertFlow(const std::string& valve_id, Sample& sample) {
   }
 }
 
-void ValveWire::End(const std::string& valve_id) {
-  if (const auto known = valves_.find(valve_id); known != valves_.end()) {
-    message_.valve_id = valve_id;
-    known->second.writer->Unregister(message_);
-    valves_.erase(known);
-  }
-}
-
-void ValveWire::Finish() {
-  for (const auto& [partition, writer] : writers_) {
-    writer->WaitForAcknowledged(kPatience);
+void ValveWire::AwaitAcknowledged(const Writers& writers) {
+  const auto end = std::chrono::steady_clock::now() + kPatience;
+  for (const auto& [partition, writer] : writers) {
+    writer->WaitForAcknowledged(
+        std::max(milliseconds(0), std::chrono::duration_cast<milliseconds>(
+                                      end - std::chrono::steady_clock::now())));
   }
 }
 

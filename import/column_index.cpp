@@ -44,9 +44,9 @@ std::string_view Trimmed(std::string_view cell) {
 }  // namespace
 
 ColumnIndex::ColumnIndex(const std::filesystem::path& path,
-                         const ColumnMap& map, std::size_t max_lines)
-    : source_(path.string()) {
+                         const ColumnMap& map, std::size_t max_lines) {
   const TextLines lines = TextLines::OfFile(path);
+  source_ = lines.places();
   packed_ = lines.packed();
   text_.reserve(lines.bytes() + 1);
   lines.ForEach([&](std::string_view line, std::size_t) {
@@ -64,11 +64,11 @@ ColumnIndex::ColumnIndex(const std::filesystem::path& path,
 }
 
 void ColumnIndex::FindForm(const ColumnMap& map) {
-  const Layout layout = FindLayout(
-      TextLines(FirstLines(text_, kHeadLines), source_), map, source_, true);
+  const Layout layout =
+      FindLayout(TextLines(FirstLines(text_, kHeadLines), source_), map, true);
   names_ = layout.names;
   if (names_.empty()) {
-    throw DataError(source_ + ": no header with rows below it");
+    throw DataError(source_.name + ": no header with rows below it");
   }
   form_ = map;
   form_.columns.clear();
@@ -104,7 +104,7 @@ void ColumnIndex::IndexRows() {
     begin = TakeRecord(begin, line) + 1;
     if (packed_ &&
         (bytes() > kMaxPacked || rows_of_tag_.size() > kMaxColumns)) {
-      throw DataError(source_ +
+      throw DataError(source_.name +
                       ": takes more than 240 MiB of memory, which a gzip may "
                       "not; try to unpack it with gunzip first, or to export "
                       "fewer tags at a time");

@@ -24,7 +24,8 @@ class ColumnIndex {
   ColumnIndex(const std::filesystem::path& path, const ColumnMap& map,
               std::size_t max_lines = 0);
 
-  const std::string& source() const { return source_; }
+  /// For CsvOptions of what Project() returns.
+  const LinePlaces& source() const { return source_; }
   /// Columns of values, or tags of a long table.
   const std::vector<std::string>& tags() const { return tags_; }
   /// The form of the table, for reading what Project() returns.
@@ -54,7 +55,7 @@ class ColumnIndex {
   std::size_t ColumnOf(std::string_view name) const;
   std::string ProjectLong(const std::vector<std::string>& tags) const;
 
-  std::string source_;
+  LinePlaces source_;
   bool packed_{false};
   std::string text_;
   ColumnMap form_;

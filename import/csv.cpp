@@ -187,8 +187,7 @@ CsvReader::CsvReader(CsvOptions options)
 }
 
 void CsvReader::Refuse(const std::string& reason) const {
-  throw DataError(options_.source + ":" + std::to_string(line_) + ": " +
-                  reason);
+  throw DataError(Place() + reason);
 }
 
 //     table  = skipped ["sep=" sign] header {row / header / comment / marker}
@@ -517,13 +516,13 @@ void CsvReader::Finish() const {
     Refuse("a quote is not closed before the end; expected a closing \"");
   }
   if (names_.empty()) {
-    throw DataError(options_.source + ": is empty: no header, no rows");
+    throw DataError(options_.source.name + ": is empty: no header, no rows");
   }
   if (rows_ == 0 && !pending_.empty()) {
     throw DataError(pending_);
   }
   if (tag_column_ && !options_.scan && options_.map.columns.empty()) {
-    throw DataError(options_.source + ": no tag of column " +
+    throw DataError(options_.source.name + ": no tag of column " +
                     Quoted(names_[*tag_column_]) +
                     " is mapped to a signal; the tags are " +
                     Quoted(Listed(header_.ignored_columns)) +
@@ -532,7 +531,7 @@ void CsvReader::Finish() const {
   }
   for (std::size_t i = 0; i < used_.size(); ++i) {
     if (!used_[i]) {
-      throw DataError(options_.source + ": tag " +
+      throw DataError(options_.source.name + ": tag " +
                       Quoted(conversions_[i].mapping.column) +
                       " does not occur; the others are " +
                       Quoted(Listed(header_.ignored_columns)) +
@@ -542,7 +541,7 @@ void CsvReader::Finish() const {
     }
   }
   if (rows_ == 0) {
-    throw DataError(options_.source + ": has a header but no rows");
+    throw DataError(options_.source.name + ": has a header but no rows");
   }
 }
 
@@ -944,8 +943,8 @@ std::string CsvReader::NoTime(const std::string& cell) const {
       word != std::string::npos && word + 1 < cell.size() &&
       std::isalpha(static_cast<unsigned char>(cell[word + 1])) != 0 &&
       ScanTime(cell.substr(0, word)).has_value();
-  return options_.source + ':' + std::to_string(line_) + ": column " +
-         Quoted(names_[*time_column_]) + ": " + Quoted(cell) +
+  return Place() + "column " + Quoted(names_[*time_column_]) + ": " +
+         Quoted(cell) +
          (slashed ? " may be day/month or month/day; try date = \"d/m/y\" "
                     "or \"m/d/y\" under [time] of --map"
           : zoned ? " has a zone that is not known, or that several countries "

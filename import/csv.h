@@ -159,7 +159,8 @@ bool IsOpen(const Sample& sample);
 
 /// Settings of the CSV readers.
 struct CsvOptions {
-  std::string source{"input"};  ///< File name for error messages.
+  /// For messages; ReadCsv() of lines has theirs.
+  LinePlaces source{};
   ColumnMap map{};
   /// Required columns; with a map, those of the map instead. Time, CV and one
   /// of X, F are always required.
@@ -308,6 +309,10 @@ class CsvReader {
   std::optional<SignalQuality> KnownQualityAt(std::size_t column) const;
   SignalQuality QualityAt(std::size_t column) const;
   bool IsMarker();
+  /// "plant.csv:12: "
+  std::string Place() const {
+    return options_.source.At(static_cast<std::size_t>(line_)) + ": ";
+  }
   std::string NoTime(const std::string& cell) const;
   void FindTimeForm(const std::string& cell);
   bool TakeTime(CsvRow& row);
@@ -365,10 +370,10 @@ class CsvReader {
 CsvTable ReadCsv(std::string_view text, const CsvOptions& options = {});
 CsvTable ReadCsv(const TextLines& lines, const CsvOptions& options);
 
-/// Reads `path`, or stdin for `-`; CsvOptions::source is set to its name.
+/// Reads `path`, or stdin for `-`.
 /// @throws as above and as ReadTextFile().
 CsvTable ReadCsvFile(const std::filesystem::path& path,
-                     CsvOptions options = {});
+                     const CsvOptions& options = {});
 
 /// The mode that a word of a controller means: AUT, CAS, IMAN, OOS, ...
 std::optional<ValveMode> ModeOfWord(std::string_view word);

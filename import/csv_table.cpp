@@ -111,8 +111,8 @@ class TableReader {
 
  private:
   static CsvOptions Settled(const TextLines& lines, CsvOptions options) {
-    options.map =
-        FindLayout(lines, std::move(options.map), options.source, false).map;
+    options.map = FindLayout(lines, std::move(options.map), false).map;
+    options.source = lines.places();
     return options;
   }
   void TakeRows();
@@ -140,7 +140,7 @@ class TableReader {
   void Cut();
   [[noreturn]] void RefuseAt(std::int64_t line,
                              const std::string& reason) const {
-    throw DataError(options().source + ":" + std::to_string(line) + ": " +
+    throw DataError(options().source.At(static_cast<std::size_t>(line)) + ": " +
                     reason);
   }
   [[noreturn]] void RefuseStep(std::size_t k) const;
@@ -211,8 +211,8 @@ CsvTable TableReader::Read() {
   for (const std::string& note : table_.notes) {
     if (options().log) {
       options().log(LogLevel::kInfo,
-                    EventLine("csv_note",
-                              {{"source", options().source}, {"note", note}}));
+                    EventLine("csv_note", {{"source", options().source.name},
+                                           {"note", note}}));
     }
   }
   return std::move(table_);
@@ -297,7 +297,7 @@ bool TableReader::Joined(const CsvRow& row) {
 
 void TableReader::CheckCount() const {
   if (lines_.packed() && rows_.size() >= options().max_packed_rows) {
-    throw DataError(options().source + ": has more than " +
+    throw DataError(options().source.name + ": has more than " +
                     std::to_string(options().max_packed_rows) +
                     " rows, which a gzip may not have; try to unpack it with "
                     "gunzip first, or to cut it into parts");
@@ -346,7 +346,7 @@ void TableReader::FindPeriod() {
     return;
   }
   if (rows_.size() < 2) {
-    throw DataError(options().source +
+    throw DataError(options().source.name +
                     ": one row does not tell the sample period; try --period");
   }
   std::vector<double> times_s;
@@ -502,8 +502,8 @@ void TableReader::NoteResampling(
 
 void TableReader::CheckResampled(std::size_t samples) const {
   if (lines_.packed() && samples >= options().max_packed_rows) {
-    throw DataError(options().source + ": --resample " + NumberText(period_s_) +
-                    "s: more than " +
+    throw DataError(options().source.name + ": --resample " +
+                    NumberText(period_s_) + "s: more than " +
                     std::to_string(options().max_packed_rows) +
                     " samples, which a gzip may not have; try a longer "
                     "period, or to unpack it with gunzip first");
@@ -575,7 +575,7 @@ void TableReader::Resample() {
     grid.push_back(std::move(made));
   }
   if (grid.empty()) {
-    throw DataError(options().source +
+    throw DataError(options().source.name +
                     ": no instant has CV and one of X, F; try a longer age, "
                     "--resample " +
                     NumberText(period_s_) + "s:hold:10min");
@@ -661,7 +661,7 @@ void TableReader::CheckReadings() {
         (table_.header.signals & MaskOf(signal)) != 0;
     if (needed && readings[i] == 0) {
       throw DataError(
-          options().source + ": no reading of " +
+          options().source.name + ": no reading of " +
           std::string(SignalName(signal)) + " in " +
           std::to_string(rows_.size()) +
           " rows: its cells are empty, words for no reading, or of bad quality"
@@ -937,19 +937,15 @@ void TableReader::Cut() {
 }  // namespace
 
 CsvTable ReadCsv(const TextLines& lines, const CsvOptions& options) {
-  try {
-    return TableReader(lines, options).Read();
-  } catch (const DataError& error) {
-    throw DataError(lines.WithPlace(error.what()));
-  }
+  return TableReader(lines, options).Read();
 }
 
 CsvTable ReadCsv(std::string_view text, const CsvOptions& options) {
   return ReadCsv(TextLines(text, options.source), options);
 }
 
-CsvTable ReadCsvFile(const std::filesystem::path& path, CsvOptions options) {
-  options.source = path == "-" ? "stdin" : path.string();
+CsvTable ReadCsvFile(const std::filesystem::path& path,
+                     const CsvOptions& options) {
   return ReadCsv(TextLines::OfFile(path), options);
 }
 

@@ -163,9 +163,8 @@ constexpr std::array kOrders = {DateOrder::kDayFirst, DateOrder::kMonthFirst,
 
 class LayoutFinder {
  public:
-  LayoutFinder(const TextLines& lines, ColumnMap map, const std::string& source,
-               bool choose)
-      : lines_(lines), source_(source), choose_(choose) {
+  LayoutFinder(const TextLines& lines, ColumnMap map, bool choose)
+      : lines_(lines), choose_(choose) {
     layout_.map = std::move(map);
   }
 
@@ -225,7 +224,6 @@ class LayoutFinder {
   void FindDateOrder();
   void FindDirection();
   const TextLines& lines_;
-  const std::string& source_;
   bool choose_;
   Layout layout_;
   std::vector<Record> rows_;  // Sample, without the header.
@@ -277,7 +275,7 @@ bool IsLineProtocol(std::string_view line) {
 void LayoutFinder::RefuseOtherForms() const {
   lines_.ForEach([&](std::string_view line, std::size_t) {
     const auto refuse = [&](std::string_view name, std::string_view command) {
-      throw DataError(source_ + ":1: is " + std::string(name) +
+      throw DataError(lines_.places().At(1) + ": is " + std::string(name) +
                       ", not a table; try: " + std::string(command));
     };
     for (const OtherForm& form : kOtherForms) {
@@ -430,8 +428,8 @@ bool LayoutFinder::FindHeader() {
   ForEachRecord(lines_, static_cast<std::size_t>(map().skip) + 1,
                 map().separator, [&](std::size_t line, const Cells& cells) {
                   if (cells.size() > kMaxColumns) {
-                    throw DataError(source_ + ":" + std::to_string(line) +
-                                    ": " + std::to_string(cells.size()) +
+                    throw DataError(lines_.places().At(line) + ": " +
+                                    std::to_string(cells.size()) +
                                     " columns; expected at most " +
                                     std::to_string(kMaxColumns) +
                                     "; try to export fewer tags at a time");
@@ -464,7 +462,7 @@ bool LayoutFinder::FindHeader() {
       SkipSettings(records, shape, names, data);
     }
     if (names == data) {
-      throw DataError(source_ + ":" + std::to_string(data->line) +
+      throw DataError(lines_.places().At(data->line) +
                       ": the first row holds values, not names: a header is "
                       "missing; try to put one line of names in front of it, "
                       "such as time,tag,value, or names of your own and --map");
@@ -690,9 +688,9 @@ void LayoutFinder::CheckTimes(std::size_t line, const Cells& cells) const {
         cells[c] != cells[*time_] &&
         SameName(stem(Name(c)), stem(Name(*time_)))) {
       throw DataError(
-          source_ + ":" + std::to_string(line) + ": column " + Quoted(Name(c)) +
-          " is at " + Quoted(cells[c]) + " and column " + Quoted(Name(*time_)) +
-          " at " + Quoted(cells[*time_]) +
+          lines_.places().At(line) + ": column " + Quoted(Name(c)) + " is at " +
+          Quoted(cells[c]) + " and column " + Quoted(Name(*time_)) + " at " +
+          Quoted(cells[*time_]) +
           ": each value has a time of its own; expected one time for a row; "
           "try to export sampled (interpolated) values, or one reading in a "
           "row: time,tag,value");
@@ -978,7 +976,7 @@ void LayoutFinder::TakeGrouped(const Signs& signs) {
   if (!signs.decimal.empty() && !signs.decimal.contains(sign)) {
     const SignCell& other = signs.decimal.begin()->second;
     RefuseSign(seen, " has thousands separators, and " + Quoted(other.cell) +
-                         " in line " + std::to_string(other.line) +
+                         " at " + lines_.places().At(other.line) +
                          " the same sign for decimals");
   }
   map().decimal = sign;
@@ -987,8 +985,8 @@ void LayoutFinder::TakeGrouped(const Signs& signs) {
 
 void LayoutFinder::RefuseSign(const SignCell& seen,
                               const std::string& reason) const {
-  throw DataError(source_ + ":" + std::to_string(seen.line) + ": " +
-                  Quoted(seen.cell) + reason +
+  throw DataError(lines_.places().At(seen.line) + ": " + Quoted(seen.cell) +
+                  reason +
                   "; try decimal = \".\" or decimal = \",\" under [file] "
                   "of --map");
 }
@@ -1076,13 +1074,8 @@ std::string UnnamedAs(const std::string& cell, std::size_t index) {
   return cell.empty() ? "column " + std::to_string(index + 1) : cell;
 }
 
-Layout FindLayout(const TextLines& lines, ColumnMap map,
-                  const std::string& source, bool choose) {
-  try {
-    return LayoutFinder(lines, std::move(map), source, choose).Find();
-  } catch (const DataError& error) {
-    throw DataError(lines.WithPlace(error.what()));
-  }
+Layout FindLayout(const TextLines& lines, ColumnMap map, bool choose) {
+  return LayoutFinder(lines, std::move(map), choose).Find();
 }
 
 }  // namespace fdi::importer

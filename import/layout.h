@@ -29,8 +29,7 @@ struct Layout {
 ///   Layout::choices; otherwise it is left open, or refused.
 /// @throws DataError if there is no header, or if the decimal sign is
 ///   ambiguous; if there are more than 20 000 columns.
-Layout FindLayout(const TextLines& lines, ColumnMap map,
-                  const std::string& source, bool choose);
+Layout FindLayout(const TextLines& lines, ColumnMap map, bool choose);
 
 /// Names that occur more than once get numbers: "Value (1)", "Value (2)".
 void NumberRepeated(std::vector<std::string>& names);

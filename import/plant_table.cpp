@@ -694,6 +694,13 @@ void SetMode(const PlantRow& row, const TagMatch& match, ColumnMap& map) {
 
 }  // namespace
 
+ColumnMapping OwnUnitColumn(const PlantRow& row, const TagMatch& match,
+                            LoopTag tag, Signal signal) {
+  ColumnMapping mapping{match[tag], signal};
+  Bound(row[tag].range, mapping);
+  return mapping;
+}
+
 ColumnMap LoopColumns(const PlantRow& row, const TagMatch& match,
                       ColumnMap file) {
   // The audit has no model, and reads the measured value of any loop as F.
@@ -707,8 +714,7 @@ ColumnMap LoopColumns(const PlantRow& row, const TagMatch& match,
   for (const auto& [tag, signal] : {std::pair(LoopTag::kPv, Signal::kF),
                                     std::pair(LoopTag::kSp, Signal::kSp)}) {
     if (!match[tag].empty()) {
-      Bound(row[tag].range,
-            file.columns.emplace_back(ColumnMapping{match[tag], signal}));
+      file.columns.push_back(OwnUnitColumn(row, match, tag, signal));
     }
   }
   file.flow_unit = FlowUnit::kM3PerHour;

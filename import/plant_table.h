@@ -121,6 +121,9 @@ struct TagMatch {
 TagMatch MatchTags(const PlantRow& row, const TagNames& names,
                    const std::string& source);
 
+/// The column of a tag whose values keep their own unit, as PV and SP do.
+ColumnMapping OwnUnitColumn(const PlantRow& row, const TagMatch& match,
+                            LoopTag tag, Signal signal);
 /// `file`, the form of the file, with the columns of a row: as a loop (op, pv,
 /// sp, x, mode) for the audit, or as a valve (op, x, flow, p1, p2, t1, mode).
 /// @throws ConfigError naming an unknown unit and those that are accepted.

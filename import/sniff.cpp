@@ -140,9 +140,8 @@ constexpr std::size_t kMaxCells = 4'000'000;
 // The columns of a wide table or the tags of a long one, through the reader of
 // the importer.
 void ReadColumns(const TextLines& lines, const Layout& layout,
-                 const std::string& source,
                  const std::vector<ColumnMapping>& given, Sniffed& found) {
-  CsvReader reader({.source = source, .map = layout.map, .scan = true});
+  CsvReader reader({.source = lines.places(), .map = layout.map, .scan = true});
   std::map<std::string, SniffedColumn> tags;
   std::vector<std::size_t> columns;
   std::vector<double> times;
@@ -321,24 +320,19 @@ std::string SignalToml(const ColumnMap& map, const SniffedColumn& column) {
 }  // namespace
 
 Sniffed Sniff(std::string_view text, const std::string& source, ColumnMap map) {
-  return Sniff(TextLines(text, source), source, std::move(map));
+  return Sniff(TextLines(text, {source}), std::move(map));
 }
 
-Sniffed ScanColumns(const TextLines& lines, const std::string& source,
-                    ColumnMap map) {
+Sniffed ScanColumns(const TextLines& lines, ColumnMap map) {
   const std::vector<ColumnMapping> given = map.columns;
-  Layout layout = FindLayout(lines, std::move(map), source, true);
+  Layout layout = FindLayout(lines, std::move(map), true);
   layout.map.columns.clear();
   Sniffed found;
   found.map = layout.map;
   for (const auto& [key, reason] : layout.choices) {
     found.choices.push_back(key + ": " + reason);
   }
-  try {
-    ReadColumns(lines, layout, source, given, found);
-  } catch (const DataError& error) {
-    throw DataError(lines.WithPlace(error.what()));
-  }
+  ReadColumns(lines, layout, given, found);
   return found;
 }
 
@@ -347,11 +341,11 @@ namespace {
 // Reads the table as the importer does, with the map as it is written. If the
 // rows can be read as they are, their notes count instead of those of the
 // resampled rows.
-void ReadWithMap(const TextLines& lines, const std::string& source,
-                 Sniffed& found) {
-  CsvOptions options{.source = source, .required = 0, .split_gaps = true};
+void ReadWithMap(const TextLines& lines, Sniffed& found) {
+  CsvOptions options{.required = 0, .split_gaps = true};
   try {
-    options.map = ReadTagMapText(MapText(found, "this table"), source);
+    options.map =
+        ReadTagMapText(MapText(found, "this table"), lines.places().name);
     options.map.zone = found.map.zone;
     options.map.time_unit = found.map.time_unit;  // Guesses are noted.
     const auto resampling = std::exchange(options.map.resampling, {});
@@ -384,9 +378,8 @@ void ReadWithMap(const TextLines& lines, const std::string& source,
 
 }  // namespace
 
-Sniffed Sniff(const TextLines& lines, const std::string& source,
-              ColumnMap map) {
-  Sniffed found = ScanColumns(lines, source, std::move(map));
+Sniffed Sniff(const TextLines& lines, ColumnMap map) {
+  Sniffed found = ScanColumns(lines, std::move(map));
   GuessSignals(found.columns, found.findings);
   FindMode(found);
   JudgeTiming(found);
@@ -410,7 +403,7 @@ Sniffed Sniff(const TextLines& lines, const std::string& source,
                             " stand where numbers were expected, and are taken "
                             "as no readings");
   }
-  ReadWithMap(lines, source, found);
+  ReadWithMap(lines, found);
   return found;
 }
 

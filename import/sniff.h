@@ -33,15 +33,14 @@ struct Sniffed {
 
 /// Reads the form of a table and all of its columns, or the first 4 million
 /// cells of them, without any signal. @throws as Sniff().
-Sniffed ScanColumns(const TextLines& lines, const std::string& source,
-                    ColumnMap map);
+Sniffed ScanColumns(const TextLines& lines, ColumnMap map);
 
 /// Analyses a table with the reader of the importer. The settings of `map` are
 /// kept, including its signals; others are guessed from units, ranges, words
 /// and ISA 5.1 letters, in this order of weight, and from the first 4 million
 /// cells.
 /// @throws DataError if there is no header, no column of times or no row.
-Sniffed Sniff(const TextLines& lines, const std::string& source, ColumnMap map);
+Sniffed Sniff(const TextLines& lines, ColumnMap map);
 Sniffed Sniff(std::string_view text, const std::string& source, ColumnMap map);
 
 /// The map as TOML to edit, with guesses and choices marked.

@@ -1,4 +1,6 @@
+#include <cerrno>
 #include <chrono>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <iostream>
@@ -160,6 +162,10 @@ class LineOutlet : public Outlet {
   explicit LineOutlet(const std::string& path) {
     if (path != "-") {
       file_.open(path);
+      if (!file_) {
+        throw DataError("--lines: " + path +
+                        " cannot be written: " + std::strerror(errno));
+      }
       out_ = &file_;
     }
   }

@@ -66,7 +66,7 @@ importer::ColumnMap LoopMap(const TextLines& lines, const AuditOptions& options,
         options.names.mode.empty() ? map.mode_column : options.names.mode;
     return map;
   }
-  const importer::Sniffed found = importer::ScanColumns(lines, source, map);
+  const importer::Sniffed found = importer::ScanColumns(lines, map);
   map.long_table = found.map.long_table;
   if (std::filesystem::is_directory(source) && !map.long_table) {
     throw ConfigError(source +
@@ -81,7 +81,6 @@ LoopRecord ReadLoop(const std::string& file, const AuditOptions& options,
                     const Context& context) {
   const TextLines lines = TextLines::OfFile(file);
   importer::CsvOptions csv;
-  csv.source = file;
   csv.map = LoopMap(lines, options, file);
   csv.split_gaps = true;
   // A PV is in any unit, so the plausible range of F does not apply to it.

@@ -36,9 +36,8 @@ Json ColumnJson(const importer::SniffedColumn& column) {
 }
 
 Report SniffFile(const SniffOptions& options, const Context& context) {
-  const importer::Sniffed found =
-      importer::Sniff(TextLines::OfFile(options.file), options.file,
-                      options.table.Read(context.options.utc));
+  const importer::Sniffed found = importer::Sniff(
+      TextLines::OfFile(options.file), options.table.Read(context.options.utc));
   Report report;
   report.document = {
       {"file", options.file},

@@ -156,11 +156,13 @@ TEST_F(FolderTest, TwoFilesOfOneTagAreRefused) {
 TEST_F(FolderTest, AnErrorNamesTheFileAndItsLine) {
   Write("a.csv", "t,Value\n1,5\n2,6\n");
   Write("b.csv", "\nt,Value\n1,5\n2,six\n");
-  const TextLines lines = TextLines::OfFile(path_);
-  EXPECT_EQ(lines.WithPlace(path_ + ":3: six"), path_ + "/a.csv:3: six");
-  EXPECT_EQ(lines.WithPlace(path_ + ":5: six"), path_ + "/b.csv:4: six");
-  EXPECT_EQ(lines.WithPlace(path_ + ":1: tag"), path_ + ":1: tag");
-  EXPECT_EQ(lines.WithPlace("no reading"), "no reading");
+  Write("c.csv", "t,Value\n");
+  Write("d.csv", "t,Value\n1,5\n");
+  const LinePlaces places = TextLines::OfFile(path_).places();
+  EXPECT_EQ(places.At(3), path_ + "/a.csv:3");
+  EXPECT_EQ(places.At(5), path_ + "/b.csv:4");
+  EXPECT_EQ(places.At(6), path_ + "/d.csv:2");
+  EXPECT_EQ(places.At(1), path_ + ":1");
 }
 
 TEST_F(FolderTest, WhatIsNoTableOfTagsIsRefused) {

@@ -54,6 +54,10 @@ samples() {  # DATA: of all runs, by valve.
   done
 }
 
+! "$bin/fdi-gateway" --domain "$domain" out --lines no/such 2>out.log ||
+  fail "out writes to a folder that is not there"
+grep -q "no/such cannot be written: No such file" out.log || fail "$(cat out.log)"
+
 # By file and by lines.
 base=$(($(date +%s) - 7200))
 for valve in $valves; do
@@ -111,6 +115,16 @@ grep -q "source_silent name=plc-V3" live.log || fail "V3 is not said to be silen
 await 20 grep -q "valve=V3.*missing_signal\|missing_signal.*valve=V3" monitor.log
 ! grep "missing_signal" monitor.log | grep -q "valve=V[12]" ||
   fail "V1 or V2 lacks signals"
+
+# A table that is too long for the writers of the first one is refused.
+mv plant.toml kept.toml
+{
+  cat kept.toml
+  for i in $(seq 200); do printf '[[loop]]\nname = "W%d"\n' "$i"; done
+} >plant.toml
+kill -HUP $gateway
+await 20 grep -q "table_refused.*203 valves.*room for 106" live.log
+mv kept.toml plant.toml
 
 # A valve less, one in another group, and the others go on.
 sed -i '/"V2"/d; s/^name = "V4"/name = "V2"\ngroup = "B"\n[[loop]]\n&/' plant.toml

@@ -88,6 +88,22 @@ TEST(MqttUrl, IsThatOfABrokerWithoutASecret) {
               ::testing::Not(HasSubstr("secret@")));
 }
 
+TEST(MqttOptions, WhatTheUrlHasNoUseForIsRefused) {
+  const auto error = [](const MqttOptions& options) -> std::string {
+    try {
+      MqttClient client(options, {}, {});
+      return "";
+    } catch (const ConfigError& refused) {
+      return refused.what();
+    }
+  };
+  const std::string file = FDI_FAULT_CATALOGUE;
+  EXPECT_THAT(error({.url = "mqtt://a", .password = file}),
+              HasSubstr("mqtt://USER@HOST"));
+  EXPECT_THAT(error({.url = "mqtt://a", .key = file}),
+              HasSubstr("are of mqtts://"));
+}
+
 // A broker that accepts connections, and says nothing else.
 class Broker {
  public:

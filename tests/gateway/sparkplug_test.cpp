@@ -524,7 +524,7 @@ TEST_F(SparkplugNodeTest, AValveIsBornThenOnlyChangesAreTold) {
       R"({"valve_id":"FV/1","health":"FAILURE","reason":null,
           "state":"ISOLATED","fault":"f19","name":"Flow transmitter wrong",
           "description":"flow","certainty":"sure","strength_pct":25.5,
-          "severity":"critical","since_utc":"2026-01-05T10:00:00Z",
+          "severity":"critical","priority":1,"since_utc":"2026-01-05T10:00:00Z",
           "check":"look"})");
   EXPECT_THAT(TopicsOf(changed), ElementsAre("spBv1.0/G/DDATA/north/FV%2F1"));
   const Payload data = Read(changed.front());

@@ -95,8 +95,13 @@ END
   }
   certify "${expired[@]}"
   serve plant.pem plant.key
-  # An error that no promise catches is but the end of a connection.
-  echo "setTimeout(() => { throw Error('thrown'); }, 2000);" >thrown.mjs
+  # An error that no promise catches is but the end of a connection. It comes a
+  # second after the client can take it, however long that takes.
+  echo "const timer = setInterval(() => {
+    if (process.listenerCount('uncaughtException') === 0) return;
+    clearInterval(timer);
+    setTimeout(() => { throw Error('thrown'); }, 1000);
+  }, 100);" >thrown.mjs
   node --import ./thrown.mjs "${run[@]:1}" --security Basic256Sha256 >>secure.txt 2>>secure.log &
   gateway=$!
   await BadCertificateUntrusted secure.log

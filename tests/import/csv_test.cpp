@@ -40,7 +40,7 @@ CsvTable Read(const std::string& text, const CsvOptions& options = {}) {
 }
 
 std::string Refusal(const std::string& text, CsvOptions options = {}) {
-  options.source = "plant.csv";
+  options.source = {"plant.csv"};
   try {
     Read(text, options);
   } catch (const DataError& error) {

@@ -1295,11 +1295,10 @@ TEST(KindsTest, EveryReferenceFileIsReadWithItsMapOrRefusedForAReason) {
         const TextLines lines = TextLines::OfFile(entry.path());
         ColumnMap zone = Utc();
         zone.zone = name.starts_with("a12") ? "Europe/Berlin" : "UTC";
-        const ColumnMap map = ReadTagMapText(
-            MapText(Sniff(lines, name, zone), name), "map of " + name);
-        const CsvTable table = ReadCsv(
-            lines,
-            {.source = name, .map = map, .required = 0, .split_gaps = true});
+        const ColumnMap map =
+            ReadTagMapText(MapText(Sniff(lines, zone), name), "map of " + name);
+        const CsvTable table =
+            ReadCsv(lines, {.map = map, .required = 0, .split_gaps = true});
         EXPECT_FALSE(table.runs.empty());
       } catch (const DataError& error) {
         said = error.what();
@@ -1334,7 +1333,7 @@ TEST(KindsTest, AFolderOfFilesIsATableOfTheirTags) {
       }
     }
     const TextLines lines = TextLines::OfFile(path);
-    const Sniffed found = Sniff(lines, path, Utc());
+    const Sniffed found = Sniff(lines, Utc());
     SignalMask signals = 0;
     for (const SniffedColumn& column : found.columns) {
       signals = static_cast<SignalMask>(
@@ -1343,8 +1342,7 @@ TEST(KindsTest, AFolderOfFilesIsATableOfTheirTags) {
     EXPECT_EQ(signals,
               MaskOf(Signal::kCv) | MaskOf(Signal::kX) | MaskOf(Signal::kF));
     const CsvTable table =
-        ReadCsv(lines, {.source = path,
-                        .map = ReadTagMapText(MapText(found, kind), kind),
+        ReadCsv(lines, {.map = ReadTagMapText(MapText(found, kind), kind),
                         .required = 0,
                         .split_gaps = true});
     EXPECT_GT(table.runs.front().samples.size(), 300U);
@@ -1492,7 +1490,7 @@ TEST(KindsTest, APolledPositionIsNewAtItsPollsAlone) {
   ColumnMap map = Utc();
   map.columns = {{"FC1.OP [%]", Signal::kCv, 1.0, 0.0, Sense::kOpening, "%"},
                  {"ZT1.PV [%]", Signal::kX, 1.0, 0.0, Sense::kOpening, "%"}};
-  const CsvTable table = ReadCsv(text, {.source = "plant.csv", .map = map});
+  const CsvTable table = ReadCsv(text, {.source = {"plant.csv"}, .map = map});
   EXPECT_THAT(table.notes,
               Contains(HasSubstr("X is new every 5 s and held between")));
   ASSERT_EQ(table.runs.size(), 1U);
@@ -1573,8 +1571,7 @@ TEST(LoopGuessTest, FindsOpPvSpXAndMode) {
     ColumnMap map;
     std::vector<std::string> found;
     try {
-      GuessLoop(ScanColumns(TextLines(text), "loop.csv", {}).columns, {},
-                "loop.csv", map);
+      GuessLoop(ScanColumns(TextLines(text), {}).columns, {}, "loop.csv", map);
       for (const Signal signal :
            {Signal::kCv, Signal::kF, Signal::kSp, Signal::kX}) {
         const auto column =
@@ -1596,8 +1593,7 @@ TEST(LoopGuessTest, AnOutputBetweenZeroAndOneIsAShare) {
         "time,TIC1.OP,TIC1.PV\n" + Rows([&](std::size_t k) {
           return Iso(k) + "," + Fixed(of_cells * kValve.cv[k], 4) + ",60";
         });
-    GuessLoop(ScanColumns(TextLines(text), "loop.csv", {}).columns, {},
-              "loop.csv", map);
+    GuessLoop(ScanColumns(TextLines(text), {}).columns, {}, "loop.csv", map);
     return map.columns.at(0).scale;
   };
   EXPECT_EQ(scale(0.01), 100.0);

@@ -5,9 +5,10 @@
 # faults grow in every fourth of FDI_WIRE_VALVES valves (default 8) and alarms are
 # acknowledged. One more valve comes by an edge node of Sparkplug B and the broker.
 # Plant and broker are hosts of their own, as network namespaces.
-# The long form, with FDI_WIRE_SECONDS of more than 200 (default 60), plays all
-# ways in which a part goes, leaves it away for 20 s and a link for 60 s, and
-# begins again until the time is up.
+# The short form kills each part once, several at a time. The long form, with
+# FDI_WIRE_SECONDS of more than 200 (default 30), plays all ways in which a part
+# goes, leaves it away for 20 s and a link for 60 s, and begins again until the
+# time is up.
 # While a part that a valve is judged by is away, neither the broker nor OPC UA
 # calls the valve normal; at the end history, MQTT and OPC UA tell the same, and
 # each acknowledgement is there once.
@@ -41,7 +42,7 @@ fi
 ip link set lo up multicast on
 ip route add 224.0.0.0/4 dev lo
 source "$tests/system/programs.sh" "$1"
-seconds=${FDI_WIRE_SECONDS:-60}
+seconds=${FDI_WIRE_SECONDS:-30}
 valves=${FDI_WIRE_VALVES:-8}
 if [ "$seconds" -gt 200 ]; then
   rate=2 away=20 cut=60  # Rows a second; how long a part and a link are away [s].
@@ -49,7 +50,7 @@ if [ "$seconds" -gt 200 ]; then
     gateway plant:STOP broker:CUT client:STOP monitor:STOP out:STOP host edge:STOP)
 else
   rate=10 away=0 cut=0
-  ways=(broker client out monitor server plant gateway:STOP plant:CUT)
+  ways=("client edge" "gateway broker" "plant host out" "monitor server")
 fi
 plant_port=$((16000 + domain)) port=$((15000 + domain)) mqtt_port=$((17000 + domain))
 export FDI_GATEWAY=$bin/fdi-gateway FDI_STORE=$bin/fdi-store
@@ -209,47 +210,57 @@ bring_back() {  # NAME WAY
   *) launch "$(service_of "$1")" ;;
   esac
 }
-# Without the part nobody judges a valve, so that none may be normal until it is
-# back. The longest time until none is goes to `blind_ms`.
+# Without these parts nobody judges the valves, so that none may be normal until
+# they are back. The longest time until none is goes to `blind_ms`.
 blind_ms=0
-stay_blind() {  # NAME WAY
+stay_blind() {  # PARTS
   local begin_ms end=$((SECONDS + away))
   begin_ms=$(date +%s%3N)
-  [ "$2" != CUT ] || end=$((SECONDS + cut))
-  await 60 none_is_normal
+  [[ $1 != *CUT* ]] || end=$((SECONDS + cut))
+  await 120 none_is_normal
   local took=$(($(date +%s%3N) - begin_ms))
-  echo "$SECONDS s: $1 $2, no valve normal after $took ms" >>rounds.log
+  echo "$SECONDS s: $1, no valve normal after $took ms" >>rounds.log
   [ $took -le $blind_ms ] || blind_ms=$took
-  [ "$1" = out ] || await 30 none_is_normal_by_opcua
+  local by_opcua=none_is_normal_by_opcua
+  # The server has a gateway of its own.
+  [[ $1 != out* && $1 != *server ]] || by_opcua=true
+  await 120 $by_opcua
   while [ $SECONDS -lt $end ]; do
-    none_is_normal || fail "normal without $1 ($2): $(states)"
+    none_is_normal || fail "normal without $1: $(states)"
     sleep 1
   done
-  [ "$1" = out ] || none_is_normal_by_opcua || fail "OPC UA without $1 ($2): $(healths)"
+  [ "$away" = 0 ] || $by_opcua || fail "OPC UA without $1: $(healths)"
+}
+judged_again() {
+  for blind in FV V1; do await 120 some_are_normal; done
 }
 
-for blind in FV V1; do await 120 some_are_normal; done
+judged_again
 end=$((SECONDS + seconds)) round=0
 while [ $SECONDS -lt $end ] || [ $round -lt ${#ways[@]} ]; do
-  way=${ways[round % ${#ways[@]}]}
-  name=${way%:*} way=${way#"$name"} way=${way#:}
-  take_away $name "${way:=KILL}"
-  case $name in
-  plant | client | gateway) blind=FV ;;
-  broker | host | edge) blind=V1 ;;
-  *) blind= ;;
+  parts=${ways[round % ${#ways[@]}]}
+  for way in $parts; do take_away "${way%:*}" "${way#*:}"; done
+  case $parts in
+  *" "* | out* | monitor*) blind= ;;
+  plant* | client* | gateway*) blind=FV ;;
+  *) blind=V1 ;;
   esac
-  case $name in
+  case $parts in
   server) sleep $((away + 2)) ;;  # The broker has nothing to do with it.
-  *) stay_blind $name $way ;;
+  *) stay_blind "$parts" ;;
   esac
-  bring_back $name $way
+  for way in $parts; do bring_back "${way%:*}" "${way#*:}"; done
   back_ms=$(date +%s%3N)
   acknowledge
-  await 120 some_are_normal
-  echo "$SECONDS s: $name $way, normal again within $(($(date +%s%3N) - back_ms)) ms" >>rounds.log
+  judged_again
+  echo "$SECONDS s: $parts, normal again within $(($(date +%s%3N) - back_ms)) ms" >>rounds.log
   round=$((round + 1))
 done
+acknowledged() {
+  acknowledge
+  [ "$acks" -gt 0 ]
+}
+await 180 acknowledged
 for name in $names; do
   kill -0 -- "-${part[$name]}" || fail "$name has ended: $(tail -3 $name.log)"
 done
@@ -291,7 +302,6 @@ done
 agree || fail "they differ: $(diff mqtt_health.txt opcua_health.txt), history $(cat history.txt), MQTT $(cat mqtt.txt), OPC UA $(cat opcua.txt)"
 stored=$(history "select count(*) from episode_event where kind = 'ACK'")
 [ "$stored" = "$acks" ] || fail "$stored acknowledgements in the history, $acks given"
-[ "$acks" -gt 0 ] || fail "no acknowledgement"
 echo "wire: $round rounds, $(history "select count(*) || ' episodes of ' ||
   count(distinct valve_id) || ' valves' from episode")," \
   "$(wc -l <history.txt) alarms the same in all three, $acks acknowledged once," \

@@ -124,8 +124,7 @@ storage::StoredRun ReadRunFile(const std::string& text,
   csv.take = [&samples](const LabelledSample& labelled) {
     samples.push_back({labelled.sample, labelled.truth});
   };
-  const importer::CsvTable table =
-      importer::ReadCsvFile(selector.id, std::move(csv));
+  const importer::CsvTable table = importer::ReadCsvFile(selector.id, csv);
   const std::size_t count = samples.size();
   storage::StoredRun run = EmptyRunOf(table, std::move(selector));
   std::erase_if(samples, [&run](const storage::StoredSample& stored) {

@@ -95,7 +95,7 @@ std::vector<storage::StoredRun> ReadRuns(const PlantJob& job,
   for (std::size_t i = 0; i < texts.size(); ++i) {
     const RowSource& source = job.sources[i];
     importer::CsvOptions csv;
-    csv.source = source.path.string();
+    csv.source = texts[i].source;
     csv.map =
         as_loop ? importer::LoopColumns(job.row, source.match, texts[i].form)
                 : importer::ValveColumns(job.row, source.match, texts[i].form);
@@ -219,7 +219,7 @@ std::vector<RowText> TextsOf(const PlantJob& job, PlantFiles& files) {
         columns.push_back(column);
       }
     }
-    texts.push_back({index->Project(columns), index->form()});
+    texts.push_back({index->Project(columns), index->form(), index->source()});
   }
   return texts;
 }

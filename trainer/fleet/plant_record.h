@@ -13,6 +13,7 @@ namespace fdi::trainer {
 struct RowText {
   std::string text;
   importer::ColumnMap form;
+  LinePlaces source;
 };
 std::vector<RowText> TextsOf(const PlantJob& job, PlantFiles& files);
 

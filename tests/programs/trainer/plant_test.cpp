@@ -127,6 +127,27 @@ TEST_F(PlantTest, FromAndToAreInTheZoneOfTheTimesOfTheFile) {
               HasSubstr("the record is from 2026-03-10T00:00:00Z"));
 }
 
+TEST_F(PlantTest, ARowOfAFolderNamesTheFileAndItsLine) {
+  std::filesystem::create_directory(Path("tags"));
+  for (const char* tag : {"A.OP", "A.PV", "A.SP"}) {
+    std::string csv = "t_s,value\n";
+    for (int k = 0; k < 300; ++k) {
+      csv += std::to_string(k) + ',' +
+             (k == 150 && tag == std::string("A.PV") ? "six" : "40.5") + '\n';
+    }
+    Write(std::string("tags/") + tag + ".csv", csv);
+  }
+  Write("plant.toml",
+        "[defaults]\n"
+        "op = \"{loop}.OP\"\npv = \"{loop}.PV\"\nsp = \"{loop}.SP\"\n"
+        "service = \"F\"\n"
+        "[[loop]]\nname = \"A\"\nfile = \"tags\"\n"
+        "[[loop]]\nname = \"B\"\nfile = \"day.csv\"\n");
+  EXPECT_THAT(RunJson("onboard --plant plant.toml")["rows"][0]["finding"]
+                  .get<std::string>(),
+              HasSubstr("tags/A.PV.csv:152: column \"value\": \"six\""));
+}
+
 TEST_F(PlantTest, ASecondRunDoesOnlyRowsThatChanged) {
   Onboard("A,,,,,,,,,\nB,,,,,,,,,\n");
   const auto again = Onboard("A,,,,,,,,,\nB,,,,,,,,300,\n");
