@@ -30,16 +30,21 @@ constexpr double kSinusoid = 0.6;      // Shapes below are sines.
 constexpr double kOverwhelming = 0.8;  // G that no sinusoid explains.
 constexpr double kGoodFit = 0.8;       // r² of a controller's own oscillation.
 constexpr double kIntegral = 0.3;      // r² of increments of an integral.
+// The longest lag of a flow: the stroke of a slow electric valve.
+constexpr double kFlowLag_s = 120.0;
 constexpr double kAntiphase = -0.5;
 constexpr double kPoorFit = 0.1;  // r² of a disturbance's.
 // A good valve with positioner has a dead band of 0.25 to 0.5 %.
 constexpr double kGoodBand = 0.25;
-constexpr double kHalf = 0.5;     // G of a play between OP and X.
+constexpr double kHalf = 0.5;     // G of a play between OP and X; of an error.
 constexpr double kMoves = 1.0;    // Change of OP that calls for an answer [%].
 constexpr double kWindsUp = 5.0;  // The same, whatever the noise of it [%].
 // Share of the mean error by which PV moves at most if it does not answer; so
 // an error of less than 1/kUnmoved noises says nothing.
 constexpr double kUnmoved = 0.05;
+// What a load seldom does meanwhile: shares of an error, and of the travel.
+constexpr double kQuarter = 0.25;
+constexpr double kSteady = 0.9;   // r² of PV over time, as a slow process has.
 constexpr double kNearEnd = 0.5;  // From an end of the range of OP [%].
 constexpr double kOftenAtLimit = 0.05;
 constexpr double kOtherHalf = 50.0;  // Distance from OP, in % of the travel.
@@ -133,35 +138,84 @@ double Distance(std::span<const double> a, std::span<const double> b) {
   return off > 0.0 ? off / (Spread(a) + Spread(b)) : 0.0;
 }
 
-// True if OP has stood at its open end for as long as a window needs, and PV,
-// off SP on one side by more than noise, has not moved towards it meanwhile.
-bool IsHelpless(const Window& window) {
+// The longest stretch of OP at this end of its range, from first to past last.
+std::pair<std::size_t, std::size_t> LongestAt(const std::vector<double>& op,
+                                              double limit) {
   std::size_t longest = 0;
   std::size_t end = 0;
-  for (std::size_t k = 0, length = 0; k < window.sp.size(); ++k) {
-    length =
-        std::abs(window.op[k] - window.open_op) <= kNearEnd ? length + 1 : 0;
+  for (std::size_t k = 0, length = 0; k < op.size(); ++k) {
+    length = std::abs(op[k] - limit) <= kNearEnd ? length + 1 : 0;
     if (length > longest) {
       longest = length;
       end = k + 1;
     }
   }
-  if (longest < kMinSamples || !IsPercent(window.op)) {
-    return false;
-  }
-  const std::size_t third = longest / 3;
+  return {end - longest, end};
+}
+
+// True if PV, off SP on one side by more than noise, comes no nearer in this
+// stretch: neither by as much as a load seldom brings it, nor steadily.
+bool StaysOff(const Window& window, std::size_t begin, std::size_t end) {
+  const std::size_t third = (end - begin) / 3;
   const auto mean = [&](const std::vector<double>& values, std::size_t from) {
     return Mean(std::span(values).subspan(from, third));
   };
-  const std::size_t begin = end - longest;
   const double pv = mean(window.pv, begin);
   const double first = mean(window.sp, begin) - pv;
   const double last =
       mean(window.sp, end - third) - mean(window.pv, end - third);
-  const double approach = mean(window.pv, end - third) - pv;
-  return first * last > 0.0 && approach * first <= kUnmoved * first * first &&
+  const double nearer = (mean(window.pv, end - third) - pv) / first;
+  CorrelationSums path;
+  for (std::size_t k = begin; k < end; ++k) {
+    path.Add(static_cast<double>(k - begin), window.pv[k] - pv);
+  }
+  const double r = path.Correlation();
+  return first * last > 0.0 && nearer <= kQuarter &&
+         (nearer <= kUnmoved || r * r <= kSteady) &&
          kUnmoved * std::min(std::abs(first), std::abs(last)) >
              NoiseOf(window.pv);
+}
+
+// True if OP has come to the end of its range, where it stands from `begin` to
+// `end`, by a quarter of its travel, PV was off SP meanwhile, and is as far off
+// at last.
+bool HasWoundUp(const Window& window, double limit, std::size_t begin,
+                std::size_t end) {
+  const auto distance = [&](std::size_t k) {
+    return std::abs(window.op[k] - limit);
+  };
+  std::size_t from = begin;
+  while (from > 0 && (distance(from) < 100.0 * kQuarter ||
+                      distance(from - 1) > distance(from))) {
+    --from;
+  }
+  const std::vector<double> errors = Errors(window);
+  const std::size_t third = (end - begin) / 3;
+  const double last = Mean(std::span(errors).subspan(end - third, third));
+  double farthest = 0.0;
+  double sum = 0.0;
+  for (std::size_t k = from; k < begin + third; ++k) {
+    farthest = std::max(farthest, errors[k] / last);
+    sum += k < begin ? errors[k] / last : 0.0;
+  }
+  return distance(from) >= 100.0 * kQuarter &&
+         sum >= kQuarter * static_cast<double>(begin - from) &&
+         (1.0 - kQuarter) * farthest <= 1.0;
+}
+
+// True if OP has stood at an end for as long as a window needs, and PV comes no
+// nearer to SP. At the closed end that is usual where the valve is not needed,
+// unless PV was already off SP when OP was on its way there.
+bool IsHelpless(const Window& window) {
+  if (window.sp.empty() || !IsPercent(window.op)) {
+    return false;
+  }
+  const auto is_at = [&window](double limit, bool open) {
+    const auto [begin, end] = LongestAt(window.op, limit);
+    return end - begin >= kMinSamples && StaysOff(window, begin, end) &&
+           (open || HasWoundUp(window, limit, begin, end));
+  };
+  return is_at(window.open_op, true) || is_at(100.0 - window.open_op, false);
 }
 
 bool IsExchanged(const Window& window, double controller) {
@@ -230,7 +284,7 @@ std::size_t LongestRepeat(const Window& window) {
 
 // The longest one-way run of the smoothed OP in which SP - PV has one sign in
 // 95 % of the samples and PV moves by less than 5 % of its mean, which is more
-// than noise [% of OP].
+// than noise [% of OP]. A load that steps begins at an error of nothing.
 double UnansweredRun(const Window& window) {
   const std::vector<double> errors = Errors(window);
   const std::size_t n = errors.size();
@@ -257,7 +311,7 @@ double UnansweredRun(const Window& window) {
     const double share = positive / static_cast<double>(e.size());
     const double mean = std::abs(Mean(e));
     if (run > longest && std::max(share, 1.0 - share) >= 0.95 &&
-        kUnmoved * mean > noise &&
+        kUnmoved * mean > noise && std::abs(e.front()) > kHalf * mean &&
         std::abs(window.pv[end] - window.pv[begin]) < kUnmoved * mean) {
       longest = run;
     }
@@ -383,7 +437,7 @@ std::optional<Band> Evidence::band() const {
 
 void SetService(char service, Window& window) {
   window.lags = service == 'T';
-  if (service != '\0' && service != 'T') {
+  if (service == 'L' || service == 'F') {
     window.integrating = service == 'L';
   }
 }
@@ -435,11 +489,14 @@ Finding JudgePlay(const Evidence& e) {
   // A play that leaves most of PV unexplained has to predict it all the more:
   // where only the load moves PV, the integral of the controller lags like
   // one.
-  if (!IsPlay(e) ||
-      e.prediction_gain <= (e.fit->explained() > kHalf ? 0.0 : kChanceGain)) {
+  // Under a slow load PV - SP is in step with dOP/dt, a quarter period behind
+  // OP however slow that is, so that the fit takes all the lag it may.
+  const double explained = e.fit ? e.fit->explained() : 0.0;
+  if (!IsPlay(e) || (e.late && explained <= kOverwhelming) ||
+      e.prediction_gain <= (explained > kHalf ? 0.0 : kChanceGain)) {
     return {};
   }
-  return e.prediction_gain > kPredictionGain
+  return e.prediction_gain > kPredictionGain && !e.late
              ? Finding{Verdict::kStiction, true,
                        "a play explains PV and predicts it"}
              : Finding{Verdict::kStiction, false,
@@ -528,7 +585,7 @@ Finding Judge(const Window& window, const Evidence& e) {
             "PV follows the integral of OP, which looks like a play: measure X "
             "or a flow, or step OP in manual"};
   }
-  if (IsPlay(e) && window.lags) {
+  if (IsPlay(e) && (window.lags || e.late)) {
     return {Verdict::kUndetermined, false,
             "PV follows OP late, which looks like a play: measure X or a flow, "
             "or step OP in manual"};
@@ -578,6 +635,10 @@ void AddAnswer(const Window& window, Evidence& e) {
   e.unrelated = explains(e.fit) < kUnrelated && !window.x.empty() &&
                 explains(FitPlay(op, means, -1)) < kUnrelated &&
                 Spread(means) < kHalf * Spread(op);
+  e.late =
+      e.fit && e.fit->lag == kLongestLag &&
+      (window.integrating != false ||
+       kLongestLag * static_cast<double>(block) * window.period_s > kFlowLag_s);
   e.increments = FitIncrements(op, BlockMeans(window.pv, block), e.gain_sign);
   e.integrates = window.integrating.value_or(
       e.fit && e.increments > kIntegral && e.increments > e.fit->linear);

@@ -72,7 +72,8 @@ struct Evidence {
   std::size_t distinct_answer{0};  ///< Values of X, else of PV.
   std::size_t longest_repeat{0};   ///< Equal readings of PV while OP moves.
   double unanswered{0.0};  ///< Longest one-way run of OP without answer [%].
-  /// OP stands at its open end, and PV comes no nearer to SP.
+  /// OP stands at its open end and PV comes no nearer to SP; or at its closed
+  /// end, and PV was as far off before OP came there.
   bool helpless{false};
   std::optional<Oscillation> oscillation;  ///< In OP; period in samples.
   std::optional<PlayFit> fit;              ///< PV, or X, over OP.
@@ -86,6 +87,9 @@ struct Evidence {
   /// OP and PV seem exchanged: SP stays at OP and not at PV, and the
   /// controller's law fits better the other way round.
   bool exchanged{false};
+  /// The play is fitted with the longest lag tried, and PV is not known to be a
+  /// flow, which answers sooner.
+  bool late{false};
 
   /// The band of the play or, if that explains little of X, of the standing;
   /// nothing if neither was found.
@@ -107,7 +111,8 @@ struct Audit : Finding {
 /// level, of "20LIC101_0405". NUL: there are none.
 char ServiceOf(std::string_view name);
 
-/// Sets what the service of a loop (ServiceOf()) says of its PV.
+/// Sets what the service of a loop (ServiceOf()) says of its PV: a level is an
+/// integral, a flow is none and answers at once, a temperature is late.
 void SetService(char service, Window& window);
 
 /// True if `op` can be % of its span: within -10 to 110.
@@ -131,7 +136,8 @@ bool IsPercent(std::span<const double> op);
 /// integral's quarter period looks like one. Nor is it where PV is known to
 /// follow OP late: under a slow load the controller keeps PV - SP in step with
 /// dOP/dt, which looks like a play, too. In both cases a run of OP without an
-/// answer means something only if it ends at a limit.
+/// answer means something only if it ends at a limit. A play that is fitted
+/// with the longest lag (Evidence::late) needs G > 0.8, and is never sure.
 ///
 /// @throws std::invalid_argument if the series differ in length, a value is not
 ///   finite, or the period is not positive.

@@ -54,8 +54,8 @@ double FitLine(std::span<const double> x, std::span<const double> y,
   return xx <= 0.0 || yy <= 0.0 || xy * sign <= 0.0 ? 0.0 : xy * xy / (xx * yy);
 }
 
-constexpr std::array kLags{0, 2, 6};  // Lags of the filter [samples].
-constexpr std::size_t kDelays = 3;    // 0, 1 and 2 samples.
+constexpr std::array kLags{0, 2, kLongestLag};  // Lags of the filter [samples].
+constexpr std::size_t kDelays = 3;              // 0, 1 and 2 samples.
 
 // A lane for each of kSides; the fourth fills up the registers.
 using Lanes = Eigen::Array4d;

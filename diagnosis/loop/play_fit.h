@@ -5,6 +5,9 @@
 
 namespace fdi::loop {
 
+/// The longest lag that FitPlay() tries [samples].
+inline constexpr int kLongestLag = 6;
+
 /// Compares how well PV follows OP through a play and without one.
 struct PlayFit {
   double linear{0.0};     ///< r² of the best fit without a play.

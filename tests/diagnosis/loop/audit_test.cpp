@@ -18,17 +18,21 @@ namespace {
 
 constexpr int kLoops = 80;
 
-// Share of `loop` called stiction, over seeds 1, 2, ...
-double StictionShare(const ClosedLoop& loop, bool say_level = true) {
+// Share of `loop` with this verdict, over seeds 1, 2, ...; NUL: nobody says
+// what the service is.
+double ShareOf(Verdict verdict, const ClosedLoop& loop, char service) {
   int found = 0;
   for (std::uint64_t seed = 1; seed <= kLoops; ++seed) {
     Window window = Simulate(loop, seed);
-    if (!say_level) {
-      window.integrating.reset();
-    }
-    found += AuditWindow(window).verdict == Verdict::kStiction ? 1 : 0;
+    window.integrating.reset();
+    SetService(service, window);
+    found += AuditWindow(window).verdict == verdict ? 1 : 0;
   }
   return static_cast<double>(found) / kLoops;
+}
+
+double StictionShare(const ClosedLoop& loop, char service) {
+  return ShareOf(Verdict::kStiction, loop, service);
 }
 
 constexpr std::array kSound{LoopState::kHealthy, LoopState::kSluggish,
@@ -42,10 +46,13 @@ TEST(AuditTest, CallsFewSoundFlowLoopsSticky) {
         loop.state = state;
         loop.noise = noise;
         loop.steps = steps;
-        const double share = StictionShare(loop);
+        const double share = StictionShare(loop, 'F');
+        const double unsaid = StictionShare(loop, '\0');
         EXPECT_LE(share, 0.05);
+        EXPECT_LE(unsaid, 0.02);
         std::cout << "state " << static_cast<int>(state) << ", noise " << noise
-                  << (steps ? ", steps" : "") << ": " << share << '\n';
+                  << (steps ? ", steps" : "") << ": " << share << ", unsaid "
+                  << unsaid << '\n';
       }
     }
   }
@@ -59,11 +66,16 @@ TEST(AuditTest, FindsBandsFromTwoPercentWithSetPointSteps) {
       loop.band = band;
       loop.noise = noise;
       loop.steps = true;
-      const double with = StictionShare(loop);
+      const double with = StictionShare(loop, 'F');
+      const double unsaid = StictionShare(loop, '\0');
       loop.steps = false;
+      const double without = StictionShare(loop, 'F');
       std::cout << "band " << band << ", noise " << noise << ": " << with
-                << " with steps, " << StictionShare(loop) << " without\n";
+                << " with steps, unsaid " << unsaid << "; " << without
+                << " without, unsaid " << StictionShare(loop, '\0') << '\n';
+      EXPECT_GE(without, 0.1);
       EXPECT_GE(with, 0.6);
+      EXPECT_GE(unsaid, 0.6);
     }
   }
 }
@@ -75,9 +87,9 @@ TEST(AuditTest, CallsNoLevelLoopSticky) {
       loop.state = state;
       loop.level = true;
       loop.steps = steps;
-      EXPECT_EQ(StictionShare(loop), 0.0) << static_cast<int>(state);
+      EXPECT_EQ(StictionShare(loop, 'L'), 0.0) << static_cast<int>(state);
       // Nor where nobody says that it is one.
-      const double unsaid = StictionShare(loop, false);
+      const double unsaid = StictionShare(loop, '\0');
       std::cout << "level unsaid, state " << static_cast<int>(state)
                 << (steps ? ", steps: " : ": ") << unsaid << '\n';
       EXPECT_LE(unsaid, 0.05) << static_cast<int>(state);
@@ -103,22 +115,73 @@ TEST(AuditTest, CallsNoTemperatureUnderASlowLoadStickyOrDead) {
       EXPECT_NE(verdict, Verdict::kStiction) << seed;
       EXPECT_NE(verdict, Verdict::kNoResponse) << seed;
     }
+    EXPECT_LE(as_any, 3) << static_cast<int>(state);
     std::cout << "state " << static_cast<int>(state)
               << ", if nobody says that it is slow: " << as_any << " of 100\n";
   }
 }
 
-TEST(AuditTest, IsSureOnlyWherePredictionAgrees) {
+// A pressure may be as slow as a temperature; only a flow is known to be quick.
+TEST(AuditTest, CallsNoPressureUnderASlowLoadSticky) {
+  for (const LoopState state :
+       {LoopState::kHealthy, LoopState::kSluggish, LoopState::kTight}) {
+    ClosedLoop loop;
+    loop.state = state;
+    loop.slow = true;
+    loop.period_s = 60.0;
+    loop.samples = 360;
+    EXPECT_LE(StictionShare(loop, 'P'), 0.03) << static_cast<int>(state);
+  }
+}
+
+// At its closed end OP stands, too, where a valve is not needed, so that fewer
+// are seen there, and of levels, which run away at their own pace, none.
+TEST(AuditTest, SeesMostStuckValves) {
+  for (const auto& [service, slow] :
+       {std::pair{'F', false}, {'P', false}, {'T', true}, {'L', false}}) {
+    ClosedLoop loop;
+    loop.state = LoopState::kStuck;
+    loop.slow = slow;
+    loop.level = service == 'L';
+    loop.period_s = slow ? 60.0 : 10.0;
+    loop.samples = slow ? 360 : 720;
+    std::array<int, 2> found{};
+    std::array<int, 2> all{};
+    for (std::uint64_t seed = 1; seed <= 2 * kLoops; ++seed) {
+      Window window = Simulate(loop, seed);
+      window.integrating.reset();
+      SetService(service, window);
+      const std::size_t open = window.op.back() > 50.0 ? 1 : 0;
+      const Verdict verdict = AuditWindow(window).verdict;
+      ++all[open];
+      found[open] += verdict == Verdict::kNoResponse ? 1 : 0;
+    }
+    std::cout << "stuck " << service << ": " << found[1] << " of " << all[1]
+              << " at the open end, " << found[0] << " of " << all[0] << '\n';
+    EXPECT_GE(found[1], 0.85 * all[1]) << service;
+    EXPECT_GE(found[0], (service == 'L' ? 0.0 : 0.75) * all[0]) << service;
+  }
+}
+
+TEST(AuditTest, IsSureOnlyWherePredictionAgreesAndPvIsNotLate) {
   ClosedLoop loop;
   loop.state = LoopState::kSticky;
   loop.band = 3.0;
+  loop.steps = true;
+  int late = 0;
   for (std::uint64_t seed = 1; seed <= 200; ++seed) {
-    const Audit audit = AuditWindow(Simulate(loop, seed));
+    Window window = Simulate(loop, seed);
+    SetService(seed % 2 == 0 ? 'F' : 'P', window);
+    const Audit audit = AuditWindow(window);
     if (audit.verdict == Verdict::kStiction) {
-      EXPECT_EQ(audit.sure, audit.evidence.prediction_gain > 3.0);
-      EXPECT_GT(audit.evidence.prediction_gain, 0.0);
+      const Evidence& e = audit.evidence;
+      EXPECT_EQ(audit.sure, e.prediction_gain > 3.0 && !e.late);
+      EXPECT_GT(e.prediction_gain, 0.0);
+      EXPECT_FALSE(e.late && seed % 2 == 0);
+      late += e.late ? 1 : 0;
     }
   }
+  EXPECT_GT(late, 0);
 }
 
 TEST(AuditTest, ReadsStictionOffThePosition) {
@@ -283,6 +346,53 @@ TEST(AuditTest, AnAnswerAtTheOpenEndIsOne) {
   }
   EXPECT_NE(AuditWindow(heating).verdict, Verdict::kNoResponse);
   EXPECT_NE(AuditWindow(following).verdict, Verdict::kNoResponse);
+}
+
+// A load brings PV nearer now and then; what follows OP slowly does so
+// steadily.
+TEST(AuditTest, ALoadIsNoAnswer) {
+  Window window = Ramp();
+  for (std::size_t k = 0; k < window.op.size(); ++k) {
+    const auto t = static_cast<double>(k);
+    window.op[k] = 100.0;
+    window.pv[k] = 30.0 + 0.5 * std::sin(0.025 * t - 1.0);
+  }
+  EXPECT_EQ(AuditWindow(window).verdict, Verdict::kNoResponse);
+  for (std::size_t k = 0; k < window.op.size(); ++k) {
+    window.pv[k] = 30.0 + 0.002 * static_cast<double>(k);
+  }
+  EXPECT_NE(AuditWindow(window).verdict, Verdict::kNoResponse);
+}
+
+// One that is not needed closes, too; but PV is at SP until then.
+TEST(AuditTest, SeesAValveThatDoesNothingThoughAskedToClose) {
+  Window window = Ramp();
+  for (std::size_t k = 0; k < window.op.size(); ++k) {
+    const auto t = static_cast<double>(k);
+    window.op[k] = std::max(0.0, 60.0 - t);
+    window.pv[k] = 40.0 + 0.5 * std::sin(0.1 * t);
+  }
+  SetService('F', window);
+  EXPECT_EQ(AuditWindow(window).verdict, Verdict::kNoResponse);
+  for (std::size_t k = 0; k < 60; ++k) {
+    window.pv[k] = 35.0 + 0.5 * std::sin(0.1 * static_cast<double>(k));
+  }
+  EXPECT_EQ(AuditWindow(window).verdict, Verdict::kSaturated);
+  // Or it has been closed all the time.
+  std::ranges::fill(window.op, 0.0);
+  EXPECT_NE(AuditWindow(window).verdict, Verdict::kNoResponse);
+}
+
+// PV is back where it was, at SP, when OP has met the load.
+TEST(AuditTest, ALoadThatStepsIsNoRunWithoutAnAnswer) {
+  Window window = Ramp();
+  for (std::size_t k = 0; k < window.op.size(); ++k) {
+    const double t = static_cast<double>(k % 200) / 20.0;
+    const double way = k < 200 ? 1.0 : -1.0;
+    window.op[k] = 50.0 + way * (10.0 * (1.0 - std::exp(-t)) - 5.0);
+    window.pv[k] = 35.0 - way * 4.0 * t * std::exp(-t);
+  }
+  EXPECT_NE(AuditWindow(window).verdict, Verdict::kNoResponse);
 }
 
 // The position follows, so the valve is not stuck, whatever PV does.
@@ -463,6 +573,20 @@ TEST(AuditTest, RefusesWhatIsNoWindow) {
   window = Simulate({}, 1);
   window.period_s = 0.0;
   EXPECT_THROW(AuditWindow(window), std::invalid_argument);
+}
+
+// A gas drum's pressure is an integral, a pipe's is not.
+TEST(ServiceTest, OnlyLevelsAndFlowsTellWhetherPvIsAnIntegral) {
+  for (const auto& [service, integrating] :
+       {std::pair<char, std::optional<bool>>{'L', true},
+        {'F', false},
+        {'P', std::nullopt},
+        {'T', std::nullopt}}) {
+    Window window;
+    SetService(service, window);
+    EXPECT_EQ(window.integrating, integrating) << service;
+    EXPECT_EQ(window.lags, service == 'T');
+  }
 }
 
 TEST(ServiceTest, IsTheFirstLetterOfATag) {

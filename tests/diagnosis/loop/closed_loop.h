@@ -10,7 +10,14 @@
 
 namespace fdi::loop {
 
-enum class LoopState { kHealthy, kSluggish, kTight, kExternalSine, kSticky };
+enum class LoopState {
+  kHealthy,
+  kSluggish,
+  kTight,
+  kExternalSine,
+  kSticky,
+  kStuck  ///< From a quarter of the window on, when the load steps.
+};
 
 /// A PI loop around a valve with play. OP in % of its span, PV in %, too.
 struct ClosedLoop {
@@ -61,6 +68,9 @@ inline Window Simulate(const ClosedLoop& loop, std::uint64_t seed) {
   const double load_noise = uniform(0.02, 0.1) * (loop.slow ? 20.0 : 1.0);
   const double load_memory =
       std::exp(-1.0 / (uniform(200.0, 1500.0) * (loop.slow ? 10.0 : 1.0)));
+  const double load_step = loop.state != LoopState::kStuck ? 0.0
+                           : uniform(0.0, 1.0) < 0.5       ? uniform(15.0, 40.0)
+                                                     : uniform(-40.0, -15.0);
   double sp = 50.0;
   double op = 50.0;
   double stem = 50.0;
@@ -95,12 +105,14 @@ inline Window Simulate(const ClosedLoop& loop, std::uint64_t seed) {
       }
     }
     const double band = loop.state == LoopState::kSticky ? loop.band : 0.0;
-    stem = std::clamp(stem, op - 0.5 * band, op + 0.5 * band);
+    const bool stuck =
+        loop.state == LoopState::kStuck && 4 * t > loop.samples * step;
+    stem = stuck ? stem : std::clamp(stem, op - 0.5 * band, op + 0.5 * band);
     load = load_memory * load + load_noise *
                                     std::sqrt(1.0 - load_memory * load_memory) *
                                     5.0 * normal(random);
-    const double outside =
-        load + sine * std::sin(2.0 * std::numbers::pi * t / sine_s);
+    const double outside = load + (stuck ? gain * load_step : 0.0) +
+                           sine * std::sin(2.0 * std::numbers::pi * t / sine_s);
     moving[static_cast<std::size_t>(t + settle_s) % moving.size()] = stem;
     const double late =
         moving[static_cast<std::size_t>(t + settle_s + 1) % moving.size()];
