@@ -670,11 +670,13 @@ void Episode::CountMisfits(FaultSet misfits, const Verdict& verdict) {
   stood_ += IsAllOf(verdict.isolated, misfits_) ? 0 : 1;
 }
 
-// Fit does not choose among faults, evidence does. But where all of a name are
-// refuted, the name is taken back: the episode is outside all faults that are
-// known.
+// Fit does not choose among faults, evidence does. But where the only fault of
+// a name is refuted, the name is taken back: the episode is outside all faults
+// that are known. A set stays: that its faults look alike does not depend on
+// how well a model of them fits.
 void Episode::Withdraw(Verdict& verdict) {
-  if (!IsAllOf(verdict.isolated, misfit_counts_.refuted())) {
+  if (!IsAllOf(verdict.isolated, misfit_counts_.refuted()) ||
+      std::popcount(verdict.isolated & ~floor_names_) > 1) {
     return;
   }
   early_ = false;

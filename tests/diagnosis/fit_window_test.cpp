@@ -236,6 +236,26 @@ TEST(FitWindowTest, ANameThatFitsNoMoreIsTakenBack) {
   EXPECT_EQ(seen.last.unknown, Unknown::kOutsideKnown);
 }
 
+// f3 and f6 look alike at a command that rests, whatever else is strange.
+TEST(FitWindowTest, ASetThatFitsNoMoreStays) {
+  ValveEngine engine(std::make_shared<const ModelSet>(Fitted()));
+  Noise noise(5);
+  Verdict verdict;
+  for (std::uint64_t k = 0; k < 300; ++k) {
+    Sample sample = tests::PlantSample(k, 0.0);
+    noise.Add(sample);
+    if (k >= 150) {
+      Strange(sample);
+    } else if (k >= 50) {
+      AddF6(sample, 1.0);
+    }
+    verdict = engine.Step(sample);
+    if (k >= 149) {
+      EXPECT_EQ(verdict.isolated, 6U) << k;
+    }
+  }
+}
+
 // A fault that fits half of the time is taken back and does not return whenever
 // it fits again.
 TEST(FitWindowTest, AFaultThatFitsNowAndThenIsNotNamedAgain) {
