@@ -51,12 +51,12 @@ std::future<LookWorker::Answer> LookWorker::Submit(std::string valve_id,
   Look look{rank, std::move(valve_id), std::move(physics), std::move(task)};
   std::future<Answer> answer = look.answer.get_future();
   const MutexLock lock(mutex_);
-  const auto [begin, end] =
-      std::ranges::equal_range(waiting_, look.rank, {}, &Look::rank);
+  const auto begin = std::ranges::lower_bound(waiting_, rank, {}, &Look::rank);
+  const auto end = std::ranges::upper_bound(waiting_, rank, {}, &Look::rank);
   // A newer look at a valve makes one that still waits pointless. Looks for
   // growth are points of a curve, each of which counts.
   const auto same =
-      look.rank == Rank::kGrowth
+      rank == Rank::kGrowth
           ? end
           : std::ranges::find(begin, end, look.valve_id, &Look::valve_id);
   if (same != end) {
@@ -66,7 +66,7 @@ std::future<LookWorker::Answer> LookWorker::Submit(std::string valve_id,
     same->answer.set_value(std::nullopt);
     *same = std::move(look);
   } else if (static_cast<std::size_t>(end - begin) <
-             (look.rank == Rank::kNaming ? capacity_ : kMaxRoutineLooks)) {
+             (rank == Rank::kNaming ? capacity_ : kMaxRoutineLooks)) {
     waiting_.insert(end, std::move(look));
     arrival_.notify_one();
   } else {
