@@ -17,12 +17,6 @@ double Growth(double t) {
   return t > 0.0 ? 1.0 / Exp(-t) : Exp(t);
 }
 
-// The share of its limit that a residual or a mean has; below 0: of the lower
-// one. That of NaN is 0.
-double ShareOf(double value, double lower, double upper) {
-  return value > 0.0 ? value / upper : value < 0.0 ? -value / lower : 0.0;
-}
-
 std::size_t WindowsOf(const ModelSet& models) {
   std::size_t windows = 0;
   for (const ChannelSpec& channel : models.channels) {
@@ -43,7 +37,7 @@ double CertainResidual(const ObserverBank& bank, int channel, double margin) {
 Detection::Detection(const ModelSet& models)
     : models_(&models),
       windows_(models),
-      shares_(models.decision.detection_samples,
+      values_(models.decision.detection_samples,
               models.channels.size() + WindowsOf(models)),
       energies_(models.decision.detection_samples, WindowsOf(models),
                 kNoEnergy) {}
@@ -56,7 +50,7 @@ void Detection::Restart() {
 void Detection::Interrupt() {
   runs_.fill({});
   pending_ = 0;
-  shares_.Restart();
+  values_.Restart();
   energies_.Restart();
   share_ = 0.0;
 }
@@ -98,9 +92,7 @@ bool Detection::Push(const ObserverBank& bank, const Sample& sample,
     abnormal = abnormal || below || above;
     Count(test++, below, stamp_ns);
     Count(test++, above, stamp_ns);
-    share_ = shares_.PushSigned(
-        ShareOf(residual, channel.lower_threshold, channel.upper_threshold), c,
-        share_);
+    PushValue(residual, channel.lower_threshold, channel.upper_threshold, c);
     if (held_out) {
       continue;
     }
@@ -115,9 +107,8 @@ bool Detection::Push(const ObserverBank& bank, const Sample& sample,
       Count(test++, mean < limits.lower_mean, stamp_ns);
       Count(test++, mean > limits.upper_mean, stamp_ns);
       Count(test++, energy > 0.0, stamp_ns);
-      share_ = shares_.PushSigned(
-          ShareOf(mean, limits.lower_mean, limits.upper_mean),
-          channels + first + w, share_);
+      PushValue(mean, limits.lower_mean, limits.upper_mean,
+                channels + first + w);
       // In this order of max() a NaN counts as none.
       energy_share =
           energies_.Push(std::max(kNoEnergy, energy), first + w, energy_share);
@@ -133,6 +124,17 @@ void Detection::Save(SnapshotWriter& writer) const {
 
 bool Detection::Restore(SnapshotReader& reader) {
   return windows_.Restore(reader);
+}
+
+// Most values have no larger share than that of another one, which takes no
+// division to be seen. NaN counts as 0.
+void Detection::PushValue(double value, double lower, double upper,
+                          std::size_t series) {
+  const double limit = value < 0.0 ? -lower : upper;
+  const double most = share_ * limit;
+  const double least =
+      values_.PushSigned(std::isnan(value) ? 0.0 : value, series, most);
+  share_ = least > most ? least / limit : share_;
 }
 
 // Hardly any run is not empty, and to read all of them takes long.

@@ -69,13 +69,14 @@ class Detection {
   // Below and above of the residual; of each window below, above and energy.
   static constexpr std::size_t kTestsPerChannel = 2 + 3 * kMaxWindows;
 
+  void PushValue(double value, double lower, double upper, std::size_t series);
   void Count(std::size_t test, bool beyond, std::int64_t stamp_ns);
 
   const ModelSet* models_;
   ResidualWindows windows_;
   std::array<Run, kTestsPerChannel * kMaxChannels> runs_{};
   int pending_{0};      // runs that are not empty
-  Sustained shares_;    // by channel, then by window; below 0: below
+  Sustained values_;    // residuals by channel, then means by window
   Sustained energies_;  // by window: logarithms of their shares
   double share_{0.0};
 };

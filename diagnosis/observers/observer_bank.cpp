@@ -50,7 +50,7 @@ void ObserverBank::Initialise(const Sample& sample) {
 }
 
 // Same rule as in fitting (BuildRegression), over about the last 100 readings.
-bool ObserverBank::IsMeasured(std::size_t channel) {
+bool ObserverBank::IsMeasured(std::size_t channel, bool all_certain) {
   if (state_.active[channel] == 0) {
     return false;
   }
@@ -61,9 +61,11 @@ bool ObserverBank::IsMeasured(std::size_t channel) {
   if (is_uncertain(model.output, 0)) {
     return false;
   }
-  const bool whole = std::ranges::none_of(
-      model.regressors,
-      [&](const Regressor& r) { return is_uncertain(r.signal, r.lag); });
+  const bool whole =
+      all_certain ||
+      std::ranges::none_of(model.regressors, [&](const Regressor& r) {
+        return is_uncertain(r.signal, r.lag);
+      });
   double& share = whole_share_[channel];
   share += kShareGain * ((whole ? 1.0 : 0.0) - share);
   return whole || share < 0.5;
@@ -74,10 +76,12 @@ void ObserverBank::Step(const Sample& sample) {
   state_.measured[state_.Row(0)] = sample.values;
   state_.uncertain[state_.Row(0)] = sample.uncertain();
   measured_count_ = 0;
+  const bool all_certain = std::ranges::all_of(
+      state_.uncertain, [](SignalMask uncertain) { return uncertain == 0; });
   const Observer& normal = plan_->models().observers.front();
   for (std::size_t c = 0; c < state_.active.size(); ++c) {
     const TsModel& model = normal.channels[c].model;
-    const bool measured = IsMeasured(c);
+    const bool measured = IsMeasured(c, all_certain);
     measured_count_ += measured ? 1 : 0;
     const double reading = measured ? sample[model.output]
                                     : std::numeric_limits<double>::quiet_NaN();

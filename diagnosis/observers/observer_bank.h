@@ -105,7 +105,7 @@ class ObserverBank {
     return quads[slot / kLanes].lane[slot % kLanes];
   }
 
-  bool IsMeasured(std::size_t channel);
+  bool IsMeasured(std::size_t channel, bool all_certain);
 
   std::shared_ptr<const ObserverPlan> plan_;
   const ObserverKernels* kernels_;
