@@ -8,6 +8,7 @@
 #include <thread>
 #include <utility>
 
+#include "base/error.h"
 #include "base/log.h"
 #include "diagnosis/records/partitions.h"
 #include "monitor/bus/dds_options.h"
@@ -171,7 +172,7 @@ void ValveWire::ConvertFlow(const std::string& valve_id, Sample& sample) {
           known->second.emplace(simulator::FlowTargetOf(store.Load(*set)));
         }
       }
-    } catch (const std::exception& error) {
+    } catch (const DataError& error) {
       context_.log(LogLevel::kWarning,
                    EventLine("flow_not_converted",
                              {{"valve", valve_id}, {"reason", error.what()}}));

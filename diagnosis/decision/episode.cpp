@@ -673,14 +673,16 @@ void Episode::CountMisfits(FaultSet misfits, const Verdict& verdict) {
 // Fit does not choose among faults, evidence does. But where the only fault of
 // a name is refuted, the name is taken back: the episode is outside all faults
 // that are known. A set stays: that its faults look alike does not depend on
-// how well a model of them fits.
+// how well a model of them fits. But it explains no loss of flow any more.
 void Episode::Withdraw(Verdict& verdict) {
-  if (!IsAllOf(verdict.isolated, misfit_counts_.refuted()) ||
-      std::popcount(verdict.isolated & ~floor_names_) > 1) {
+  if (!IsAllOf(verdict.isolated, misfit_counts_.refuted())) {
+    return;
+  }
+  stood_ = 0;
+  if (std::popcount(verdict.isolated & ~floor_names_) > 1) {
     return;
   }
   early_ = false;
-  stood_ = 0;
   without_fault_ = models_->decision.isolation_samples;
   verdict.isolated = floor_;
   verdict.state = floor_ != 0 ? State::kIsolated : State::kDetected;

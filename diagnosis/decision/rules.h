@@ -154,7 +154,7 @@ inline constexpr auto kRules = std::to_array<RuleRow>({
      "blocks every change while something may be on top", "all below", "-",
      "SecondFaultTest.ASecondFaultGetsItsOwnNameAndTheFirstKeepsIts"},
     {Rule::kWithdraw, Stage::kName, "withdraw",
-     "takes a name of one fault back that is refuted", "the name", "-",
+     "takes back the name of one fault once that is refuted", "the name", "-",
      "FitWindowTest.ANameThatFitsNoMoreIsTakenBack"},
     {Rule::kMisfitIsNoName, Stage::kName, "misfit_is_no_name",
      "blocks a set of which nothing fits", "-", "-",

@@ -50,7 +50,7 @@ if [ "$seconds" -gt 200 ]; then
     gateway plant:STOP broker:CUT client:STOP monitor:STOP out:STOP host edge:STOP)
 else
   rate=10 away=0 cut=0
-  ways=("client edge" "gateway broker" "plant host out" "monitor server")
+  ways=("client edge" "out broker" gateway "plant host" "monitor server")
 fi
 plant_port=$((16000 + domain)) port=$((15000 + domain)) mqtt_port=$((17000 + domain))
 export FDI_GATEWAY=$bin/fdi-gateway FDI_STORE=$bin/fdi-store
