@@ -284,9 +284,8 @@ std::size_t LongestRepeat(const Window& window) {
 
 // The longest one-way run of the smoothed OP in which SP - PV has one sign in
 // 95 % of the samples and PV moves by less than 5 % of its mean, which is more
-// than noise [% of OP]. Under a load that steps, PV begins at SP. The mean of
-// SP counts because smoothing begins a run before the step of SP that causes
-// it.
+// than noise [% of OP]: at last and on average, because under a load that steps
+// PV ends where it began, and was elsewhere meanwhile.
 double UnansweredRun(const Window& window) {
   const std::vector<double> errors = Errors(window);
   const std::size_t n = errors.size();
@@ -314,8 +313,8 @@ double UnansweredRun(const Window& window) {
     const double mean = std::abs(Mean(e));
     if (run > longest && std::max(share, 1.0 - share) >= 0.95 &&
         kUnmoved * mean > noise &&
-        std::abs(Mean(std::span(window.sp).subspan(begin, e.size())) -
-                 window.pv[begin]) > kHalf * mean &&
+        std::abs(Mean(std::span(window.pv).subspan(begin, e.size())) -
+                 window.pv[begin]) < kUnmoved * mean &&
         std::abs(window.pv[end] - window.pv[begin]) < kUnmoved * mean) {
       longest = run;
     }

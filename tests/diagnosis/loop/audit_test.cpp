@@ -463,6 +463,9 @@ TEST(AuditTest, ALoadThatStepsIsNoRunWithoutAnAnswer) {
     window.pv[k] = 35.0 - way * 4.0 * t * std::exp(-t);
   }
   EXPECT_NE(AuditWindow(window).verdict, Verdict::kNoResponse);
+  // Nor where PV is on its way to SP yet.
+  std::ranges::fill(window.sp, 38.0);
+  EXPECT_NE(AuditWindow(window).verdict, Verdict::kNoResponse);
 }
 
 // The position follows, so the valve is not stuck, whatever PV does.
