@@ -36,7 +36,7 @@ constexpr double kAntiphase = -0.5;
 constexpr double kPoorFit = 0.1;  // r² of a disturbance's.
 // A good valve with positioner has a dead band of 0.25 to 0.5 %.
 constexpr double kGoodBand = 0.25;
-constexpr double kHalf = 0.5;     // G of a play between OP and X; of an error.
+constexpr double kHalf = 0.5;     // G of a play between OP and X.
 constexpr double kMoves = 1.0;    // Change of OP that calls for an answer [%].
 constexpr double kWindsUp = 5.0;  // The same, whatever the noise of it [%].
 // Share of the mean error by which PV moves at most if it does not answer; so
