@@ -36,15 +36,16 @@ constexpr double kAntiphase = -0.5;
 constexpr double kPoorFit = 0.1;  // r² of a disturbance's.
 // A good valve with positioner has a dead band of 0.25 to 0.5 %.
 constexpr double kGoodBand = 0.25;
-constexpr double kHalf = 0.5;     // G of a play between OP and X; of an error.
+constexpr double kHalf = 0.5;     // G of a play between OP and X.
 constexpr double kMoves = 1.0;    // Change of OP that calls for an answer [%].
 constexpr double kWindsUp = 5.0;  // The same, whatever the noise of it [%].
 // Share of the mean error by which PV moves at most if it does not answer; so
 // an error of less than 1/kUnmoved noises says nothing.
 constexpr double kUnmoved = 0.05;
-// What a load seldom does meanwhile: shares of an error, and of the travel.
+constexpr double kSteady = 0.9;  // r² of PV over time, as a slow process has.
+// A load seldom takes away this share of an error, or moves OP by this share of
+// its travel.
 constexpr double kQuarter = 0.25;
-constexpr double kSteady = 0.9;   // r² of PV over time, as a slow process has.
 constexpr double kNearEnd = 0.5;  // From an end of the range of OP [%].
 constexpr double kOftenAtLimit = 0.05;
 constexpr double kOtherHalf = 50.0;  // Distance from OP, in % of the travel.
@@ -154,7 +155,8 @@ std::pair<std::size_t, std::size_t> LongestAt(const std::vector<double>& op,
 }
 
 // True if PV, off SP on one side by more than noise, comes no nearer in this
-// stretch: neither by as much as a load seldom brings it, nor steadily.
+// stretch: neither by as much as a load seldom brings it, nor steadily once its
+// dead time is over.
 bool StaysOff(const Window& window, std::size_t begin, std::size_t end) {
   const std::size_t third = (end - begin) / 3;
   const auto mean = [&](const std::vector<double>& values, std::size_t from) {
@@ -166,7 +168,7 @@ bool StaysOff(const Window& window, std::size_t begin, std::size_t end) {
       mean(window.sp, end - third) - mean(window.pv, end - third);
   const double nearer = (mean(window.pv, end - third) - pv) / first;
   CorrelationSums path;
-  for (std::size_t k = begin; k < end; ++k) {
+  for (std::size_t k = begin + third; k < end; ++k) {
     path.Add(static_cast<double>(k - begin), window.pv[k] - pv);
   }
   const double r = path.Correlation();
@@ -206,16 +208,14 @@ bool HasWoundUp(const Window& window, double limit, std::size_t begin,
 // True if OP has stood at an end for as long as a window needs, and PV comes no
 // nearer to SP. At the closed end that is usual where the valve is not needed,
 // unless PV was already off SP when OP was on its way there.
-bool IsHelpless(const Window& window) {
+bool IsHelpless(const Window& window, bool open) {
   if (window.sp.empty() || !IsPercent(window.op)) {
     return false;
   }
-  const auto is_at = [&window](double limit, bool open) {
-    const auto [begin, end] = LongestAt(window.op, limit);
-    return end - begin >= kMinSamples && StaysOff(window, begin, end) &&
-           (open || HasWoundUp(window, limit, begin, end));
-  };
-  return is_at(window.open_op, true) || is_at(100.0 - window.open_op, false);
+  const double limit = open ? window.open_op : 100.0 - window.open_op;
+  const auto [begin, end] = LongestAt(window.op, limit);
+  return end - begin >= kMinSamples && StaysOff(window, begin, end) &&
+         (open || HasWoundUp(window, limit, begin, end));
 }
 
 bool IsExchanged(const Window& window, double controller) {
@@ -284,7 +284,8 @@ std::size_t LongestRepeat(const Window& window) {
 
 // The longest one-way run of the smoothed OP in which SP - PV has one sign in
 // 95 % of the samples and PV moves by less than 5 % of its mean, which is more
-// than noise [% of OP]. A load that steps begins at an error of nothing.
+// than noise [% of OP]: at last and on average, because under a load that steps
+// PV ends where it began, and was elsewhere meanwhile.
 double UnansweredRun(const Window& window) {
   const std::vector<double> errors = Errors(window);
   const std::size_t n = errors.size();
@@ -311,7 +312,9 @@ double UnansweredRun(const Window& window) {
     const double share = positive / static_cast<double>(e.size());
     const double mean = std::abs(Mean(e));
     if (run > longest && std::max(share, 1.0 - share) >= 0.95 &&
-        kUnmoved * mean > noise && std::abs(e.front()) > kHalf * mean &&
+        kUnmoved * mean > noise &&
+        std::abs(Mean(std::span(window.pv).subspan(begin, e.size())) -
+                 window.pv[begin]) < kUnmoved * mean &&
         std::abs(window.pv[end] - window.pv[begin]) < kUnmoved * mean) {
       longest = run;
     }
@@ -496,11 +499,16 @@ Finding JudgePlay(const Evidence& e) {
       e.prediction_gain <= (explained > kHalf ? 0.0 : kChanceGain)) {
     return {};
   }
-  return e.prediction_gain > kPredictionGain && !e.late
-             ? Finding{Verdict::kStiction, true,
-                       "a play explains PV and predicts it"}
-             : Finding{Verdict::kStiction, false,
-                       "a play explains PV and hardly predicts it better"};
+  if (e.prediction_gain <= kPredictionGain) {
+    return {Verdict::kStiction, false,
+            "a play explains PV and hardly predicts it better"};
+  }
+  if (e.late) {
+    return {Verdict::kStiction, false,
+            "a play explains PV and predicts it, but PV follows late, as under "
+            "a slow load"};
+  }
+  return {Verdict::kStiction, true, "a play explains PV and predicts it"};
 }
 
 // Against the controller: in antiphase, or, where PV is known to follow OP,
@@ -527,16 +535,49 @@ Finding JudgeOscillation(const Window& window, const Evidence& e) {
   return {};
 }
 
+// No cause holds: what keeps the record from telling.
+Finding Unclear(const Window& window, const Evidence& e) {
+  if (e.integrates) {
+    return {Verdict::kUndetermined, false,
+            "PV follows the integral of OP, which looks like a play: measure X "
+            "or a flow, or step OP in manual"};
+  }
+  if (IsPlay(e) && (window.lags || e.late)) {
+    return {
+        Verdict::kUndetermined, false,
+        window.integrating == false
+            ? "PV follows OP late, which looks like a play: measure X, read "
+              "the flow each 20 s or faster, or step OP in manual"
+            : "PV follows OP late, which looks like a play: measure X or a "
+              "flow, or step OP in manual"};
+  }
+  if (IsPlay(e)) {
+    return {Verdict::kUndetermined, false,
+            "a play explains PV but does not predict it"};
+  }
+  if (e.prediction_gain > kUnclearGain) {
+    return {Verdict::kUndetermined, false,
+            "tuning or stiction: a play predicts PV but does not explain it"};
+  }
+  return {Verdict::kUndetermined, false, "nothing stands out"};
+}
+
 // The first cause that holds, from those that leave nothing else to see to
 // those that need a sound record.
 Finding Judge(const Window& window, const Evidence& e) {
   if (e.samples < kMinSamples) {
     return {Verdict::kUndetermined, false, "too few samples"};
   }
-  if (e.helpless && window.x.empty()) {
+  if (e.helpless_open && window.x.empty()) {
     return {Verdict::kNoResponse, true,
-            "OP stands at its end and PV comes no nearer to SP: stuck, shut, "
-            "isolated, or too small"};
+            "OP stands at its open end and PV comes no nearer to SP: stuck, "
+            "shut, isolated, or too small"};
+  }
+  // A load that falls until the valve just closes looks alike.
+  if (e.helpless_closed && window.x.empty()) {
+    return {Verdict::kNoResponse, false,
+            "OP stands at its closed end and PV comes no nearer to SP: stuck "
+            "open, bypassed, or a load that needs no valve"};
   }
   if (e.hunts > kHunts) {
     return {Verdict::kHunting, false, "X swings to and fro while OP rests"};
@@ -580,25 +621,7 @@ Finding Judge(const Window& window, const Evidence& e) {
       cause.verdict != Verdict::kUndetermined) {
     return cause;
   }
-  if (e.integrates) {
-    return {Verdict::kUndetermined, false,
-            "PV follows the integral of OP, which looks like a play: measure X "
-            "or a flow, or step OP in manual"};
-  }
-  if (IsPlay(e) && (window.lags || e.late)) {
-    return {Verdict::kUndetermined, false,
-            "PV follows OP late, which looks like a play: measure X or a flow, "
-            "or step OP in manual"};
-  }
-  if (IsPlay(e)) {
-    return {Verdict::kUndetermined, false,
-            "a play explains PV but does not predict it"};
-  }
-  if (e.prediction_gain > kUnclearGain) {
-    return {Verdict::kUndetermined, false,
-            "tuning or stiction: a play predicts PV but does not explain it"};
-  }
-  return {Verdict::kUndetermined, false, "nothing stands out"};
+  return Unclear(window, e);
 }
 
 void Check(const Window& window) {
@@ -670,7 +693,8 @@ Evidence EvidenceOf(const Window& window) {
   e.sp_moves = MovingShare(window.sp);
   e.longest_repeat = LongestRepeat(window);
   e.unanswered = window.sp.empty() ? 0.0 : UnansweredRun(window);
-  e.helpless = IsHelpless(window);
+  e.helpless_open = IsHelpless(window, true);
+  e.helpless_closed = IsHelpless(window, false);
   e.oscillation = FindOscillation(window.op);
   const ControllerFit controller = FitController(window);
   e.controller = controller.r2;
@@ -722,7 +746,8 @@ Audit AuditValve(Window window) {
   window.x.clear();
   Audit by_flow = by_x;
   by_flow.evidence.standing = {};
-  by_flow.evidence.helpless = false;  // X tells where the rod is.
+  // X tells where the rod is.
+  by_flow.evidence.helpless_open = by_flow.evidence.helpless_closed = false;
   by_flow.evidence.hunts = 0.0;
   AddAnswer(window, by_flow.evidence);
   judge(by_flow);
@@ -734,7 +759,7 @@ Audit AuditValve(Window window) {
              : by_flow;
 }
 
-char ServiceOf(std::string_view name) {
+char ServiceOf(std::string_view name, bool of_valve) {
   constexpr std::string_view kFunctions = "ICTVRYASDQK";
   for (std::size_t i = 0; i < name.size();) {
     std::size_t end = i;
@@ -745,7 +770,8 @@ char ServiceOf(std::string_view name) {
     const std::string_view letters = name.substr(i, end - i);
     if (letters.size() >= 2 && letters.size() <= 4 &&
         letters.substr(1).find_first_not_of(kFunctions) ==
-            std::string_view::npos) {
+            std::string_view::npos &&
+        !(of_valve && letters.front() == 'F' && letters.back() == 'V')) {
       return letters.front();
     }
     i = std::max(end, i + 1);

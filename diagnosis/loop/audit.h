@@ -72,9 +72,10 @@ struct Evidence {
   std::size_t distinct_answer{0};  ///< Values of X, else of PV.
   std::size_t longest_repeat{0};   ///< Equal readings of PV while OP moves.
   double unanswered{0.0};  ///< Longest one-way run of OP without answer [%].
-  /// OP stands at its open end and PV comes no nearer to SP; or at its closed
-  /// end, and PV was as far off before OP came there.
-  bool helpless{false};
+  /// OP stands at its open end and PV comes no nearer to SP.
+  bool helpless_open{false};
+  /// The same at its closed end, and PV was as far off before OP came there.
+  bool helpless_closed{false};
   std::optional<Oscillation> oscillation;  ///< In OP; period in samples.
   std::optional<PlayFit> fit;              ///< PV, or X, over OP.
   Standing standing;            ///< Stops of X, for samples of 2 s or less.
@@ -109,7 +110,9 @@ struct Audit : Finding {
 
 /// The first of the function letters of a tag, which is its service: L, a
 /// level, of "20LIC101_0405". NUL: there are none.
-char ServiceOf(std::string_view name);
+/// @param of_valve the tag may be the valve's own: FV101 can be in a level loop
+///   and tells nothing, unlike FIC101.
+char ServiceOf(std::string_view name, bool of_valve = false);
 
 /// Sets what the service of a loop (ServiceOf()) says of its PV: a level is an
 /// integral, a flow is none and answers at once, a temperature is late.

@@ -266,10 +266,7 @@ void LoopWatch::SetControlled(loop::Window& window) const {
     // Its sense and whether it is an integral are read off the record.
     window.pv = std::move(pv);
     window.gain_sign = 0;
-    // Another tag is that of the valve: FV101 may be in a level loop.
-    if (service_ == 'L' || service_ == 'T') {
-      loop::SetService(service_, window);
-    }
+    loop::SetService(service_, window);
     if (has_gap(window.sp)) {
       window.sp.clear();
     }

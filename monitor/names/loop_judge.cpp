@@ -9,7 +9,7 @@ namespace fdi::monitor {
 LoopJudge::LoopJudge(std::string_view valve_id, AuditWorker* worker,
                      std::shared_ptr<const SeverityCatalogue> severities)
     : watch_(std::hash<std::string_view>{}(valve_id) % LoopWatch::kHop,
-             std::move(severities), loop::ServiceOf(valve_id)),
+             std::move(severities), loop::ServiceOf(valve_id, true)),
       worker_(worker) {}
 
 const Verdict& LoopJudge::Step(const Sample& sample, double period_s) {

@@ -240,12 +240,9 @@ std::optional<loop::Window> WindowOf(Samples part, double period_s,
   window.open_op = record.open_op;
   window.pv = Series(part, Signal::kPv);
   if (!window.pv.empty()) {
-    // The sense of a valve's PV is known only from the record. Its tag is that
-    // of the valve: FV101 may be in a level loop.
+    // The sense of a valve's PV is known only from the record.
     window.sp = Series(part, Signal::kSp);
-    if (service == 'L' || !of_valve || !options.service.empty()) {
-      loop::SetService(service, window);
-    }
+    loop::SetService(service, window);
     return window;
   }
   window.pv = Series(part, Signal::kF);
@@ -299,7 +296,8 @@ std::string HintOf(const Judged& one, bool has_sp) {
 // The service of the loop by its name, or by the tag of OP where that tells
 // nothing: a file has any name.
 char ServiceOf(const LoopRecord& record) {
-  if (const char service = loop::ServiceOf(record.loop); service != '\0') {
+  if (const char service = loop::ServiceOf(record.loop, record.gain_sign != 0);
+      service != '\0') {
     return service;
   }
   const char service = loop::ServiceOf(record.tag);

@@ -180,6 +180,24 @@ TEST_F(LoopWatchPvTest, ALevelIsNeverCalledSticky) {
   }
 }
 
+TEST_F(LoopWatchPvTest, TheServiceOfALoopSaysWhatItsPvIs) {
+  for (const auto& [service, integrating] :
+       {std::pair<char, std::optional<bool>>{'F', false},
+        {'L', true},
+        {'\0', std::nullopt}}) {
+    LoopWatch watch(0, Severities(), service);
+    for (std::uint64_t k = 1; k <= LoopWatch::kPoints; ++k) {
+      Sample sample = At(k, 50.0, 5.0);
+      sample.Set(Signal::kPv, 3.1);
+      sample.Set(Signal::kSp, 3.6);
+      watch.Step(sample, 10.0);
+    }
+    const auto window = watch.TakeWindow();
+    ASSERT_TRUE(window);
+    EXPECT_EQ(window->integrating, integrating) << service;
+  }
+}
+
 // With SP the error is known: a PV that keeps its distance does not answer,
 // although its readings differ.
 TEST_F(LoopWatchPvTest, AnOpThatWindsUpHasNoResponse) {

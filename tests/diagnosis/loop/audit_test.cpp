@@ -35,6 +35,10 @@ double StictionShare(const ClosedLoop& loop, char service) {
   return ShareOf(Verdict::kStiction, loop, service);
 }
 
+bool Says(const Finding& finding, std::string_view words) {
+  return finding.reason.find(words) != std::string_view::npos;
+}
+
 constexpr std::array kSound{LoopState::kHealthy, LoopState::kSluggish,
                             LoopState::kTight, LoopState::kExternalSine};
 
@@ -134,6 +138,29 @@ TEST(AuditTest, CallsNoPressureUnderASlowLoadSticky) {
   }
 }
 
+// One that is known as a flow and read too seldom is not told to measure one.
+TEST(AuditTest, AdvisesASlowlyReadFlowToBeReadFaster) {
+  ClosedLoop loop;
+  loop.slow = true;
+  loop.period_s = 60.0;
+  loop.samples = 360;
+  std::array<int, 2> late{};
+  for (std::uint64_t seed = 1; seed <= 100; ++seed) {
+    for (const bool told : {false, true}) {
+      Window window = Simulate(loop, seed);
+      SetService(told ? 'F' : '\0', window);
+      const Audit audit = AuditWindow(window);
+      if (audit.verdict == Verdict::kUndetermined && Says(audit, "late")) {
+        ++late[told ? 1 : 0];
+        EXPECT_NE(Says(audit, "a flow"), told) << audit.reason;
+        EXPECT_EQ(Says(audit, "20 s"), told) << audit.reason;
+      }
+    }
+  }
+  EXPECT_GT(late[0], 0);
+  EXPECT_GT(late[1], 0);
+}
+
 // At its closed end OP stands, too, where a valve is not needed, so that fewer
 // are seen there, and of levels, which run away at their own pace, none.
 TEST(AuditTest, SeesMostStuckValves) {
@@ -159,7 +186,11 @@ TEST(AuditTest, SeesMostStuckValves) {
     std::cout << "stuck " << service << ": " << found[1] << " of " << all[1]
               << " at the open end, " << found[0] << " of " << all[0] << '\n';
     EXPECT_GE(found[1], 0.85 * all[1]) << service;
-    EXPECT_GE(found[0], (service == 'L' ? 0.0 : 0.75) * all[0]) << service;
+    if (service == 'L') {
+      EXPECT_EQ(found[0], 0);
+    } else {
+      EXPECT_GE(found[0], 0.75 * all[0]) << service;
+    }
   }
 }
 
@@ -176,6 +207,8 @@ TEST(AuditTest, IsSureOnlyWherePredictionAgreesAndPvIsNotLate) {
     if (audit.verdict == Verdict::kStiction) {
       const Evidence& e = audit.evidence;
       EXPECT_EQ(audit.sure, e.prediction_gain > 3.0 && !e.late);
+      EXPECT_EQ(Says(audit, "hardly"), e.prediction_gain <= 3.0);
+      EXPECT_EQ(Says(audit, "late"), e.prediction_gain > 3.0 && e.late);
       EXPECT_GT(e.prediction_gain, 0.0);
       EXPECT_FALSE(e.late && seed % 2 == 0);
       late += e.late ? 1 : 0;
@@ -305,13 +338,28 @@ TEST(AuditTest, SeesThatNothingAnswers) {
   EXPECT_EQ(AuditWindow(dead).verdict, Verdict::kNoResponse);
 }
 
+// OP winds up and reaches no end until SP steps back.
+TEST(AuditTest, SeesAStuckValveUnderASetPointStep) {
+  Window window = Ramp();
+  for (std::size_t k = 0; k < window.op.size(); ++k) {
+    const auto wound =
+        static_cast<double>(std::clamp<std::size_t>(k, 200, 260));
+    window.op[k] = 40.0 + (wound - 200.0) / 3.0;
+    window.sp[k] = k >= 200 && k < 260 ? 35.0 : 30.0;
+  }
+  EXPECT_EQ(AuditWindow(window).verdict, Verdict::kNoResponse);
+}
+
 TEST(AuditTest, SeesAValveThatDoesNothingThoughAskedToOpen) {
   Window window = Ramp();
   for (std::size_t k = 0; k < window.op.size(); ++k) {
     window.op[k] = 100.0;
     window.pv[k] = 30.0 + 0.1 * std::sin(static_cast<double>(k));
   }
-  EXPECT_EQ(AuditWindow(window).verdict, Verdict::kNoResponse);
+  const Audit audit = AuditWindow(window);
+  EXPECT_EQ(audit.verdict, Verdict::kNoResponse);
+  EXPECT_TRUE(audit.sure);
+  EXPECT_TRUE(Says(audit, "open end")) << audit.reason;
   window.open_op = 0.0;  // It is asked to close.
   EXPECT_EQ(AuditWindow(window).verdict, Verdict::kUndetermined);
   window.open_op = 100.0;
@@ -348,6 +396,24 @@ TEST(AuditTest, AnAnswerAtTheOpenEndIsOne) {
   EXPECT_NE(AuditWindow(following).verdict, Verdict::kNoResponse);
 }
 
+// A heater at full output answers after its dead time.
+TEST(AuditTest, ASlowAnswerAfterADeadTimeIsOne) {
+  for (const double dead : {0.0, 0.2, 0.3, 0.4}) {
+    for (const double order : {1.0, 2.0}) {
+      Window window = Ramp();
+      const auto n = static_cast<double>(window.op.size());
+      for (std::size_t k = 0; k < window.op.size(); ++k) {
+        const double t = std::max(0.0, static_cast<double>(k) / n - dead);
+        window.op[k] = 100.0;
+        window.sp[k] = 90.0;
+        window.pv[k] += 14.0 * std::pow(t / (1.0 - dead), order);
+      }
+      EXPECT_NE(AuditWindow(window).verdict, Verdict::kNoResponse)
+          << "dead time " << dead << ", order " << order;
+    }
+  }
+}
+
 // A load brings PV nearer now and then; what follows OP slowly does so
 // steadily.
 TEST(AuditTest, ALoadIsNoAnswer) {
@@ -373,7 +439,11 @@ TEST(AuditTest, SeesAValveThatDoesNothingThoughAskedToClose) {
     window.pv[k] = 40.0 + 0.5 * std::sin(0.1 * t);
   }
   SetService('F', window);
-  EXPECT_EQ(AuditWindow(window).verdict, Verdict::kNoResponse);
+  const Audit audit = AuditWindow(window);
+  EXPECT_EQ(audit.verdict, Verdict::kNoResponse);
+  EXPECT_TRUE(Says(audit, "closed end")) << audit.reason;
+  // A controller that is mostly P closes a sound valve so under a falling load.
+  EXPECT_FALSE(audit.sure);
   for (std::size_t k = 0; k < 60; ++k) {
     window.pv[k] = 35.0 + 0.5 * std::sin(0.1 * static_cast<double>(k));
   }
@@ -392,6 +462,9 @@ TEST(AuditTest, ALoadThatStepsIsNoRunWithoutAnAnswer) {
     window.op[k] = 50.0 + way * (10.0 * (1.0 - std::exp(-t)) - 5.0);
     window.pv[k] = 35.0 - way * 4.0 * t * std::exp(-t);
   }
+  EXPECT_NE(AuditWindow(window).verdict, Verdict::kNoResponse);
+  // Nor where PV is on its way to SP yet.
+  std::ranges::fill(window.sp, 38.0);
   EXPECT_NE(AuditWindow(window).verdict, Verdict::kNoResponse);
 }
 
@@ -595,6 +668,12 @@ TEST(ServiceTest, IsTheFirstLetterOfATag) {
   EXPECT_EQ(ServiceOf("boiler level 2"), 'L');
   EXPECT_EQ(ServiceOf("FV101"), 'F');
   EXPECT_EQ(ServiceOf("V1"), '\0');
+}
+
+TEST(ServiceTest, AFlowIsKnownByTheTagOfItsControllerNotOfItsValve) {
+  EXPECT_EQ(ServiceOf("FIC101", true), 'F');
+  EXPECT_EQ(ServiceOf("20FV101", true), '\0');
+  EXPECT_EQ(ServiceOf("LV101", true), 'L');
 }
 
 }  // namespace
