@@ -535,6 +535,33 @@ Finding JudgeOscillation(const Window& window, const Evidence& e) {
   return {};
 }
 
+// No cause holds: what keeps the record from telling.
+Finding Unclear(const Window& window, const Evidence& e) {
+  if (e.integrates) {
+    return {Verdict::kUndetermined, false,
+            "PV follows the integral of OP, which looks like a play: measure X "
+            "or a flow, or step OP in manual"};
+  }
+  if (IsPlay(e) && (window.lags || e.late)) {
+    return {
+        Verdict::kUndetermined, false,
+        window.integrating == false
+            ? "PV follows OP late, which looks like a play: measure X, read "
+              "the flow each 20 s or faster, or step OP in manual"
+            : "PV follows OP late, which looks like a play: measure X or a "
+              "flow, or step OP in manual"};
+  }
+  if (IsPlay(e)) {
+    return {Verdict::kUndetermined, false,
+            "a play explains PV but does not predict it"};
+  }
+  if (e.prediction_gain > kUnclearGain) {
+    return {Verdict::kUndetermined, false,
+            "tuning or stiction: a play predicts PV but does not explain it"};
+  }
+  return {Verdict::kUndetermined, false, "nothing stands out"};
+}
+
 // The first cause that holds, from those that leave nothing else to see to
 // those that need a sound record.
 Finding Judge(const Window& window, const Evidence& e) {
@@ -594,29 +621,7 @@ Finding Judge(const Window& window, const Evidence& e) {
       cause.verdict != Verdict::kUndetermined) {
     return cause;
   }
-  if (e.integrates) {
-    return {Verdict::kUndetermined, false,
-            "PV follows the integral of OP, which looks like a play: measure X "
-            "or a flow, or step OP in manual"};
-  }
-  if (IsPlay(e) && (window.lags || e.late)) {
-    return {
-        Verdict::kUndetermined, false,
-        window.integrating == false
-            ? "PV follows OP late, which looks like a play: measure X, read "
-              "the flow each 20 s or faster, or step OP in manual"
-            : "PV follows OP late, which looks like a play: measure X or a "
-              "flow, or step OP in manual"};
-  }
-  if (IsPlay(e)) {
-    return {Verdict::kUndetermined, false,
-            "a play explains PV but does not predict it"};
-  }
-  if (e.prediction_gain > kUnclearGain) {
-    return {Verdict::kUndetermined, false,
-            "tuning or stiction: a play predicts PV but does not explain it"};
-  }
-  return {Verdict::kUndetermined, false, "nothing stands out"};
+  return Unclear(window, e);
 }
 
 void Check(const Window& window) {
