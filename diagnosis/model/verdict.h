@@ -37,8 +37,8 @@ constexpr bool OutOfOrder(Intake intake) {
          intake == Intake::kSuperseded;
 }
 
-/// A valve that has sent nothing for more sample periods than these has a gap in
-/// its samples, and is stale.
+/// A valve that has sent nothing for more sample periods than these has a gap
+/// in its samples, and is stale.
 inline constexpr double kGapPeriods = 3.0;
 
 /// Tells how far the diagnosis can be relied upon, independent of the state.
