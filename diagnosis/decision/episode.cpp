@@ -672,8 +672,8 @@ void Episode::CountMisfits(FaultSet misfits, const Verdict& verdict) {
 
 // Fit does not choose among faults, evidence does. But where the only fault of
 // a name is refuted, the name is taken back: the episode is outside all faults
-// that are known. A set stays: that its faults look alike does not depend on
-// how well a model of them fits. But it explains no loss of flow any more.
+// that are known. A set stays, because its faults look alike however well their
+// models fit; only a loss of flow is no longer put down to it.
 void Episode::Withdraw(Verdict& verdict) {
   if (!IsAllOf(verdict.isolated, misfit_counts_.refuted())) {
     return;

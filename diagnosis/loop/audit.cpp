@@ -31,7 +31,7 @@ constexpr double kOverwhelming = 0.8;  // G that no sinusoid explains.
 constexpr double kGoodFit = 0.8;       // r² of a controller's own oscillation.
 constexpr double kIntegral = 0.3;      // r² of increments of an integral.
 // The longest lag of a flow: the stroke of a slow electric valve.
-constexpr double kFlowLag_s = 120.0;
+constexpr double kFlowLagS = 120.0;
 constexpr double kAntiphase = -0.5;
 constexpr double kPoorFit = 0.1;  // r² of a disturbance's.
 // A good valve with positioner has a dead band of 0.25 to 0.5 %.
@@ -42,10 +42,12 @@ constexpr double kWindsUp = 5.0;  // The same, whatever the noise of it [%].
 // Share of the mean error by which PV moves at most if it does not answer; so
 // an error of less than 1/kUnmoved noises says nothing.
 constexpr double kUnmoved = 0.05;
-constexpr double kSteady = 0.9;  // r² of PV over time, as a slow process has.
-// A load seldom takes away this share of an error, or moves OP by this share of
-// its travel.
-constexpr double kQuarter = 0.25;
+constexpr double kSteady = 0.9;  // r² of PV over time of a slow process.
+// A load seldom takes away this share of an error, or moves OP by this much of
+// its travel [%]. Chosen on simulated loops, counted on others
+// (docs/results/loops.md).
+constexpr double kTakenAway = 0.25;
+constexpr double kLongWay = 25.0;
 constexpr double kNearEnd = 0.5;  // From an end of the range of OP [%].
 constexpr double kOftenAtLimit = 0.05;
 constexpr double kOtherHalf = 50.0;  // Distance from OP, in % of the travel.
@@ -172,7 +174,7 @@ bool StaysOff(const Window& window, std::size_t begin, std::size_t end) {
     path.Add(static_cast<double>(k - begin), window.pv[k] - pv);
   }
   const double r = path.Correlation();
-  return first * last > 0.0 && nearer <= kQuarter &&
+  return first * last > 0.0 && nearer <= kTakenAway &&
          (nearer <= kUnmoved || r * r <= kSteady) &&
          kUnmoved * std::min(std::abs(first), std::abs(last)) >
              NoiseOf(window.pv);
@@ -187,8 +189,8 @@ bool HasWoundUp(const Window& window, double limit, std::size_t begin,
     return std::abs(window.op[k] - limit);
   };
   std::size_t from = begin;
-  while (from > 0 && (distance(from) < 100.0 * kQuarter ||
-                      distance(from - 1) > distance(from))) {
+  while (from > 0 &&
+         (distance(from) < kLongWay || distance(from - 1) > distance(from))) {
     --from;
   }
   const std::vector<double> errors = Errors(window);
@@ -200,9 +202,9 @@ bool HasWoundUp(const Window& window, double limit, std::size_t begin,
     farthest = std::max(farthest, errors[k] / last);
     sum += k < begin ? errors[k] / last : 0.0;
   }
-  return distance(from) >= 100.0 * kQuarter &&
-         sum >= kQuarter * static_cast<double>(begin - from) &&
-         (1.0 - kQuarter) * farthest <= 1.0;
+  return distance(from) >= kLongWay &&
+         sum >= kTakenAway * static_cast<double>(begin - from) &&
+         (1.0 - kTakenAway) * farthest <= 1.0;
 }
 
 // True if OP has stood at an end for as long as a window needs, and PV comes no
@@ -661,7 +663,7 @@ void AddAnswer(const Window& window, Evidence& e) {
   e.late =
       e.fit && e.fit->lag == kLongestLag &&
       (window.integrating != false ||
-       kLongestLag * static_cast<double>(block) * window.period_s > kFlowLag_s);
+       kLongestLag * static_cast<double>(block) * window.period_s > kFlowLagS);
   e.increments = FitIncrements(op, BlockMeans(window.pv, block), e.gain_sign);
   e.integrates = window.integrating.value_or(
       e.fit && e.increments > kIntegral && e.increments > e.fit->linear);

@@ -11,7 +11,8 @@ namespace fdi {
 
 /// The least of the last `samples` values of each of some series: a detection
 /// needs that many in a row beyond a limit. Values of `none` at the start keep
-/// fewer from counting. All series together take few lines of the cache.
+/// fewer from counting. One array holds all series, because the cache misses of
+/// a vector for each of them took a sixth of an engine's time with 1000 valves.
 class Sustained {
  public:
   explicit Sustained(int samples, std::size_t series = 1, double none = 0.0)
@@ -20,15 +21,14 @@ class Sustained {
         next_(series) {}
 
   void Restart() { std::fill(last_.begin(), last_.end(), none_); }
-  /// Returns the least one, or `most` if that is more: most samples of most
-  /// tests do not even have a newest value that is.
+  /// Returns the least one, or `most` if that is more. The last values are only
+  /// read if the newest one is above `most`, which is rare.
   double Push(double value, std::size_t series = 0,
               double most = -std::numeric_limits<double>::infinity()) {
     Keep(value, series);
     return value > most ? Least(1.0, series, most) : most;
   }
-  /// The same of the sizes of the values, which count only if all are on the
-  /// side of zero of the newest one.
+  /// The same for the absolute values, if all have the sign of the newest one.
   double PushSigned(double value, std::size_t series, double most) {
     Keep(value, series);
     return std::abs(value) > most

@@ -126,8 +126,8 @@ bool Detection::Restore(SnapshotReader& reader) {
   return windows_.Restore(reader);
 }
 
-// Most values have no larger share than that of another one, which takes no
-// division to be seen. NaN counts as 0.
+// The share of most values is below that of another test, which a product tells
+// without a division. NaN counts as 0.
 void Detection::PushValue(double value, double lower, double upper,
                           std::size_t series) {
   const double limit = value < 0.0 ? -lower : upper;
@@ -137,7 +137,7 @@ void Detection::PushValue(double value, double lower, double upper,
   share_ = least > most ? least / limit : share_;
 }
 
-// Hardly any run is not empty, and to read all of them takes long.
+// Almost always all runs are empty, and to read them all takes long.
 void Detection::Count(std::size_t test, bool beyond, std::int64_t stamp_ns) {
   if (!beyond && pending_ == 0) {
     return;

@@ -105,6 +105,7 @@ class ObserverBank {
     return quads[slot / kLanes].lane[slot % kLanes];
   }
 
+  /// @param all_certain no reading in the whole past is UNCERTAIN.
   bool IsMeasured(std::size_t channel, bool all_certain);
 
   std::shared_ptr<const ObserverPlan> plan_;
