@@ -26,7 +26,7 @@ v06 sine phase_s 0,13,29,47,61,83 trim.kv_m3_h=135 actuator.play_fraction=0.013
 v07 operating-point amplitude_pct 12,10,9,11,8,12.5 actuator.diaphragm_area_m2=0.031
 v08 operating-point amplitude_pct 10,8,9,11,7,10.5 trim.exponent=4.4
 v09 inventory-loop initial_cv_pct 60,58,61,57,62,59
-v10 inventory-loop initial_cv_pct 55,53,56,52,57,54 trim.characteristic="linear"
+v10 inventory-loop initial_cv_pct 60,58,61,57,62,59 trim.exponent=3.8
 v11 inventory-loop initial_cv_pct 60,62,58,61,57,59 actuator.coulomb_friction_n=300 trim.kv_m3_h=110
 v12 level-loop steam_demand_t_h 14.89,15.5,14.3,15,14.6,15.8 positioner.filter_time_s=0.4 actuator.chamber_volume_m3=0.0063
 '

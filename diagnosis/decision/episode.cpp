@@ -362,9 +362,6 @@ void Episode::ApplyToName(Rule rule, Proposal& p) {
   Verdict& verdict = p.verdict;
   FaultSet& supported = p.supported;
   switch (rule) {
-    case Rule::kGroups:
-      supported = WithGroups(supported, verdict);
-      break;
     case Rule::kFourAtMost:
       // A set this large is no diagnosis: its faults remain candidates. Sets
       // without a floor keep their answers.
@@ -533,28 +530,6 @@ FaultSet Episode::FactorsFrom(double threshold, const Verdict& verdict) const {
   return from & ~floor_names_;
 }
 
-// Among faults that training could not separate (docs/method.md), noise may
-// favour one throughout the window. The others of its group join it unless they
-// are refuted, that is, below T/2, or one is recognised, which stands for all.
-FaultSet Episode::WithGroups(FaultSet set, const Verdict& verdict) const {
-  if (!Acts(Rule::kGroups)) {
-    return Recognised(set);
-  }
-  FaultSet joined = set;
-  const FaultSet close =
-      FactorsFrom(0.5 * models_->decision.isolation_threshold, verdict);
-  for (const std::vector<int>& group : models_->groups) {
-    FaultSet members = 0;
-    for (const int fault : group) {
-      members |= FaultSet{1} << FaultIndex(*models_, fault);
-    }
-    if ((members & set) != 0) {
-      joined |= members & close;
-    }
-  }
-  return Recognised(joined);
-}
-
 // Wald's sequential test: before t_k, the few faults that are left once the
 // likelihood ratio to every other one and to normal operation is more than m/α,
 // with m faults (findings of the floor have none), so that a name without the
@@ -717,7 +692,7 @@ void Episode::NameEarly(const Sample& sample, FaultSet beginning,
   const bool narrower =
       (proven & ~named) == 0 && std::popcount(proven) == 1 && proven != named;
   const bool early = proven != 0 && ((proven & named) == 0 || narrower);
-  const FaultSet name = early ? WithGroups(proven, verdict) : verdict.isolated;
+  const FaultSet name = early ? Recognised(proven) : verdict.isolated;
   const FaultSet loss = LossBeside(name, floor_ | beginning, sample, verdict);
   if ((early && (loss & ~floor_) == 0) || (loss & floor_ & ~name) != 0) {
     early_ = early_ || early;

@@ -208,7 +208,6 @@ class Episode {
   void ApplyFloorFindings(const Findings& findings, Verdict& verdict) const;
   void JudgeUnknown(Verdict& verdict);
   FaultSet FactorsFrom(double threshold, const Verdict& verdict) const;
-  FaultSet WithGroups(FaultSet set, const Verdict& verdict) const;
   Transition Make(TransitionKind kind, std::int64_t stamp_ns, EndReason reason,
                   const Verdict& verdict) const;
   void Emit(TransitionKind kind, std::int64_t stamp_ns, Verdict& verdict,

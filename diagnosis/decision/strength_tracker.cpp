@@ -364,7 +364,6 @@ void StrengthTracker::PushFit(const ObserverBank& bank,
   const PathPlace place = PlaceOfBest(trained);
   std::array<double, kMaxChannels> z;
   z.fill(std::numeric_limits<double>::quiet_NaN());
-  std::array<double, kMaxChannels> u{};
   for (std::size_t c = 0; c < channels_; ++c) {
     if (bank.active(static_cast<int>(c))) {
       const Prediction p =
@@ -375,21 +374,20 @@ void StrengthTracker::PushFit(const ObserverBank& bank,
       // not there: nearer to normal operation, there is none.
       const bool apart =
           Acts(Rule::kApart) && std::abs(normal) < std::abs(p.residual);
-      const double effect =
-          apart || std::isnan(normal) ? 0.0 : normal - p.residual;
-      const double onset =
-          begins && Acts(Rule::kOnset) ? kOnsetError * effect : 0.0;
+      const bool comes = begins && Acts(Rule::kOnset) && !apart;
+      const double onset = comes && !std::isnan(normal)
+                               ? kOnsetError * (normal - p.residual)
+                               : 0.0;
       const double most = Acts(Rule::kFitVariance)
                               ? kMaxFitVariance * sd * sd
                               : std::numeric_limits<double>::infinity();
       const double spread = std::sqrt(std::min(p.variance - p.error, most) +
                                       (apart ? 0.0 : p.error) + onset * onset);
       z[c] = p.residual / spread;
-      u[c] = Acts(Rule::kShareOff) ? effect / spread : 0.0;
       PushAccount(bank, c, p.residual);
     }
   }
-  fit_.Push({z.data(), channels_}, {u.data(), channels_});
+  fit_.Push({z.data(), channels_});
   misfit_ = 0.0;
   // Normal operation, the first node, has no limits.
   const std::size_t node = std::max<std::size_t>(place.nearest, 1);

@@ -10,17 +10,15 @@
 namespace fdi {
 
 /// The least of the last `samples` values of each of some series: a detection
-/// needs that many in a row beyond a limit. Values of `none` at the start keep
-/// fewer from counting. One array holds all series, because the cache misses of
+/// needs that many in a row beyond a limit. Zeros at the start keep fewer from
+/// counting. One array holds all series, because the cache misses of
 /// a vector for each of them took a sixth of an engine's time with 1000 valves.
 class Sustained {
  public:
-  explicit Sustained(int samples, std::size_t series = 1, double none = 0.0)
-      : none_(none),
-        last_(static_cast<std::size_t>(samples) * series, none),
-        next_(series) {}
+  explicit Sustained(int samples, std::size_t series = 1)
+      : last_(static_cast<std::size_t>(samples) * series), next_(series) {}
 
-  void Restart() { std::fill(last_.begin(), last_.end(), none_); }
+  void Restart() { std::fill(last_.begin(), last_.end(), 0.0); }
   /// Returns the least one, or `most` if that is more. The last values are only
   /// read if the newest one is above `most`, which is rare.
   double Push(double value, std::size_t series = 0,
@@ -51,7 +49,6 @@ class Sustained {
     return std::max(least, most);
   }
 
-  double none_;
   std::vector<double> last_;  // A row for each sample.
   std::vector<std::uint16_t> next_;
 };

@@ -5,17 +5,8 @@
 #include <limits>
 #include <span>
 
-#include "diagnosis/model/exponential.h"
-
 namespace fdi {
 namespace {
-
-constexpr double kNoEnergy = -std::numeric_limits<double>::infinity();
-
-// exp(t), by our own function on either side of zero.
-double Growth(double t) {
-  return t > 0.0 ? 1.0 / Exp(-t) : Exp(t);
-}
 
 std::size_t WindowsOf(const ModelSet& models) {
   std::size_t windows = 0;
@@ -39,8 +30,16 @@ Detection::Detection(const ModelSet& models)
       windows_(models),
       values_(models.decision.detection_samples,
               models.channels.size() + WindowsOf(models)),
-      energies_(models.decision.detection_samples, WindowsOf(models),
-                kNoEnergy) {}
+      energies_(models.decision.detection_samples, WindowsOf(models)) {
+  for (const ChannelSpec& channel : models.channels) {
+    for (const WindowLimits& limits : channel.windows) {
+      usual_.push_back({std::exp(-2.0 * limits.upper_log_rms),
+                        limits.activity_slope == 0.0
+                            ? std::numeric_limits<double>::infinity()
+                            : std::exp(2.0 * limits.log_activity)});
+    }
+  }
+}
 
 void Detection::Restart() {
   windows_.Restart();
@@ -72,7 +71,7 @@ bool Detection::Push(const ObserverBank& bank, const Sample& sample,
   windows_.Push({certain.data(), channels},
                 sample.Has(Signal::kCv) ? sample[Signal::kCv] : kNan);
   bool abnormal = false;
-  double energy_share = kNoEnergy;
+  double energy_share = 0.0;
   std::size_t first_window = 0;
   share_ = 0.0;
   for (std::size_t c = 0; c < channels; ++c) {
@@ -102,19 +101,19 @@ bool Detection::Push(const ObserverBank& bank, const Sample& sample,
       const ResidualWindow& command = windows_.command(c, w);
       const bool applies = Applies(limits, window, command);
       const double mean = applies ? window.mean() : 0.0;
+      // In this order of max() a NaN counts as none.
       const double energy =
-          applies ? window.log_rms() - UpperLogRms(limits, command) : kNoEnergy;
+          applies ? std::max(0.0, Energy(limits, window, command, first + w))
+                  : 0.0;
       Count(test++, mean < limits.lower_mean, stamp_ns);
       Count(test++, mean > limits.upper_mean, stamp_ns);
-      Count(test++, energy > 0.0, stamp_ns);
+      Count(test++, energy > 1.0, stamp_ns);
       PushValue(mean, limits.lower_mean, limits.upper_mean,
                 channels + first + w);
-      // In this order of max() a NaN counts as none.
-      energy_share =
-          energies_.Push(std::max(kNoEnergy, energy), first + w, energy_share);
+      energy_share = energies_.Push(energy, first + w, energy_share);
     }
   }
-  share_ = std::max(share_, Growth(energy_share));
+  share_ = std::max(share_, std::sqrt(energy_share));
   return abnormal;
 }
 
@@ -124,6 +123,19 @@ void Detection::Save(SnapshotWriter& writer) const {
 
 bool Detection::Restore(SnapshotReader& reader) {
   return windows_.Restore(reader);
+}
+
+// Logarithms of all windows took a twentieth of an engine's time, and CV is
+// seldom more active than in training.
+double Detection::Energy(const WindowLimits& limits,
+                         const ResidualWindow& window,
+                         const ResidualWindow& command,
+                         std::size_t series) const {
+  const Usual& usual = usual_[series];
+  if (!command.full() || command.variance() <= usual.activity) {
+    return window.variance() * usual.per_variance;
+  }
+  return std::exp(2.0 * (window.log_rms() - UpperLogRms(limits, command)));
 }
 
 // The share of most values is below that of another test, which a product tells

@@ -69,6 +69,14 @@ class Detection {
   // Below and above of the residual; of each window below, above and energy.
   static constexpr std::size_t kTestsPerChannel = 2 + 3 * kMaxWindows;
 
+  struct Usual {  // of a window, while CV is as active as in training
+    double per_variance{0.0};  // 1 / the one at the limit on its energy
+    double activity{0.0};      // variance of CV, up to which this holds
+  };
+
+  // The variance of a window as a share of the one at its limit.
+  double Energy(const WindowLimits& limits, const ResidualWindow& window,
+                const ResidualWindow& command, std::size_t series) const;
   void PushValue(double value, double lower, double upper, std::size_t series);
   void Count(std::size_t test, bool beyond, std::int64_t stamp_ns);
 
@@ -77,7 +85,8 @@ class Detection {
   std::array<Run, kTestsPerChannel * kMaxChannels> runs_{};
   int pending_{0};      // runs that are not empty
   Sustained values_;    // residuals by channel, then means by window
-  Sustained energies_;  // by window: logarithms of their shares
+  Sustained energies_;  // by window
+  std::vector<Usual> usual_;
   double share_{0.0};
 };
 

@@ -29,42 +29,24 @@ void FitWindow::Restart() {
   std::ranges::fill(sums_, Sums{});
 }
 
-namespace {
-
-constexpr double kMostOff = 0.1;  // of the effect: two deviations
-
-// α, least squares within its bounds.
-double ShareOff(double zu, double uu) {
-  return uu > 0.0 ? std::clamp(zu / uu, -kMostOff, kMostOff) : 0.0;
-}
-
-}  // namespace
-
-void FitWindow::Add(const Entry& entry, int sign, Sums& sums) {
-  const double z = entry.z;
-  const double u = entry.u;
-  if (!std::isnan(z)) {
-    sums.z += sign * z;
-    sums.u += sign * u;
-    sums.zz += sign * z * z;
-    sums.zu += sign * z * u;
-    sums.uu += sign * u * u;
+void FitWindow::Add(float z, int sign, Sums& sums) {
+  const double value = z;
+  if (!std::isnan(value)) {
+    sums.z += sign * value;
+    sums.zz += sign * value * value;
     sums.count += sign;
   }
 }
 
 // The ring holds the values that were added, so the same bits are taken off.
-void FitWindow::Push(std::span<const double> z, std::span<const double> u) {
+void FitWindow::Push(std::span<const double> z) {
   static const double kMost = std::sqrt(kMaxSquaredDistance);
-  Entry* row = &ring_[static_cast<std::size_t>(next_) * channels_];
+  float* row = &ring_[static_cast<std::size_t>(next_) * channels_];
   for (std::size_t c = 0; c < channels_; ++c) {
     if (full()) {
       Add(row[c], -1, sums_[c]);
     }
-    const double effect = u.empty() ? 0.0 : u[c];
-    const double most = kMost + kMostOff * std::abs(effect);
-    row[c] = {static_cast<float>(std::clamp(z[c], -most, most)),
-              static_cast<float>(effect)};
+    row[c] = static_cast<float>(std::clamp(z[c], -kMost, kMost));
     Add(row[c], 1, sums_[c]);
   }
   next_ = (next_ + 1) % length_;
@@ -73,19 +55,14 @@ void FitWindow::Push(std::span<const double> z, std::span<const double> u) {
 
 double FitWindow::mean(std::size_t channel) const {
   const Sums& sums = sums_[channel];
-  return 2 * sums.count < filled_
-             ? std::numeric_limits<double>::quiet_NaN()
-             : (sums.z - ShareOff(sums.zu, sums.uu) * sums.u) / sums.count;
+  return 2 * sums.count < filled_ ? std::numeric_limits<double>::quiet_NaN()
+                                  : sums.z / sums.count;
 }
 
 double FitWindow::square(std::size_t channel) const {
   const Sums& sums = sums_[channel];
-  if (2 * sums.count < filled_) {
-    return std::numeric_limits<double>::quiet_NaN();
-  }
-  const double off = ShareOff(sums.zu, sums.uu);
-  return std::max(0.0, sums.zz - off * (2.0 * sums.zu - off * sums.uu)) /
-         sums.count;
+  return 2 * sums.count < filled_ ? std::numeric_limits<double>::quiet_NaN()
+                                  : std::max(0.0, sums.zz) / sums.count;
 }
 
 double FitWindow::Excess(std::size_t channel, const FitBounds& limits) const {

@@ -20,10 +20,6 @@ bool JudgesFit(const ModelSet& models);
 /// square q of z = r/√S by channel, |z| bounded at 5. A reading of which
 /// nothing is known, or that is beyond a limit of its transmitter as predicted,
 /// has no z; a channel with a z in less than half of the samples says nothing.
-///
-/// The effect of a fault may be off by a share α, the same in all samples of
-/// the window: with u the effect in units of √S, m and q are those of z − α u,
-/// α being the best in [−0.1, 0.1].
 class FitWindow {
  public:
   FitWindow(int length, std::size_t channels);
@@ -31,8 +27,7 @@ class FitWindow {
   void Restart();
 
   /// @param z by channel; NaN abstains.
-  /// @param u the effect by channel; empty: none may be off.
-  void Push(std::span<const double> z, std::span<const double> u = {});
+  void Push(std::span<const double> z);
 
   bool full() const { return filled_ == length_; }
 
@@ -45,26 +40,19 @@ class FitWindow {
   double square(std::size_t channel) const;
 
  private:
-  struct Entry {
-    float z{0.0F};
-    float u{0.0F};
-  };
   struct Sums {  // over the window
     double z{0.0};
-    double u{0.0};
     double zz{0.0};
-    double zu{0.0};
-    double uu{0.0};
     int count{0};
   };
 
-  static void Add(const Entry& entry, int sign, Sums& sums);
+  static void Add(float z, int sign, Sums& sums);
 
   int length_;
   std::size_t channels_;
   int filled_{0};
   int next_{0};
-  std::vector<Entry> ring_;  // by sample and channel
+  std::vector<float> ring_;  // by sample and channel
   std::vector<Sums> sums_;
 };
 

@@ -25,6 +25,7 @@ class ResidualWindow {
 
   bool full() const { return count_ >= length_; }
   double mean() const { return mean_; }
+  double variance() const { return variance_; }
   double log_rms() const;
 
   void Save(SnapshotWriter& writer) const;

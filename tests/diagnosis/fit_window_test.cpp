@@ -44,29 +44,6 @@ TEST(FitWindowTest, OutliersCountAsFive) {
   EXPECT_DOUBLE_EQ(Filled({-80.0, 5.0}, 2).square(0), 25.0);
 }
 
-TEST(FitWindowTest, TheEffectMayBeOffByOneShareInAllSamples) {
-  FitWindow window(3, 1);
-  const auto push = [&window](double z, double u) {
-    window.Push({&z, 1}, {&u, 1});
-  };
-  // 5 % of effects of 10, 20 and 40 deviations.
-  push(0.5, 10.0);
-  push(1.0, 20.0);
-  push(2.0, 40.0);
-  EXPECT_NEAR(window.mean(0), 0.0, 1e-6);
-  EXPECT_NEAR(window.square(0), 0.0, 1e-6);
-  // Half of an effect is more than an error of it, and what changes its sign is
-  // no share of it.
-  push(5.0, 10.0);
-  push(5.0, 10.0);
-  push(5.0, 10.0);
-  EXPECT_NEAR(window.mean(0), 4.0, 1e-6);
-  push(2.0, 20.0);
-  push(-2.0, 20.0);
-  push(2.0, 0.0);
-  EXPECT_NEAR(window.square(0), 4.0, 1e-6);
-}
-
 TEST(AccountedShareTest, TellsAnExplanationFromOneThatOnlyTolerates) {
   const auto share = [](double left) {
     AccountedShare account;

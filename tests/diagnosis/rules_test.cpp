@@ -35,27 +35,6 @@ TEST(RulesTest, WhatLeavesMostOfWhatItOughtToExplainIsNoName) {
   EXPECT_EQ(seen.last.unknown, Unknown::kOutsideKnown);
 }
 
-// An effect that is 4 % larger than that of the observer is 1.6 deviations off
-// in every sample.
-TEST(RulesTest, AnEffectThatIsOffByAShareFits) {
-  ModelSet models = tests::LinearPlant();
-  models.decision.isolation_samples = 20;
-  for (Observer& observer : models.observers) {
-    for (ChannelObserver& channel : observer.channels) {
-      channel.fit = {-0.8, 0.8, 2.0};
-      channel.membership = {-10.0, -8.0, 8.0, 10.0};
-    }
-  }
-  ValveEngine engine(std::make_shared<const ModelSet>(models));
-  tests::Noise noise(5);
-  StepRange(engine, 0, 50, [&](Sample& sample) { noise.Add(sample); });
-  const tests::Seen seen = StepRange(engine, 50, 250, [&](Sample& sample) {
-    noise.Add(sample);
-    tests::AddF6(sample, 1.04);
-  });
-  EXPECT_EQ(FaultSetName(models, seen.last.isolated), "f6");
-}
-
 // Medium that gets hot shows in T1 at once, while the flow is still on its way:
 // in the first seconds it has two thirds of what the fault does in the end.
 TEST(RulesTest, AFaultThatAnInputShowsMayBeOnItsWay) {
