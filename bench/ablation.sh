@@ -10,11 +10,15 @@
 #     [RULES="drift lasting"] bench/ablation.sh build/release/bin DIR [COLUMN...]
 #
 # RULES: these only, beside the program as it is.
+# SEEDS: others than "1 2"; a COLUMN-7 is of SEEDS=7.
+# SHIFT: added to the seeds of perturbed-1 to -4.
 set -euo pipefail
 bin=$(realpath "$1")
 mkdir -p "$2"
 dir=$(realpath "$2")
 wanted=" ${*:3} "
+seeds=${SEEDS:-1 2}
+shift=${SHIFT:-0}
 cd "$(dirname "$0")/.."
 data=$FDI_REFERENCE_DATA
 export FDI_DATA=$dir/data
@@ -76,7 +80,7 @@ awk '/^\[\[validation\]\]/ && !first { first = NR }
   END { for (i = 1; i <= NR; i++) if (i < first || i >= last) print line[i] }' \
   campaigns/benchmark.toml >"$dir/ramps.toml"
 
-for n in 1 2; do
+for n in $seeds; do
   if is_wanted benchmark-$n; then
     benchmark_set
     ablate_campaign benchmark-$n "$dir/short.toml" ${n}1000
@@ -89,7 +93,7 @@ if is_wanted loop-given; then
 fi
 
 # Fifteen faults of two strengths on an onboarded valve in its level loop.
-for n in 1 2; do
+for n in $seeds; do
   is_wanted loop-own-$n || continue
   own_set
   seed=${n}7400
@@ -111,7 +115,7 @@ done
 # and the onboarded valve's.
 untrained=(f2 f4 f5 f9 f10 f11 f12 f12- f13 f13- f15 f16 f17 f17- f18 f19- t1 t1-
   p1 p1- p2 p2-)
-for n in 1 2; do
+for n in $seeds; do
   if is_wanted untrained-paper-$n; then
     once paper "$bin/fdi-trainer" train --campaign campaigns/paper.toml
     files=()
@@ -170,7 +174,7 @@ done
 pairs=(f13=.2,f1=.5 f13=.2,f2=.5 f13=.2,f7=.5 f13=.2,f4=.6 f19=-.3,f1=.5
   f19=-.3,f7=.5 f19=-.3,f4=.6 f1=.5,f19=-.3 f2=.5,f13=.2 f7=.5,f13=.2
   f4=.6,f19=-.3 f3=.6,f13=.2)
-for n in 1 2; do
+for n in $seeds; do
   is_wanted pairs-$n || continue
   benchmark_set
   files=()
@@ -202,7 +206,7 @@ if is_wanted days; then
   ablate days benchmark "$data"/fault-free-days/*.csv
 fi
 
-for n in 1 2; do
+for n in $seeds; do
   if is_wanted ramps-$n; then
     benchmark_set
     ablate_campaign ramps-$n "$dir/ramps.toml" ${n}1000
@@ -210,7 +214,7 @@ for n in 1 2; do
 done
 
 # Faults of X that grow over a day, which are a drift at first.
-for n in 1 2; do
+for n in $seeds; do
   is_wanted slow-$n || continue
   benchmark_set
   seed=${n}9100
@@ -226,7 +230,7 @@ for n in 1 2; do
 done
 
 # Faults that grow over three days: an episode that is long, for `lasting`.
-for n in 1 2; do
+for n in $seeds; do
   is_wanted days-long-$n || continue
   benchmark_set
   seed=${n}6100
@@ -243,7 +247,7 @@ done
 
 # Flow that is lost with the pressure, in four seconds, while the command is
 # what it was; and a trim that fills until next to nothing passes.
-for n in 1 2; do
+for n in $seeds; do
   is_wanted lost-flow-$n || continue
   own_set
   files=()
@@ -276,7 +280,7 @@ for off in trim.kv_m3_h=102 trim.kv_m3_h=138 positioner.gain=85 \
   n=$((n + 1))
   is_wanted perturbed-$n || continue
   valve=(--excitation level-loop --set "parameters.$off")
-  seed=93${n}00
+  seed=$((93000 + 100 * n + shift))
   simulate perturbed-healthy-$n $seed 7200 "${valve[@]}"
   once perturbed-$n "$bin/fdi-trainer" onboard --valve perturbed-$n \
     --no-coverage --file "$dir/runs/perturbed-healthy-$n.csv"
@@ -298,7 +302,7 @@ if is_wanted loop-looks; then
   given_set
   ablate loop-looks "LV1 --second-look" "$data"/closed-loop/loop_*.csv
 fi
-for n in 1 2; do
+for n in $seeds; do
   is_wanted weak-looks-$n || continue
   own_set
   seed=${n}8400
@@ -312,7 +316,7 @@ for n in 1 2; do
   done
   ablate weak-looks-$n "own --second-look" "${files[@]}"
 done
-for n in 1 2; do
+for n in $seeds; do
   is_wanted friction-looks-$n || continue
   friction=("${level_loop[@]}" --set parameters.actuator.coulomb_friction_n=500)
   simulate friction-healthy 5301 7200 "${friction[@]}"
