@@ -68,7 +68,7 @@ not block names.
 | `exhausted`: a look whose best fault is as large as there is names nothing | `=` on the same, and on four runs of a valve whose friction is new (named f4) |
 | `refutable`, hidden sets | gone before: no answer, or worse |
 | `share_off`: in the fit, an effect may be off by a share of up to 10 % | one more answer that holds the fault of 78 on valves 15 % off their data sheet, one of 79 on others (seeds 94150 on), one of 14 in the given loop, whose f1 is named by the look after 30 s instead of 6; it cost three of 94 untrained faults of the paper's set a wrong name, all three of them sure |
-| `groups`: joins the faults that training could not tell apart | one wrong name on the way of 16 in untrained-benchmark, and none of fresh seeds (n = 7 and 8); it costs the right name alone in one of 27 runs of loop-own-1 and of 26 with n = 7; `=` in the columns with looks |
+| `groups`: joins the faults that training could not tell apart | one wrong name on the way of 16 in untrained-benchmark-1 and -2, and none with n = 7; it costs the right name alone in one of 27 runs of loop-own-1 and of 26 with n = 7; `=` in the columns with looks |
 
 One rule each, for they act only together: `recognise` with `taught_stands`
 and what is recognised alone; `forget_findings` with `drop_findings`;

@@ -374,8 +374,8 @@ void StrengthTracker::PushFit(const ObserverBank& bank,
       // not there: nearer to normal operation, there is none.
       const bool apart =
           Acts(Rule::kApart) && std::abs(normal) < std::abs(p.residual);
-      const bool comes = begins && Acts(Rule::kOnset) && !apart;
-      const double onset = comes && !std::isnan(normal)
+      const bool on_its_way = begins && Acts(Rule::kOnset) && !apart;
+      const double onset = on_its_way && !std::isnan(normal)
                                ? kOnsetError * (normal - p.residual)
                                : 0.0;
       const double most = Acts(Rule::kFitVariance)
