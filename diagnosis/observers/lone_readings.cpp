@@ -22,12 +22,6 @@ constexpr std::uint32_t SidesOf(std::size_t channel) {
   return std::uint32_t{3} << (2 * channel);
 }
 
-// Bit 0: below the threshold, bit 1: above.
-std::uint32_t SidesBeyond(const ChannelSpec& channel, double residual) {
-  return (residual < channel.lower_threshold ? 1U : 0U) |
-         (residual > channel.upper_threshold ? 2U : 0U);
-}
-
 }  // namespace
 
 // An input that has no channel of its own, as a pressure of the paper's set,
@@ -40,11 +34,34 @@ LoneReadings::LoneReadings(const ModelSet& models) : models_(&models) {
   }
   for (std::size_t c = 0; c < models.channels.size(); ++c) {
     const TsModel& model = models.observers.front().channels[c].model;
+    bounds_[c] = BoundsOf(models.channels[c]);
     doubtful_[c] = static_cast<SignalMask>((RequiredSignals(model) & ~others) |
                                            MaskOf(model.output));
   }
   residuals_.fill(kNan);
   doubted_until_ns_.fill(std::numeric_limits<std::int64_t>::min());
+}
+
+// In normal operation a window has less than half of what its limits allow. So a
+// reading that brings the other half is a matter of this class, too: thresholds
+// that are far out, as those of X in a noisy loop, do not see it.
+LoneReadings::Bounds LoneReadings::BoundsOf(const ChannelSpec& channel) {
+  Bounds bounds{channel.lower_threshold, channel.upper_threshold};
+  for (const WindowLimits& limits : channel.windows) {
+    const double rms =
+        std::exp(limits.upper_log_rms) * std::sqrt(0.5 * limits.length);
+    const double mean = 0.5 * limits.length;
+    bounds.lower = std::max({bounds.lower, -rms, mean * limits.lower_mean});
+    bounds.upper = std::min({bounds.upper, rms, mean * limits.upper_mean});
+  }
+  return bounds;
+}
+
+// Bit 0: below, bit 1: above.
+LoneReadings::Sides LoneReadings::SidesBeyond(const Bounds& bounds,
+                                              double residual) {
+  return (residual < bounds.lower ? 1U : 0U) |
+         (residual > bounds.upper ? 2U : 0U);
 }
 
 void LoneReadings::Restart() {
@@ -134,7 +151,7 @@ SignalMask LoneReadings::WrongIn(Sides refuted) const {
       continue;
     }
     inputs |= doubtful_[c];
-    if (SidesBeyond(channel, change(Index(channel.output))) != 0) {
+    if (SidesBeyond(bounds_[c], change(Index(channel.output))) != 0) {
       outputs = static_cast<SignalMask>(outputs | MaskOf(channel.output));
     }
   }
@@ -189,7 +206,7 @@ LoneReadings::Sides LoneReadings::Beyond() const {
   for (std::size_t c = 0; c < models_->channels.size(); ++c) {
     beyond |= std::isnan(now_[c])
                   ? beyond_ & SidesOf(c)
-                  : SidesBeyond(models_->channels[c], now_[c]) << 2 * c;
+                  : SidesBeyond(bounds_[c], now_[c]) << 2 * c;
   }
   return beyond;
 }
@@ -197,7 +214,7 @@ LoneReadings::Sides LoneReadings::Beyond() const {
 LoneReadings::Sides LoneReadings::Jumped() const {
   Sides jumped = 0;
   for (std::size_t c = 0; c < models_->channels.size(); ++c) {
-    jumped |= SidesBeyond(models_->channels[c], now_[c] - last_[c]) << 2 * c;
+    jumped |= SidesBeyond(bounds_[c], now_[c] - last_[c]) << 2 * c;
   }
   return jumped;
 }

@@ -13,12 +13,13 @@ namespace fdi {
 
 /// Holds out single wrong readings, as loose wires and lost telegrams make
 /// them. A reading is held out where the residual of the normal observer passes
-/// a threshold that it did not pass at the reading before, and has changed by
-/// more than that threshold since then; a fault that hovers about a threshold
-/// is not held out. The reading then counts as UNCERTAIN, with the last value
-/// in its place, and the next one decides:
+/// a bound that it did not pass at the reading before, and has changed by more
+/// than that bound since then; a fault that hovers about a bound is not held
+/// out. The bound is the threshold of the channel, or less where one reading
+/// could bring a window of residuals beyond its limits. The reading then counts
+/// as UNCERTAIN, with the last value in its place, and the next one decides:
 ///
-///  1. The next one passes that threshold, too: the step was real. The past of
+///  1. The next one passes that bound, too: the step was real. The past of
 ///     the observers gets the reading back, and nothing more is held out.
 ///     Windows and evidence begin one sample later than without this class.
 ///  2. It does not, or cannot be used: the reading stays out of the past of the
@@ -79,6 +80,13 @@ class LoneReadings {
   };
   static constexpr std::size_t kMostHeldOut = 2;  // in a row
 
+  struct Bounds {  // on a residual that one reading may make
+    double lower{0.0};
+    double upper{0.0};
+  };
+
+  static Bounds BoundsOf(const ChannelSpec& channel);
+  static Sides SidesBeyond(const Bounds& bounds, double residual);
   void Read(const ObserverBank& bank);
   Sides Beyond() const;
   Sides Jumped() const;
@@ -93,6 +101,7 @@ class LoneReadings {
 
   const ModelSet* models_;
   std::array<SignalMask, kMaxChannels> doubtful_{};  // if the channel is lone
+  std::array<Bounds, kMaxChannels> bounds_{};
   Sample judged_;
   std::size_t held_count_{0};  // of last_held_, in a row
   Sides beyond_{0};            // at the last reading of each channel
