@@ -143,7 +143,7 @@ Service::Service(const ServiceOptions& options, const report::Context& context)
           data_.models(), options.model_set,
           [this](const ModelSet& models) { AnnounceModels(models); })),
       model_sets_(assignment_->loaded()),
-      between_alarms_h_(options.alarm_budget.empty()
+      between_alarms_h_(options.alarm_budget == "off"
                             ? 0.0
                             : ParseAlarmBudget(options.alarm_budget)),
       gate_(std::make_shared<AlarmGate>()),
@@ -377,7 +377,9 @@ void Service::RefreshBudget() {
   gate_->Set(budget);
   const AlarmBudget::Promise promise = budget->Now();
   context_.log(
-      promise.wait_hours == 0.0 ? LogLevel::kInfo : LogLevel::kWarning,
+      // Before any valve has its hours, every episode is an alarm, as expected.
+      promise.wait_hours == 0.0 || promise.ready == 0 ? LogLevel::kInfo
+                                                      : LogLevel::kWarning,
       EventLine("alarm_budget",
                 {{"budget", options_.alarm_budget},
                  {"valves", std::to_string(promise.valves)},
@@ -385,6 +387,9 @@ void Service::RefreshBudget() {
                  {"needed_h", report::FormatNumber(promise.needed_hours, 0)},
                  {"longest_h", report::FormatNumber(promise.longest_hours, 0)},
                  {"kept", PromiseText(promise)}}));
+  if (promise.ready == 0) {
+    return;  // Nothing has been made rarer yet.
+  }
   for (const AlarmBudget::Spender& valve : budget->spenders()) {
     context_.log(LogLevel::kWarning,
                  EventLine("alarm_share_exceeded",

@@ -54,9 +54,9 @@ struct ServiceOptions {
   std::function<void()> on_ready{[] {}};
   /// Optional parts, which follow valves and events in this order.
   std::vector<std::shared_ptr<ServicePart>> parts{};
-  /// The false alarms of all valves, ParseAlarmBudget(); empty: every episode
+  /// The false alarms of all valves, ParseAlarmBudget(); "off": every episode
   /// is an alarm.
-  std::string alarm_budget{};
+  std::string alarm_budget{"1/week"};
 };
 
 /// Tells the service manager (systemd, Type=notify), if there is one.

@@ -54,9 +54,11 @@ std::string ParseRecord(const std::string& word) {
 // Empty: it is one.
 std::string CheckBudget(const std::string& text) {
   try {
-    ParseAlarmBudget(text);
+    if (text != "off") {
+      ParseAlarmBudget(text);
+    }
   } catch (const ConfigError& error) {
-    return error.what();
+    return error.what() + std::string(", or off");
   }
   return "";
 }
@@ -160,9 +162,11 @@ void AddRunVerb(report::Program& program) {
   AddOnEventOptions(run, service);
   run.add_option("--alarm-budget", service.alarm_budget,
                  "False alarms that all valves together may raise, for example "
-                 "1/day: what healthy valves show more often is a notice")
+                 "1/day: what healthy valves show more often is a notice, once "
+                 "there are hours enough; off: every episode is an alarm")
       ->check(CheckBudget)
-      ->type_name("N/PERIOD");
+      ->type_name("N/PERIOD|off")
+      ->capture_default_str();
   AddHttpOption(run, "--http", arguments.http, "127.0.0.1:9464",
                 "Serve /metrics, /healthz and /readyz; port 0: any free one");
   AddPageOptions(program, run, arguments.page);
