@@ -75,8 +75,9 @@ for loop in independent level-loop sine; do
         spoilt=()
         for file in "${files[@]}"; do
           spoilt+=("$work/wrong-$(basename "$file")")
-          if [ $kind = extreme ]; then spoil $rate $rate "$name" "$extreme" "" "$file"
-          else spoil $rate $rate "$name" "" "$impossible" "$file"; fi >"${spoilt[-1]}"
+          seed=$((10 * ${#spoilt[@]} + rate))
+          if [ $kind = extreme ]; then spoil $seed $rate "$name" "$extreme" "" "$file"
+          else spoil $seed $rate "$name" "" "$impossible" "$file"; fi >"${spoilt[-1]}"
         done
         evaluate $loop "${spoilt[@]}" |
           awk -F, -v row="$loop,$hours,$name,$kind,$rate" '{ n += $5 } END { print row "," n + 0 }'
