@@ -33,7 +33,8 @@ struct HealthyHours {
   /// alarms.
   int others{0};
   int others_lasted{0};
-  int alarms{0};  ///< Episodes that were alarms.
+  int alarms{0};        ///< Episodes that were alarms.
+  bool damaged{false};  ///< There are no hours, since one cannot be read.
 };
 
 /// How rarely a healthy valve shows what an episode shows, from the hours of

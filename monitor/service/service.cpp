@@ -372,8 +372,10 @@ void Service::RefreshBudget() {
   }
   next_budget_ = Clock::now() + kBudgetPeriod;
   storage::HistoryReader reader(data_.history());
-  const auto budget = std::make_shared<const AlarmBudget>(
-      between_alarms_h_, storage::ReadHealthyHours(reader.database()));
+  const std::vector<HealthyHours> valves =
+      storage::ReadHealthyHours(reader.database());
+  const auto budget =
+      std::make_shared<const AlarmBudget>(between_alarms_h_, valves);
   gate_->Set(budget);
   const AlarmBudget::Promise promise = budget->Now();
   context_.log(
@@ -387,6 +389,12 @@ void Service::RefreshBudget() {
                  {"needed_h", report::FormatNumber(promise.needed_hours, 0)},
                  {"longest_h", report::FormatNumber(promise.longest_hours, 0)},
                  {"kept", PromiseText(promise)}}));
+  for (const HealthyHours& valve : valves) {
+    if (valve.damaged) {
+      context_.log(LogLevel::kWarning,
+                   EventLine("hours_damaged", {{"valve", valve.valve_id}}));
+    }
+  }
   if (promise.ready == 0) {
     return;  // Nothing has been made rarer yet.
   }

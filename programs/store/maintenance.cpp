@@ -250,6 +250,11 @@ void AddBudgets(const DataDirectory& data, Report& report) {
                   valve["hours"].dump() + ", days: " + valve["days"].dump());
     }
   }
+  for (const HealthyHours& valve : valves) {
+    if (valve.damaged) {
+      report.Line("  " + valve.valve_id + ": an hour of it cannot be read");
+    }
+  }
   for (const Json& valve : document["alarm_budgets"][1]["spenders"]) {
     report.Line("  " + valve["valve_id"].get<std::string>() + ": " +
                 valve["alarms"].dump() +

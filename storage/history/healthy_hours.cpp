@@ -5,6 +5,7 @@
 #include <set>
 #include <string>
 
+#include "base/error.h"
 #include "base/time_units.h"
 #include "storage/history/health.h"
 #include "storage/history/sql.h"
@@ -78,7 +79,15 @@ std::vector<HealthyHours> ReadHealthyHours(Database& database) {
   std::map<std::string, std::int64_t> last;
   std::int64_t newest = 0;
   for (const std::string& id : ids) {
-    const std::vector<HealthHour> hours = NewestHealth(database, id, each);
+    std::vector<HealthHour> hours;
+    try {
+      hours = NewestHealth(database, id, each);
+    } catch (const DataError&) {
+      HealthyHours& valve = valves.emplace_back();
+      valve.valve_id = id;
+      valve.damaged = true;
+      continue;
+    }
     if (hours.empty()) {
       continue;  // Nothing judges it.
     }
@@ -117,7 +126,7 @@ std::vector<HealthyHours> ReadHealthyHours(Database& database) {
     valves.push_back(std::move(valve));
   }
   std::erase_if(valves, [&](const HealthyHours& valve) {
-    return last[valve.valve_id] < newest - kRecent;
+    return !valve.damaged && last[valve.valve_id] < newest - kRecent;
   });
   return valves;
 }

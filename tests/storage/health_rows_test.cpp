@@ -322,5 +322,25 @@ TEST_F(HealthRowsTest, ValvesThatAreGoneOrAuditedAloneAreLeftOut) {
   EXPECT_EQ(valves[1].valve_id, "V2");
 }
 
+TEST_F(HealthRowsTest, ADamagedHourIsThatOfItsValveAlone) {
+  {
+    Transaction transaction(writer_.database());
+    StoreHealth(writer_.database(),
+                std::vector{Typical("V1", 400'000, 1, random_),
+                            Typical("V2", 400'000, 1, random_)});
+    writer_.database()
+        .Prepare("UPDATE health_hour SET bytes = x'FF' WHERE valve_id = 'V1'")
+        .Run();
+    transaction.Commit();
+  }
+
+  const std::vector<HealthyHours> valves = ReadHealthyHours(writer_.database());
+  ASSERT_EQ(valves.size(), 2U);
+  EXPECT_TRUE(valves[0].damaged);
+  EXPECT_TRUE(valves[0].hours.empty());
+  EXPECT_FALSE(valves[1].damaged);
+  EXPECT_EQ(valves[1].hours.size(), 1U);
+}
+
 }  // namespace
 }  // namespace fdi::storage
