@@ -42,17 +42,17 @@ LoneReadings::LoneReadings(const ModelSet& models) : models_(&models) {
   doubted_until_ns_.fill(std::numeric_limits<std::int64_t>::min());
 }
 
-// In normal operation a window has less than half of what its limits allow. So a
-// reading that brings the other half is a matter of this class, too: thresholds
-// that are far out, as those of X in a noisy loop, do not see it.
+// In normal operation a window has less than half of what its limits allow. So
+// readings that bring the other half are a matter of this class, too:
+// thresholds that are far out, as those of X in a noisy loop, do not see them.
+// A window has one of them, or as many as may come in its time for good.
 LoneReadings::Bounds LoneReadings::BoundsOf(const ChannelSpec& channel) {
   Bounds bounds{channel.lower_threshold, channel.upper_threshold};
   for (const WindowLimits& limits : channel.windows) {
-    const double rms =
-        std::exp(limits.upper_log_rms) * std::sqrt(0.5 * limits.length);
-    const double mean = 0.5 * limits.length;
-    bounds.lower = std::max({bounds.lower, -rms, mean * limits.lower_mean});
-    bounds.upper = std::min({bounds.upper, rms, mean * limits.upper_mean});
+    const double each = 0.5 * std::min<double>(limits.length, 1.0 / kRecovery);
+    const double rms = std::sqrt(each) * std::exp(limits.upper_log_rms);
+    bounds.lower = std::max({bounds.lower, -rms, each * limits.lower_mean});
+    bounds.upper = std::min({bounds.upper, rms, each * limits.upper_mean});
   }
   return bounds;
 }
@@ -204,9 +204,8 @@ void LoneReadings::Read(const ObserverBank& bank) {
 LoneReadings::Sides LoneReadings::Beyond() const {
   Sides beyond = 0;
   for (std::size_t c = 0; c < models_->channels.size(); ++c) {
-    beyond |= std::isnan(now_[c])
-                  ? beyond_ & SidesOf(c)
-                  : SidesBeyond(bounds_[c], now_[c]) << 2 * c;
+    beyond |= std::isnan(now_[c]) ? beyond_ & SidesOf(c)
+                                  : SidesBeyond(bounds_[c], now_[c]) << 2 * c;
   }
   return beyond;
 }

@@ -15,7 +15,7 @@ namespace fdi {
 /// them. A reading is held out where the residual of the normal observer passes
 /// a bound that it did not pass at the reading before, and has changed by more
 /// than that bound since then; a fault that hovers about a bound is not held
-/// out. The bound is the threshold of the channel, or less where one reading
+/// out. The bound is the threshold of the channel, or less where few readings
 /// could bring a window of residuals beyond its limits. The reading then counts
 /// as UNCERTAIN, with the last value in its place, and the next one decides:
 ///
