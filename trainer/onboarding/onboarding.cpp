@@ -189,6 +189,13 @@ Stretch LongestStretch(const std::vector<TrainingRun>& runs) {
   return longest;
 }
 
+// 25 minutes, or more where kMinSamples take longer.
+std::string LeastRecord(const std::vector<TrainingRun>& runs) {
+  const double minutes = runs.front().period_s * kMinSamples / 60.0;
+  return std::to_string(std::max(25, static_cast<int>(std::ceil(minutes)))) +
+         " minutes";
+}
+
 // Names what cuts the record into pieces: missing readings, by signal, or gaps.
 std::string Interruptions(const std::vector<TrainingRun>& runs) {
   std::array<std::size_t, kSignalCount> lacks{};
@@ -223,11 +230,14 @@ std::string Interruptions(const std::vector<TrainingRun>& runs) {
   }
   return samples < kMinSamples
              ? ". The whole record has " + std::to_string(samples) +
-                   ": export at least 25 minutes of normal operation"
+                   ": export at least " + LeastRecord(runs) +
+                   " of normal operation"
              : ". Likeliest: gaps cut the record, or samples with other "
-               "signals "
-               "than the first. Export one stretch of at least 25 minutes, or "
-               "fill short gaps with --resample 1s:linear";
+               "signals than the first. Export one stretch of at least " +
+                   LeastRecord(runs) + ", or fill short gaps with --resample " +
+                   std::to_string(
+                       std::max(1L, std::lround(runs.front().period_s))) +
+                   "s:linear";
 }
 
 void RequireHealthy(const std::vector<TrainingRun>& runs) {

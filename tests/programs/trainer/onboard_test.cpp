@@ -29,6 +29,21 @@ TEST_F(OnboardProgramTest, ShortRecordIsRefusedAndNothingIsStored) {
   EXPECT_EQ(Run("show FV-101").code, 5);
 }
 
+// 600 samples take ten hours.
+TEST_F(OnboardProgramTest, ASlowRecordThatIsTooShortIsToldHowLongItHasToBe) {
+  std::string csv = "t_s,CV_pct,X_pct,F_t_h\n";
+  for (int k = 0; k < 150; ++k) {
+    const std::string cv = std::to_string(50 + k % 7);
+    csv += std::to_string(60 * k) + "," + cv + "," + cv + ",17\n";
+  }
+  Write("slow.csv", csv);
+  const Outcome outcome =
+      Run("onboard --valve FV-101 --file slow.csv --resample 60s");
+  EXPECT_EQ(outcome.code, 3);
+  EXPECT_NE(outcome.err.find("export at least 600 minutes"), std::string::npos)
+      << outcome.err;
+}
+
 // Opening read as closing: before anything is fitted or stored.
 TEST_F(OnboardProgramTest, RecordThatCannotBeIsRefusedAndNothingIsStored) {
   std::string csv = "t_s,CV_pct,P1_kPa,P2_kPa,T1_degC,X_pct,F_t_h\n";
