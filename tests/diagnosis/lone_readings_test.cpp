@@ -147,7 +147,8 @@ TEST_F(LoneReadingsTest, WhatIsWrongTooOftenIsHeldOutNoLonger) {
   EXPECT_EQ(held, 5);
 }
 
-// The threshold of a noisy loop may be so far out that it sees no wrong reading.
+// The threshold of a noisy loop may be so far out that it sees no wrong
+// reading.
 TEST(LoneReadingsEngineTest, AWindowTakesNoLoneReading) {
   for (const double threshold : {4 * kNoise, 50.0}) {
     ModelSet models = LinearPlant();

@@ -47,9 +47,9 @@ Sticky CalledSticky(LoadedLoop loop, char told) {
   return sticky;
 }
 
-// Of 600 windows at most 1 % sure and 3 % likely, but for a flow that is known
-// as one while its load ramps: PV stands beside SP while OP ramps, as of a
-// sticky valve at a constant set point, and nothing tells the two apart.
+// At most 1 % of 600 windows are sure and 3 % likely, but of a flow that is
+// known as one while its load ramps: PV stands beside SP while OP ramps, as of
+// a sticky valve at a constant set point, and nothing tells the two apart.
 TEST(LoadedLoopsTest, FewAreCalledSticky) {
   for (const auto& [service, told] : {std::pair{'F', 'F'},
                                       {'F', '\0'},
