@@ -37,6 +37,13 @@ LoneReadings::LoneReadings(const ModelSet& models) : models_(&models) {
     bounds_[c] = BoundsOf(models.channels[c]);
     doubtful_[c] = static_cast<SignalMask>((RequiredSignals(model) & ~others) |
                                            MaskOf(model.output));
+    for (std::size_t of = 0; of < models.channels.size(); ++of) {
+      const Signal output = models.channels[of].output;
+      if (output != model.output &&
+          (RequiredSignals(model) & MaskOf(output)) == 0) {
+        others_[of] |= std::uint32_t{1} << c;
+      }
+    }
   }
   residuals_.fill(kNan);
   doubted_until_ns_.fill(std::numeric_limits<std::int64_t>::min());
@@ -107,7 +114,7 @@ const Sample& LoneReadings::Step(ObserverBank& bank, const Sample& sample) {
   }
   const Sides beyond = Beyond();
   const Sides lone =
-      again | TakeRare(has_past_ ? beyond & Jumped() & ~beyond_ : 0);
+      again | TakeRare(has_past_ ? beyond & Jumped(sample) & ~beyond_ : 0);
   beyond_ = beyond;
   has_past_ = true;
   for (std::size_t c = 0; c < channels; ++c) {
@@ -210,12 +217,33 @@ LoneReadings::Sides LoneReadings::Beyond() const {
   return beyond;
 }
 
-LoneReadings::Sides LoneReadings::Jumped() const {
+// Within the threshold the reading itself has to jump, and no other signal may
+// be out of line: where a rod goes elsewhere for a moment, so does the flow,
+// seen from the command.
+LoneReadings::Sides LoneReadings::Jumped(const Sample& sample) const {
   Sides jumped = 0;
   for (std::size_t c = 0; c < models_->channels.size(); ++c) {
-    jumped |= SidesBeyond(bounds_[c], now_[c] - last_[c]) << 2 * c;
+    const ChannelSpec& channel = models_->channels[c];
+    const std::size_t i = Index(channel.output);
+    Sides sides = SidesBeyond(bounds_[c], now_[c] - last_[c]);
+    if (now_[c] >= channel.lower_threshold &&
+        now_[c] <= channel.upper_threshold) {
+      const double change = sample.values[i] - judged_.values[i];
+      sides &= IsSupported(c) ? 0U : SidesBeyond(bounds_[c], change);
+    }
+    jumped |= sides << 2 * c;
   }
   return jumped;
+}
+
+bool LoneReadings::IsSupported(std::size_t channel) const {
+  for (std::size_t c = 0; c < models_->channels.size(); ++c) {
+    if ((others_[channel] >> c & 1U) != 0 && !std::isnan(now_[c]) &&
+        SidesBeyond(bounds_[c], now_[c]) != 0) {
+      return true;
+    }
+  }
+  return false;
 }
 
 LoneReadings::Sides LoneReadings::Unread() const {

@@ -16,8 +16,10 @@ namespace fdi {
 /// a bound that it did not pass at the reading before, and has changed by more
 /// than that bound since then; a fault that hovers about a bound is not held
 /// out. The bound is the threshold of the channel, or less where few readings
-/// could bring a window of residuals beyond its limits. The reading then counts
-/// as UNCERTAIN, with the last value in its place, and the next one decides:
+/// could bring a window of residuals beyond its limits; there the reading
+/// itself has to jump, and no other signal may be out of line. The reading then
+/// counts as UNCERTAIN, with the last value in its place, and the next one
+/// decides:
 ///
 ///  1. The next one passes that bound, too: the step was real. The past of
 ///     the observers gets the reading back, and nothing more is held out.
@@ -89,7 +91,8 @@ class LoneReadings {
   static Sides SidesBeyond(const Bounds& bounds, double residual);
   void Read(const ObserverBank& bank);
   Sides Beyond() const;
-  Sides Jumped() const;
+  Sides Jumped(const Sample& sample) const;
+  bool IsSupported(std::size_t channel) const;
   Sides Unread() const;
   Sides Confirmed(Sides held, std::int64_t stamp_ns);
   SignalMask WrongIn(Sides refuted) const;
@@ -100,7 +103,8 @@ class LoneReadings {
                Sides again);
 
   const ModelSet* models_;
-  std::array<SignalMask, kMaxChannels> doubtful_{};  // if the channel is lone
+  std::array<SignalMask, kMaxChannels> doubtful_{};   // if the channel is lone
+  std::array<std::uint32_t, kMaxChannels> others_{};  // that do not read it
   std::array<Bounds, kMaxChannels> bounds_{};
   Sample judged_;
   std::size_t held_count_{0};  // of last_held_, in a row

@@ -165,6 +165,27 @@ TEST(LoneReadingsEngineTest, AWindowTakesNoLoneReading) {
   }
 }
 
+// A rod that goes elsewhere for a moment takes the flow along.
+TEST(LoneReadingsEngineTest, WhatTwoSignalsShowIsNoLoneReading) {
+  ModelSet models = LinearPlant();
+  for (const std::size_t channel : {0U, 1U}) {
+    models.channels[channel].lower_threshold = -50.0;
+    models.channels[channel].upper_threshold = 50.0;
+    models.channels[channel].windows = {
+        {10, -kNoise, kNoise, std::log(4 * kNoise)}};
+  }
+  ValveEngine engine(std::make_shared<const ModelSet>(models));
+  StepRange(engine, 0, 100);
+  const Seen seen =
+      StepRange(engine, 100, 103, [k = 0](Sample& sample) mutable {
+        for (const Signal signal : {Signal::kX, Signal::kF}) {
+          sample.values[Index(signal)] += k == 0 ? 40.0 : 0.0;
+        }
+        ++k;
+      });
+  EXPECT_FALSE(seen.transitions.empty());
+}
+
 TEST(LoneReadingsEngineTest, TheVerdictSaysOfWhichSignalAReadingWasWrong) {
   ValveEngine engine(std::make_shared<const ModelSet>(LinearPlant()));
   std::array<int, kSignalCount> single{};
