@@ -41,7 +41,7 @@ LoneReadings::LoneReadings(const ModelSet& models) : models_(&models) {
       const Signal output = models.channels[of].output;
       if (output != model.output &&
           (RequiredSignals(model) & MaskOf(output)) == 0) {
-        others_[of] |= std::uint32_t{1} << c;
+        independent_[of] |= std::uint32_t{1} << c;
       }
     }
   }
@@ -52,7 +52,8 @@ LoneReadings::LoneReadings(const ModelSet& models) : models_(&models) {
 // In normal operation a window has less than half of what its limits allow. So
 // readings that bring the other half are a matter of this class, too:
 // thresholds that are far out, as those of X in a noisy loop, do not see them.
-// A window has one of them, or as many as may come in its time for good.
+// A window is taken to hold one of them, or as many as are held out in its time
+// in the long run.
 LoneReadings::Bounds LoneReadings::BoundsOf(const ChannelSpec& channel) {
   Bounds bounds{channel.lower_threshold, channel.upper_threshold};
   for (const WindowLimits& limits : channel.windows) {
@@ -226,7 +227,7 @@ LoneReadings::Sides LoneReadings::Jumped(const Sample& sample) const {
     const ChannelSpec& channel = models_->channels[c];
     const std::size_t i = Index(channel.output);
     Sides sides = SidesBeyond(bounds_[c], now_[c] - last_[c]);
-    if (now_[c] >= channel.lower_threshold &&
+    if (sides != 0 && now_[c] >= channel.lower_threshold &&
         now_[c] <= channel.upper_threshold) {
       const double change = sample.values[i] - judged_.values[i];
       sides &= IsSupported(c) ? 0U : SidesBeyond(bounds_[c], change);
@@ -238,7 +239,7 @@ LoneReadings::Sides LoneReadings::Jumped(const Sample& sample) const {
 
 bool LoneReadings::IsSupported(std::size_t channel) const {
   for (std::size_t c = 0; c < models_->channels.size(); ++c) {
-    if ((others_[channel] >> c & 1U) != 0 && !std::isnan(now_[c]) &&
+    if ((independent_[channel] >> c & 1U) != 0 && !std::isnan(now_[c]) &&
         SidesBeyond(bounds_[c], now_[c]) != 0) {
       return true;
     }

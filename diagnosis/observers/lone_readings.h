@@ -103,8 +103,9 @@ class LoneReadings {
                Sides again);
 
   const ModelSet* models_;
-  std::array<SignalMask, kMaxChannels> doubtful_{};   // if the channel is lone
-  std::array<std::uint32_t, kMaxChannels> others_{};  // that do not read it
+  std::array<SignalMask, kMaxChannels> doubtful_{};  // if the channel is lone
+  /// Channels of other signals that do not read the channel's, by bit.
+  std::array<std::uint32_t, kMaxChannels> independent_{};
   std::array<Bounds, kMaxChannels> bounds_{};
   Sample judged_;
   std::size_t held_count_{0};  // of last_held_, in a row

@@ -163,7 +163,8 @@ void AddRunVerb(report::Program& program) {
   run.add_option("--alarm-budget", service.alarm_budget,
                  "False alarms that all valves together may raise, for example "
                  "1/day: what healthy valves show more often is a notice, once "
-                 "there are hours enough; off: every episode is an alarm")
+                 "enough of their hours are known; off: every episode is an "
+                 "alarm")
       ->check(CheckBudget)
       ->type_name("N/PERIOD|off")
       ->capture_default_str();

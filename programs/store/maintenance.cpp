@@ -220,7 +220,8 @@ Json TailJson(const HealthyHours& valve, const ShareTails& tails) {
   return {{"valve_id", valve.valve_id},
           {"hours", valve.hours.size()},
           {"days", valve.days},
-          {"tail", tails.ReturnHours(valve.valve_id, 1.0).has_value()}};
+          {"tail", tails.ReturnHours(valve.valve_id, 1.0).has_value()},
+          {"damaged", valve.damaged}};
 }
 
 // Only of a history that is sound: its hours are read.
@@ -247,12 +248,8 @@ void AddBudgets(const DataDirectory& data, Report& report) {
     if (!valve["tail"].get<bool>()) {
       report.Line("  " + valve["valve_id"].get<std::string>() +
                   ": alarms as its limits are set; healthy hours: " +
-                  valve["hours"].dump() + ", days: " + valve["days"].dump());
-    }
-  }
-  for (const HealthyHours& valve : valves) {
-    if (valve.damaged) {
-      report.Line("  " + valve.valve_id + ": an hour of it cannot be read");
+                  valve["hours"].dump() + ", days: " + valve["days"].dump() +
+                  (valve["damaged"] ? "; an hour cannot be read" : ""));
     }
   }
   for (const Json& valve : document["alarm_budgets"][1]["spenders"]) {

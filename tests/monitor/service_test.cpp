@@ -261,7 +261,7 @@ TEST_F(ServiceTest, AReloadThatFailedIsTriedAgain) {
   EXPECT_EQ(Count("models_loaded model_set=first@1"), 3U);
 }
 
-// Nor the monitor at each start.
+// It must not end the monitor at each start, either.
 TEST_F(ServiceTest, ADamagedHourEndsNoBudget) {
   std::filesystem::create_directories(global_.data_dir);
   Execute(global_.data_dir / "history.db", storage::HistorySchema(),

@@ -681,6 +681,7 @@ TEST_F(FdiStoreHistoryTest, DoctorTellsWhichBudgetsOfAlarmsAreKept) {
   EXPECT_EQ(report["tails"][0]["tail"], true);
   EXPECT_EQ(report["tails"][0]["hours"], 300);
   EXPECT_EQ(report["tails"][4]["tail"], false);
+  EXPECT_EQ(report["tails"][4]["damaged"], false);
 
   const std::string text = Store("doctor").out;
   EXPECT_THAT(text, HasSubstr("5 valves are judged, 4 have return periods, "
