@@ -882,10 +882,13 @@ void TableReader::MarkRepeats() {
     const auto signal = static_cast<Signal>(i);
     const int* samples = EveryOf(every, signal);
     if (samples != nullptr && *samples > 0) {
-      table_.notes.push_back(std::string(SignalName(signal)) +
-                             " is new every " +
-                             NumberText(period_s_ * *samples) +
-                             " s and held between: only new readings count");
+      const std::string when =
+          *samples == ReadEvery::kOnChange
+              ? "when it changes"
+              : "every " + NumberText(period_s_ * *samples) + " s";
+      table_.notes.push_back(std::string(SignalName(signal)) + " is new " +
+                             when +
+                             " and held between: only new readings count");
     }
   }
 }

@@ -10,6 +10,7 @@
 #include "diagnosis/model/fault_catalogue.h"
 #include "trainer/calibration.h"
 #include "trainer/channel_training.h"
+#include "trainer/dead_bands.h"
 #include "trainer/model_set_description.h"
 #include "trainer/observer_calibration.h"
 #include "trainer/regression.h"
@@ -417,6 +418,7 @@ void FitLimits(const Healthy& healthy, const NormalResiduals& held_out,
   }
   FitThresholds(held_out.residuals, windows, options.false_alarms_per_hour,
                 models, held_out.commands);
+  CoverDeadBands(healthy.normal, models);
   BalanceThresholds(models);
 }
 

@@ -44,7 +44,7 @@ struct Answer {
   }
 };
 
-// A repeat of a position, which Floor does not test.
+// An estimate of the position, of which Floor only tests that it stays.
 bool IsHeld(const Sample& sample) {
   return (sample.uncertain() & (MaskOf(Signal::kCv) | MaskOf(Signal::kX))) != 0;
 }
@@ -152,12 +152,12 @@ void FitDeviation(const std::vector<Stretch>& stretches, FloorLimits& floor) {
     for (std::size_t k = 0; k < stretch.samples.size(); ++k) {
       const double x = stretch.samples[k][Signal::kX];
       rod.Step(stretch.samples[k][Signal::kCv]);
-      if (IsHeld(stretch.samples[k])) {
-        continue;
-      }
-      if (const bool moved = std::exchange(last, x) != x;
-          moved || k < kSettling) {
+      const bool silent =
+          (stretch.samples[k].uncertain() & MaskOf(Signal::kX)) != 0;
+      const double slack = silent ? Floor::kDeadBand : 0.0;
+      if (std::abs(x - last) > slack || k < kSettling) {
         lowest = highest = rod.slow();
+        last = x;
       }
       if (k < kSettling) {
         continue;
@@ -165,6 +165,9 @@ void FitDeviation(const std::vector<Stretch>& stretches, FloorLimits& floor) {
       lowest = std::min(lowest, rod.slow());
       highest = std::max(highest, rod.slow());
       repeated = std::max(repeated, highest - lowest);
+      if (IsHeld(stretch.samples[k])) {
+        continue;
+      }
       above.push_back(rod.Beyond(x));
       below.push_back(-rod.Beyond(x));
     }

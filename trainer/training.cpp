@@ -6,6 +6,7 @@
 #include "base/parallel_for.h"
 #include "diagnosis/observers/drift_watch.h"
 #include "trainer/calibration.h"
+#include "trainer/dead_bands.h"
 #include "trainer/model_set_description.h"
 #include "trainer/observer_adaptation.h"
 #include "trainer/observer_calibration.h"
@@ -113,6 +114,7 @@ ModelSet TrainModelSet(const std::vector<TrainingRun>& runs,
   }
   FitThresholds(normal_data.residuals, windows, options.false_alarms_per_hour,
                 models, normal_data.commands);
+  CoverDeadBands(conditions.front(), models);
   reporter.Report(0.9, "comparing faults");
   FitInterpolationErrors(conditions, options.threads, models);
   SetFitBounds(conditions, options.threads, models);

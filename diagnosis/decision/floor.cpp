@@ -11,12 +11,15 @@
 namespace fdi {
 namespace {
 
-constexpr double kShut = 98.0;       // of CV and X [%]
-constexpr double kStop = 2.0;        // from an end of the travel [%]
-constexpr int kBreakaway = 5;        // samples that a rod may stay at rest
-constexpr int kStuckSamples = 10;    // for the position; twice as many for F
-constexpr double kLeastDp = 0.5;     // of the usual pressure drop
-constexpr double kFlowBorder = 0.9;  // of the largest flow: not saturated
+constexpr double kShut = 98.0;        // of CV and X [%]
+constexpr double kStop = 2.0;         // from an end of the travel [%]
+constexpr int kBreakaway = 5;         // samples that a rod may stay at rest
+constexpr int kStuckSamples = 10;     // for the position; twice as many for F,
+constexpr int kSilentSamples = 60;    // or so many without any reading of F,
+constexpr int kSilentPolls = 2;       // which are two polls at least
+constexpr int kMaxRepeats = 1 << 20;  // counted
+constexpr double kLeastDp = 0.5;      // of the usual pressure drop
+constexpr double kFlowBorder = 0.9;   // of the largest flow: not saturated
 
 }  // namespace
 
@@ -85,8 +88,19 @@ bool IsShut(double x, double cv) {
   return x >= kShut && cv >= kShut;
 }
 
+namespace {
+
+int SilenceOf(int every) {
+  return every == ReadEvery::kOnChange
+             ? kSilentSamples
+             : std::max(kSilentSamples, kSilentPolls * every);
+}
+
+}  // namespace
+
 Floor::Floor(const ModelSet& models)
     : limits_(models.floor ? &*models.floor : nullptr),
+      flow_silence_(SilenceOf(models.every.f)),
       first_(static_cast<std::size_t>(
           std::max(FaultIndex(models, kFirstFinding), 0))),
       travel_share_(limits_ != nullptr ? limits_->deviation_samples : 1),
@@ -108,7 +122,7 @@ void Floor::Restart() {
   share_ = 0.0;
 }
 
-void Floor::Push(const Sample& sample) {
+void Floor::Push(const Sample& sample, SignalMask silent) {
   share_ = 0.0;
   if (limits_ == nullptr) {
     return;
@@ -125,15 +139,25 @@ void Floor::Push(const Sample& sample) {
   }
   rod_->Step(sample[Signal::kCv]);
   const SignalMask uncertain = sample.uncertain();
-  if ((uncertain & (MaskOf(Signal::kCv) | MaskOf(Signal::kX))) != 0) {
-    return;
-  }
-  if (has_x) {
+  const auto is_in = [](Signal signal, SignalMask mask) {
+    return (mask & MaskOf(signal)) != 0;
+  };
+  const bool read =
+      !is_in(Signal::kCv, uncertain) && !is_in(Signal::kX, uncertain);
+  if (has_x && read) {
     PushTravel(sample);
   }
-  if (limits_->flow_gain > 0.0 && sample.Has(Signal::kF) &&
-      (uncertain & MaskOf(Signal::kF)) == 0) {
-    PushFlow(sample);
+  const auto made_up = static_cast<SignalMask>(uncertain & ~silent);
+  if (has_x && !is_in(Signal::kX, made_up)) {
+    WatchPosition(sample, is_in(Signal::kX, silent));
+  }
+  if (limits_->flow_gain > 0.0 && sample.Has(Signal::kF)) {
+    if (read && !is_in(Signal::kF, uncertain)) {
+      PushFlow(sample);
+    }
+    if (!is_in(Signal::kX, made_up) && !is_in(Signal::kF, made_up)) {
+      WatchFlow(sample, is_in(Signal::kF, silent));
+    }
   }
   findings_ = 0;
   beginning_ = 0;
@@ -157,25 +181,27 @@ void Floor::Count(int finding, bool beyond, double share, double size,
   test.found = test.length >= needed;
 }
 
-// Finds a reading that repeats while its expected value moves by more than
-// `most`.
-void Floor::Watch(int finding, double reading, Expectations expected,
-                  double most, bool counts, const Sample& sample,
-                  Repeat& repeat) {
-  if (repeat.length == 0 || !counts || reading != repeat.reading) {
-    repeat = {reading, sample.stamp_ns, 0, expected, expected};
+// Finds a reading that repeats while its expected value moves.
+void Floor::Watch(const Watched& what, std::int64_t stamp_ns, Repeat& repeat) {
+  const Expectations& expected = what.expected;
+  if (repeat.length == 0 || !what.counts ||
+      std::abs(what.reading - repeat.reading) > what.slack) {
+    repeat = {what.reading, stamp_ns, 0, expected, expected};
   }
-  const int needed =
-      finding == kPositionStuck ? kStuckSamples : 2 * kStuckSamples;
-  repeat.length = std::min(repeat.length + 1, needed);
+  repeat.length = std::min(repeat.length, kMaxRepeats) + 1;
   double travel = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < expected.size(); ++i) {
     repeat.lowest[i] = std::min(repeat.lowest[i], expected[i]);
     repeat.highest[i] = std::max(repeat.highest[i], expected[i]);
     travel = std::min(travel, repeat.highest[i] - repeat.lowest[i]);
   }
-  Test& test = tests_[static_cast<std::size_t>(finding - kTravelDeviation)];
-  test.found = repeat.length >= needed && travel > most;
+  Test& test =
+      tests_[static_cast<std::size_t>(what.finding - kTravelDeviation)];
+  // A reading that repeats says so from the first time on, silence from when
+  // another one was due.
+  repeat.since_ns =
+      what.slack > 0.0 && travel <= what.most ? stamp_ns : repeat.since_ns;
+  test.found = repeat.length >= what.needed && travel > what.most;
   test.since_ns = repeat.since_ns;
   test.size = test.found ? 1.0 : 0.0;
 }
@@ -193,12 +219,22 @@ void Floor::PushTravel(const Sample& sample) {
   Count(kTravelDeviation, std::abs(deviation) > limits_->deviation,
         std::abs(deviation) / limits_->deviation, 0.01 * deviation,
         limits_->deviation_samples, sample.stamp_ns);
+}
+
+// Where readings come by exception, silence says that the value stays within
+// the dead band; what is held or interpolated meanwhile is no other reading.
+void Floor::WatchPosition(const Sample& sample, bool silent) {
   // At a stop the rod does not move, whatever the command.
   const auto within = [](double at) {
     return std::clamp(at, kStop, 100.0 - kStop);
   };
-  Watch(kPositionStuck, x, {within(rod_->quick()), within(rod_->slow())},
-        limits_->stuck_travel, true, sample, position_);
+  Watch({.finding = kPositionStuck,
+         .reading = sample[Signal::kX],
+         .slack = silent ? kDeadBand : 0.0,
+         .needed = kStuckSamples,
+         .expected = {within(rod_->quick()), within(rod_->slow())},
+         .most = limits_->stuck_travel},
+        sample.stamp_ns, position_);
 }
 
 double Floor::DpOf(const Sample& sample) const {
@@ -248,11 +284,36 @@ void Floor::PushFlow(const Sample& sample) {
         judged ? 1.0 + (least - flow) / limits_->flow_high : 0.0,
         (least - flow) / limits_->flow_high, limits_->flow_samples,
         sample.stamp_ns);
-  const bool within = flow > margin && flow < kFlowBorder * limits_->flow_high;
-  const double expected = FlowAt(*limits_, x, dp);
-  Watch(kFlowStuck, flow,
-        {expected, has_x ? expected : FlowAt(*limits_, least_open, dp)}, margin,
-        within, sample, flow_);
+}
+
+// As the position; but how long F is silent while the flow changes, the record
+// does not show.
+void Floor::WatchFlow(const Sample& sample, bool silent) {
+  const bool has_x = sample.Has(Signal::kX);
+  const double most_open = has_x ? sample[Signal::kX] : rod_->most_open();
+  const double least_open = has_x ? sample[Signal::kX] : rod_->least_open();
+  const double flow = sample[Signal::kF];
+  const double dp = DpOf(sample);
+  const double margin = limits_->flow_margin * limits_->flow_high;
+  const double opened = FlowAt(*limits_, most_open, dp);
+  Watch(
+      {.finding = kFlowStuck,
+       .reading = flow,
+       .slack = silent ? 0.01 * kDeadBand * limits_->flow_high : 0.0,
+       .needed = silent ? flow_silence_ : 2 * kStuckSamples,
+       .expected = {opened, has_x ? opened : FlowAt(*limits_, least_open, dp)},
+       .most = margin,
+       .counts = flow > margin && flow < kFlowBorder * limits_->flow_high},
+      sample.stamp_ns, flow_);
+}
+
+SignalMask Floor::stuck() const {
+  const auto found = [&](int finding) {
+    return tests_[static_cast<std::size_t>(finding - kTravelDeviation)].found;
+  };
+  return static_cast<SignalMask>(
+      (found(kPositionStuck) ? MaskOf(Signal::kX) : SignalMask{0}) |
+      (found(kFlowStuck) ? MaskOf(Signal::kF) : SignalMask{0}));
 }
 
 std::optional<std::int64_t> Floor::stamp_ns() const {

@@ -65,7 +65,8 @@ bool IsShut(double x, double cv);
 ///     shut_flow         F > c F(X_shut, P1 − P2) (100 − X)/(100 − X_shut) +
 ///                       m F_high although CV and X are beyond X_shut
 ///     excess_flow       F > c F(X − deviation/2, P1 − P2) + m F_high
-///     x_stuck           X repeats, to the bit, while the rod should travel
+///     x_stuck           X repeats, to the bit, while the rod should travel, or
+///                       has no new reading meanwhile
 ///     f_stuck           F likewise, while F(X, P1 − P2) changes
 ///     low_flow          F < s LeastFlowAt(X, P1 − P2) − m F_high, X follows
 ///
@@ -76,6 +77,10 @@ bool IsShut(double x, double cv);
 /// a fault is isolated.
 class Floor {
  public:
+  /// The widest dead band [%] within which historians keep a value to
+  /// themselves.
+  static constexpr double kDeadBand = 1.0;
+
   /// `models` must outlive it.
   explicit Floor(const ModelSet& models);
 
@@ -83,8 +88,15 @@ class Floor {
   void Restart();
 
   /// Takes every accepted sample. Modes other than AUTO restart it; UNCERTAIN
-  /// readings are not tested.
-  void Push(const Sample& sample);
+  /// readings are not tested, but that there are no other ones is.
+  /// @param silent signals of which the source has no new reading; what else is
+  ///   UNCERTAIN stands for one that is missing or was held out.
+  void Push(const Sample& sample, SignalMask silent);
+  void Push(const Sample& sample) { Push(sample, sample.uncertain()); }
+
+  /// Signals that were silent although they should have moved: that they did
+  /// not is a reading.
+  SignalMask stuck() const;
 
   /// The current findings; always empty without a floor.
   FaultSet findings() const { return findings_; }
@@ -108,6 +120,15 @@ class Floor {
   };
   /// Two estimates of the expected value of a reading.
   using Expectations = std::array<double, 2>;
+  struct Watched {
+    int finding;
+    double reading;
+    double slack;  // what is closer to the reading is no other one
+    int needed;    // samples
+    Expectations expected;
+    double most;  // change of both expectations without a finding
+    bool counts{true};
+  };
   struct Repeat {  // consecutive samples with the same reading
     double reading{0.0};
     std::int64_t since_ns{0};
@@ -120,12 +141,14 @@ class Floor {
   double LeastFlow(double x, const Sample& sample) const;
   void Count(int finding, bool beyond, double share, double size, int needed,
              std::int64_t stamp_ns);
-  void Watch(int finding, double reading, Expectations expected, double most,
-             bool counts, const Sample& sample, Repeat& repeat);
+  void Watch(const Watched& what, std::int64_t stamp_ns, Repeat& repeat);
   void PushTravel(const Sample& sample);
+  void WatchPosition(const Sample& sample, bool silent);
   void PushFlow(const Sample& sample);
+  void WatchFlow(const Sample& sample, bool silent);
 
   const FloorLimits* limits_;  // null: no floor
+  int flow_silence_;           // samples without a reading of F
   std::size_t first_;          // fault index of the first finding
   std::optional<RodBand> rod_;
   bool follows_{false};

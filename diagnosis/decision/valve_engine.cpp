@@ -186,6 +186,7 @@ class ValveEngine::Impl {
  private:
   void ClearVerdict();
   Checked CheckSample(const Sample& measured, bool begins);
+  void TakeSilence(SignalMask silent, Sample& trained) const;
   bool Mend(const Checked& checked, bool begins, Sample& trained);
   SignalMask Single(const Checked& checked) const;
   void TakeSource(const Sample& sample);
@@ -246,6 +247,8 @@ const Verdict& ValveEngine::Impl::Step(const Sample& measured) {
   }
   const bool begins = needs_initialisation_ || placement.gap;
   const Checked checked = CheckSample(measured, begins);
+  const SignalMask silent = trained.uncertain();
+  TakeSilence(silent, trained);
   if (!Mend(checked, begins, trained)) {
     Reject(checked.intake);
     return verdict_;
@@ -260,7 +263,7 @@ const Verdict& ValveEngine::Impl::Step(const Sample& measured) {
   judged_ = true;
   verdict_.single = Single(checked);
   diagnosis_->stuck.Push(sample);
-  diagnosis_->floor.Push(sample);
+  diagnosis_->floor.Push(sample, silent);
   ReadResiduals();
   const ObserverBank& bank = diagnosis_->bank;
   const bool unread =
@@ -305,6 +308,15 @@ Checked ValveEngine::Impl::CheckSample(const Sample& measured, bool begins) {
     flow_before_ = measured.Has(Signal::kF) ? measured[Signal::kF] : 0.0;
   }
   return values;
+}
+
+// Where a reading was due and none came, the valve is still where it was.
+void ValveEngine::Impl::TakeSilence(SignalMask silent, Sample& trained) const {
+  for (unsigned left = silent & diagnosis_->floor.stuck(); left != 0;
+       left &= left - 1) {
+    trained.quality[static_cast<std::size_t>(std::countr_zero(left))] =
+        SignalQuality::kGood;
+  }
 }
 
 // @returns whether the sample can be judged; what is unusable is then bridged.
@@ -400,16 +412,17 @@ void ValveEngine::Impl::ReadResiduals() {
 
 Quality ValveEngine::Impl::Judge(const Sample& sample) {
   verdict_.uncovered = 0;
+  const bool found = diagnosis_->floor.findings() != 0;
   if (diagnosis_->bank.active_channels() == 0 ||
-      uncertain_ > kMaxUncertainRun) {
+      (uncertain_ > kMaxUncertainRun && !found)) {
     return Quality::kBadInput;
   }
   // A fault moves the command, so whether the valve is abnormal has to be known
   // before its command may disarm it (docs/method.md): the floor has taken
   // this sample, and pending() is that of the last judged one.
-  const Quality quality = diagnosis_->coverage.Judge(
-      sample, diagnosis_->bank, episode_open(),
-      diagnosis_->floor.findings() != 0, diagnosis_->detection.pending());
+  const Quality quality =
+      diagnosis_->coverage.Judge(sample, diagnosis_->bank, episode_open(),
+                                 found, diagnosis_->detection.pending());
   verdict_.uncovered = diagnosis_->coverage.reasons();
   return quality;
 }
@@ -421,11 +434,12 @@ void ValveEngine::Impl::Decide(const Sample& sample) {
   if (diagnosis_->coverage.armed_now()) {
     detection.Restart();
   }
-  if (uncertain_ > 0) {
-    return;  // All stays as it is.
+  // Nothing is measured, so all stays as it is but for what silence shows.
+  if (uncertain_ > 0 && floor.findings() == 0) {
+    return;
   }
   Findings findings;
-  findings.settled = diagnosis_->coverage.settled();
+  findings.settled = diagnosis_->coverage.settled() && uncertain_ == 0;
   findings.floor = floor.findings();
   findings.beginning = floor.beginning();
   findings.abnormal = findings.floor != 0;

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 
 #include "diagnosis/model/sample.h"
 
@@ -9,8 +10,11 @@ namespace fdi {
 
 /// Samples from one new reading of a transmitter to the next, where it is read
 /// less often than samples are taken: a position that is polled by HART every
-/// 30 s and stands in the rows between. 0: each sample has a new reading.
+/// 30 s and stands in the rows between. 0: each sample has a new reading;
+/// kOnChange: a value is new when it changes, as by exception.
 struct ReadEvery {
+  static constexpr int kOnChange = std::numeric_limits<int>::max();
+
   int p1{0};
   int p2{0};
   int t1{0};
@@ -25,10 +29,13 @@ struct ReadEvery {
 int* EveryOf(ReadEvery& every, Signal signal);
 
 /// Tells new readings from repeats. A polled transmitter changes only at
-/// multiples of a fixed number of samples, whatever it measures. Its repeats
-/// become UNCERTAIN: they stay in the past of the observers and are no evidence
-/// of anything. After the time of a poll an unchanged value is a new reading.
-/// O(1) a sample.
+/// multiples of a fixed number of samples, whatever it measures. One that tells
+/// a value on change changes at any time, but by more than its dead band, and
+/// not by multiples of one step, as a coarse one would: two readings of a
+/// process are never the same to the bit. The repeats of both become UNCERTAIN:
+/// they stay in the past of the observers and are no evidence of anything.
+/// After the time of a poll an unchanged value is a new reading, and so it is
+/// after rows that are UNCERTAIN already. O(1) a sample.
 class HeldReadings {
  public:
   /// @param known what is known of the transmitters, before any reading.
@@ -46,14 +53,18 @@ class HeldReadings {
 
   struct Watch {
     bool begun{false};
+    bool told{false};  // the source has said that it held since
     double value{0.0};
     std::int64_t changed_ns{0};
     std::int64_t new_ns{0};
     std::array<double, kChanges> steps{};  // between changes [samples]
+    std::array<double, kChanges> sizes{};  // of the changes
     std::size_t changes{0};
   };
 
-  void TakeChange(double step, Watch& watch, int& every) const;
+  static int Poll(const Watch& watch);
+  static bool IsToldOnChange(const Watch& watch);
+  void TakeChange(double step, double size, Watch& watch, int& every) const;
 
   double period_ns_;
   ReadEvery every_;

@@ -328,6 +328,75 @@ TEST(FloorTest, ReadingsThatRepeatWhileTheyShouldMove) {
             -1);
 }
 
+// By exception there is no reading while a rod stays within the dead band. What
+// stands there for one that is missing is not the silence of a transmitter.
+TEST(FloorTest, SilenceWhileItShouldMoveIsARepeat) {
+  const auto first = [](int finding, double x_moves, double f_moves,
+                        bool bridged) {
+    const ModelSet models = FlooredPlant();
+    Floor floor(models);
+    for (int k = 0; k < 200; ++k) {
+      const double cv = k < 40 ? 50.0 : 70.0;
+      const double line = std::min(1.0, std::max(0, k - 40) / 20.0);
+      Sample sample = ValveAt(
+          k, {cv, 50.0 + x_moves * line, Passes(50.0 + f_moves * line)});
+      for (const Signal signal : {Signal::kX, Signal::kF}) {
+        const bool told = k < 40 || (signal == Signal::kX && x_moves > 10.0);
+        sample.quality[Index(signal)] =
+            told ? SignalQuality::kGood : SignalQuality::kUncertain;
+      }
+      floor.Push(sample, bridged ? SignalMask{0} : sample.uncertain());
+      const FaultSet bit = FaultSet{1} << FaultIndex(models, finding);
+      if ((floor.findings() & bit) != 0) {
+        return k;
+      }
+    }
+    return -1;
+  };
+  EXPECT_GT(first(kPositionStuck, 0.0, 0.0, false), 40);
+  EXPECT_LE(first(kPositionStuck, 0.0, 0.0, false), 50);
+  EXPECT_GT(first(kPositionStuck, 0.9, 0.0, false), 40) << "drawn as a line";
+  EXPECT_EQ(first(kPositionStuck, 20.0, 20.0, false), -1);
+  EXPECT_EQ(first(kPositionStuck, 0.0, 0.0, true), -1);
+  EXPECT_GT(first(kFlowStuck, 20.0, 0.0, false), 50);
+  EXPECT_EQ(first(kFlowStuck, 20.0, 20.0, false), -1);
+  EXPECT_EQ(first(kFlowStuck, 20.0, 0.0, true), -1);
+}
+
+// Nothing is measured for longer than nothing may be known, but silence is
+// known.
+TEST(FloorTest, ARodThatIsSilentOpensAnEpisode) {
+  ModelSet models = FlooredPlant();
+  models.floor->flow_gain = 0.0;  // Here is another flow.
+  ValveEngine engine(std::make_shared<const ModelSet>(models));
+  constexpr int kNever = 1000;
+  bool open = false;
+  int detected = kNever;
+  FaultSet name = 0;
+  for (int k = 0; k < 400; ++k) {
+    Sample sample =
+        tests::PlantSample(static_cast<std::uint64_t>(k), k < 200 ? 2.0 : 0.0);
+    if (k >= 300) {
+      sample.Set(Signal::kCv, 70.0);
+    }
+    if (k >= 200) {
+      sample.quality[Index(Signal::kX)] = SignalQuality::kUncertain;
+      sample.quality[Index(Signal::kF)] = SignalQuality::kUncertain;
+    }
+    const Verdict& verdict = engine.Step(sample);
+    open = open || engine.episode_open();
+    name = name != 0 ? name : verdict.isolated;
+    EXPECT_FALSE(open && k <= 300) << k;
+    EXPECT_TRUE(open || k < 310) << k;
+    // Nothing is known of a valve without readings, until one was due.
+    EXPECT_EQ(verdict.quality == Quality::kBadInput, k >= 260 && !open) << k;
+    // The first reading that is far off is held out, like any other.
+    EXPECT_EQ(std::isnan(verdict.residuals[0]), k >= 200 && k <= detected + 1);
+    detected = open && detected == kNever ? k : detected;
+  }
+  EXPECT_EQ(FaultSetName(engine.models(), name), "x_stuck");
+}
+
 // A valve without a position transmitter: its rod is somewhere in the range
 // that it may have.
 TEST(FloorTest, TestsTheFlowWithoutAPosition) {

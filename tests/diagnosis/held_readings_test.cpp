@@ -73,6 +73,94 @@ TEST(HeldReadingsTest, ARodThatRestsIsNotPolled) {
   }
 }
 
+// X in steps of `resolution`, told when it has changed by more than a dead band
+// of 0.4 %.
+class OnChange {
+ public:
+  explicit OnChange(double resolution, double step = 0.2)
+      : resolution_(resolution), step_(step) {}
+
+  Sample Next() {
+    x_ += step_ * (static_cast<double>(random_() % 1000) / 999.0 - 0.5);
+    const double x = resolution_ * std::round(x_ / resolution_);
+    is_new_ = std::abs(x - told_) > 0.4;
+    told_ = is_new_ ? x : told_;
+    Sample sample = tests::PlantSample(k_++);
+    sample.Set(Signal::kX, told_);
+    return sample;
+  }
+  bool is_new() const { return is_new_; }
+
+ private:
+  double resolution_;
+  double step_;
+  std::mt19937 random_{7};
+  std::uint64_t k_{0};
+  double x_{50.0};
+  double told_{50.0};
+  bool is_new_{false};
+};
+
+TEST(HeldReadingsTest, WhatIsToldOnChangeIsNewWhenItChanges) {
+  HeldReadings held(1.0);
+  OnChange source(0.01);
+  int late = 0;
+  for (int k = 0; k < 4000; ++k) {
+    Sample sample = source.Next();
+    held.Mark(sample);
+    EXPECT_FALSE(IsHeld(sample, Signal::kX) && source.is_new());
+    EXPECT_FALSE(IsHeld(sample, Signal::kF));
+    if (k >= 2000) {
+      late += IsHeld(sample, Signal::kX) == source.is_new() ? 1 : 0;
+    }
+  }
+  EXPECT_EQ(held.every().x, ReadEvery::kOnChange);
+  EXPECT_EQ(late, 0);
+}
+
+// A transmitter of 0.5 % repeats itself while the rod does, and all its changes
+// are multiples of that.
+TEST(HeldReadingsTest, ACoarseTransmitterIsReadForEachSample) {
+  HeldReadings held(1.0);
+  OnChange source(0.5, 1.2);
+  for (int k = 0; k < 20000; ++k) {
+    Sample sample = source.Next();
+    // Through another unit and back.
+    sample.Set(Signal::kX, (1.8 * sample[Signal::kX] + 32.0 - 32.0) / 1.8);
+    held.Mark(sample);
+    ASSERT_EQ(held.every().x, 0) << k;
+  }
+}
+
+TEST(HeldReadingsTest, TheEndsOfARangeAreReadings) {
+  for (const double end : {0.0, 100.0, 40.0}) {
+    HeldReadings held(1.0, {.x = ReadEvery::kOnChange});
+    int marked = 0;
+    for (std::uint64_t k = 0; k < 50; ++k) {
+      Sample sample = tests::PlantSample(k);
+      sample.Set(Signal::kX, end);
+      held.Mark(sample);
+      marked += IsHeld(sample, Signal::kX) ? 1 : 0;
+    }
+    EXPECT_EQ(marked, end == 40.0 ? 49 : 0);
+  }
+}
+
+// A file says itself which of its rows are filled in: the others are readings,
+// also those that say the same again.
+TEST(HeldReadingsTest, AnUnchangedValueAfterHeldOnesIsAReading) {
+  HeldReadings held(1.0, {.x = ReadEvery::kOnChange});
+  for (std::uint64_t k = 0; k < 50; ++k) {
+    Sample sample = tests::PlantSample(k);
+    sample.Set(Signal::kX, 40.0);
+    const bool filled = k % 10 != 0;
+    sample.quality[Index(Signal::kX)] =
+        filled ? SignalQuality::kUncertain : SignalQuality::kGood;
+    held.Mark(sample);
+    EXPECT_EQ(IsHeld(sample, Signal::kX), filled) << k;
+  }
+}
+
 TEST(HeldReadingsTest, ARecordIsMarkedFromItsFirstSampleOn) {
   std::vector<Sample> record;
   for (int k = 0; k < 2000; ++k) {

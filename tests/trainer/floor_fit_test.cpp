@@ -100,6 +100,22 @@ TEST(FloorFitTest, WithoutAPositionTheFlowIsThatOfTheCommand) {
   EXPECT_EQ(wider, *floor);
 }
 
+// Polled every half a minute, the rod travels far without a reading.
+TEST(FloorFitTest, SilenceIsAsLongAsInTheRecord) {
+  Condition normal = Healthy(3.0);
+  double x = 0.0;
+  int k = 0;
+  for (Sample& sample : normal.training.front().samples) {
+    const bool poll = k++ % 30 == 0;
+    x = poll ? sample[Signal::kX] : x;
+    sample.Set(Signal::kX, x);
+    sample.quality[Index(Signal::kX)] =
+        poll ? SignalQuality::kGood : SignalQuality::kUncertain;
+  }
+  EXPECT_EQ(FitFloor(Healthy(3.0), 1.0)->stuck_travel, 5.0);
+  EXPECT_GT(FitFloor(normal, 1.0)->stuck_travel, 15.0);
+}
+
 TEST(FloorFitTest, NoFlowNoLimitOnIt) {
   EXPECT_EQ(FitFloor(Healthy(3.0, false), 1.0)->flow_gain, 0.0);
 }

@@ -27,7 +27,7 @@ double MeanSquaredError(const std::vector<TsRule>& rules,
          static_cast<double>(data.y.size());
 }
 
-double Ramp(double a, double b) {
+double Rising(double a, double b) {
   return 2.0 * a - 0.01 * b + 5.0;
 }
 
@@ -43,7 +43,7 @@ TakagiSugenoOptions Rules(int count) {
 }
 
 TEST(TakagiSugenoFitTest, OneRuleIsTheLinearModelOfAllData) {
-  const RegressionData data = Sampled(200, Ramp);
+  const RegressionData data = Sampled(200, Rising);
   const std::vector<TsRule> rules = FitTakagiSugeno(data, Rules(1));
 
   ASSERT_EQ(rules.size(), 1U);
@@ -53,12 +53,12 @@ TEST(TakagiSugenoFitTest, OneRuleIsTheLinearModelOfAllData) {
   EXPECT_EQ(rules[0].data_share, 1.0);
   MatrixXd far(1, 2);
   far << 1e6, -1e6;
-  EXPECT_NEAR(Predict(rules, far)(0), Ramp(1e6, -1e6), 1e-4);
+  EXPECT_NEAR(Predict(rules, far)(0), Rising(1e6, -1e6), 1e-4);
 }
 
 TEST(TakagiSugenoFitTest, EveryRuleOfALinearFunctionIsThatFunction) {
   for (const int c : {2, 3, 5}) {
-    const auto rules = FitTakagiSugeno(Sampled(300, Ramp), Rules(c));
+    const auto rules = FitTakagiSugeno(Sampled(300, Rising), Rules(c));
     for (const TsRule& rule : rules) {
       EXPECT_NEAR(rule.slopes[0], 2.0, 1e-8);
       EXPECT_NEAR(rule.slopes[1], -0.01, 1e-10);
@@ -260,12 +260,12 @@ TEST(TakagiSugenoFitTest, TheDistanceIsOverTheAntecedentsAlone) {
 }
 
 TEST(TakagiSugenoFitTest, RefusesUnusableData) {
-  RegressionData data = Sampled(20, Ramp);
+  RegressionData data = Sampled(20, Rising);
   EXPECT_THROW(FitTakagiSugeno(data, Rules(7)), std::invalid_argument);
   EXPECT_THROW(FitTakagiSugeno(data, Rules(0)), std::invalid_argument);
   data.x(3, 1) = std::numeric_limits<double>::quiet_NaN();
   EXPECT_THROW(FitTakagiSugeno(data, Rules(2)), std::invalid_argument);
-  data = Sampled(20, Ramp);
+  data = Sampled(20, Rising);
   data.y.conservativeResize(19);
   EXPECT_THROW(FitTakagiSugeno(data, Rules(2)), std::invalid_argument);
 }

@@ -140,6 +140,24 @@ WindowLimits* WindowOf(ChannelSpec& channel, int length) {
   return found == channel.windows.end() ? nullptr : &*found;
 }
 
+// What a dead band hides is in the limits of the parent (CoverDeadBands()) and
+// in no residual.
+void KeepWide(const ModelSet& parent, ModelSet& fitted) {
+  for (std::size_t c = 0; c < parent.channels.size(); ++c) {
+    const ChannelSpec& before = parent.channels[c];
+    ChannelSpec& now = fitted.channels[c];
+    now.lower_threshold = std::min(now.lower_threshold, before.lower_threshold);
+    now.upper_threshold = std::max(now.upper_threshold, before.upper_threshold);
+    for (std::size_t w = 0; w < before.windows.size(); ++w) {
+      const WindowLimits& then = before.windows[w];
+      WindowLimits& limits = now.windows[w];
+      limits.lower_mean = std::min(limits.lower_mean, then.lower_mean);
+      limits.upper_mean = std::max(limits.upper_mean, then.upper_mean);
+      limits.upper_log_rms = std::max(limits.upper_log_rms, then.upper_log_rms);
+    }
+  }
+}
+
 // The parent with the limits that FitThresholds() gives for the data; a window
 // that they are too short for keeps those that it has.
 ModelSet FitToData(const ModelSet& parent, const HealthyResiduals& data) {
@@ -171,6 +189,10 @@ ModelSet FitToData(const ModelSet& parent, const HealthyResiduals& data) {
     fitted.channels[c].windows = std::move(windows);
   }
   BalanceThresholds(fitted);
+  if (parent.every.x == ReadEvery::kOnChange ||
+      parent.every.f == ReadEvery::kOnChange) {
+    KeepWide(parent, fitted);
+  }
   return fitted;
 }
 

@@ -96,6 +96,20 @@ ModelSet TwoHourSet() {
   return WithLimitsOf(models, PlantRun(kTwoHours, 1, kMadeNs - kNsPerDay));
 }
 
+TEST(SetLimitsTest, WhatADeadBandHidesStaysInTheLimits) {
+  for (const int every : {0, ReadEvery::kOnChange}) {
+    ModelSet parent = TwoHourSet();
+    parent.every.x = every;
+    parent.channels[0].upper_threshold = 20.0;
+    parent.channels[0].windows[1].lower_mean = -20.0;
+    const ModelSet now = WithLimitsOf(parent, PlantRun(kTwoHours, 2, kMadeNs));
+    const bool stays = every == ReadEvery::kOnChange;
+    EXPECT_EQ(now.channels[0].upper_threshold == 20.0, stays);
+    EXPECT_EQ(now.channels[0].windows[1].lower_mean == -20.0, stays);
+    EXPECT_LT(now.channels[1].upper_threshold, 20.0);
+  }
+}
+
 class AppLimitsTest : public TrainerProgram {
  protected:
   void SetUp() override {
