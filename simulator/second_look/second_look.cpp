@@ -123,6 +123,7 @@ class Looker {
   Trajectory Simulate(int fault, double strength, Course course,
                       double supply = 1.0);
   Trajectory FlowOnly(int fault, double strength, Course course) const;
+  Trajectory Seized(Course course) const;
   ChannelFit FitChannel(const Trajectory& answers, bool flow,
                         double slow_sd) const;
   double ErrorsOf(const Trajectory& answers) const;
@@ -277,6 +278,9 @@ Trajectory Looker::Simulate(int fault, double strength, Course course,
       (window_.at_position && fault != 0)) {
     return FlowOnly(fault, strength, course);
   }
+  if (fault == kStemFriction && strength >= 1.0 && !course.growing) {
+    return Seized(course);
+  }
   ValveSimulationConfig config;
   RecordedExcitation excitation;
   for (int k = 0; k < rows_; ++k) {
@@ -329,6 +333,28 @@ Trajectory Looker::FlowOnly(int fault, double strength, Course course) const {
     RecordAnswer& answer = answers[static_cast<std::size_t>(k)];
     answer.flow =
         FlowReading(valve_, effects, InputAt(k, fault, now), answer.x_pct);
+  }
+  return answers;
+}
+
+// f4 at its full strength: the play is as wide as the travel, but where in it
+// the rod begins is not known. So it rests where X is read.
+Trajectory Looker::Seized(Course course) const {
+  Trajectory answers = healthy_;
+  double sum = 0.0;
+  double count = 0.0;
+  for (int k = course.start; k < rows_; ++k) {
+    const RecordRow& row = window_.rows[static_cast<std::size_t>(k)];
+    sum += row.x_measured ? row.x_pct : 0.0;
+    count += row.x_measured ? 1.0 : 0.0;
+  }
+  const auto start = static_cast<std::size_t>(course.start);
+  const double rest = count > 0.0 ? sum / count : healthy_.at(start).x_pct;
+  const FaultEffects effects =
+      EffectsOf(stands_ && ReachesValve(window_.standing), 0, 0.0);
+  for (int k = course.start; k < rows_; ++k) {
+    answers[static_cast<std::size_t>(k)] = {
+        rest, FlowReading(valve_, effects, InputAt(k, 0, 0.0), rest)};
   }
   return answers;
 }

@@ -16,6 +16,7 @@
 #include "diagnosis/model/fault_catalogue.h"
 #include "diagnosis/records/growth.h"
 #include "simulator/fault_effects.h"
+#include "simulator/record_fit.h"
 #include "tests/simulator/recorded_valve.h"
 
 namespace fdi::simulator {
@@ -285,6 +286,26 @@ TEST(SecondLookTest, ATravelStopIsSoughtInReadingsAlone) {
   const Explanation high = look(97.0);
   EXPECT_EQ(low.strength, high.strength);
   EXPECT_EQ(low.distance, high.distance);
+}
+
+// The command opens by 25 %, which a rod at a stop would follow, and closes. A
+// play as wide as the travel would let the rod go at one of its edges.
+TEST(SecondLookTest, ARodThatRestsIsFrictionWhereverItRests) {
+  for (const double rest : {48.0, 60.0, 74.0}) {
+    LookWindow window = Window({});
+    for (std::size_t k = kLeadIn; k < window.rows.size(); ++k) {
+      RecordRow& row = window.rows[k];
+      row.input.cv_pct = rest + (k < kLeadIn + 100 ? -25.0 : 25.0);
+      row.x_pct = rest + 0.2 * (static_cast<double>(k % 5) - 2.0);
+      row.flow = FlowReading(Physics().parameters, {}, row.input, rest) +
+                 0.05 * (static_cast<double>(k % 7) - 3.0);
+    }
+    const SecondLook look = RunSecondLook(Physics(), window);
+    EXPECT_EQ(look.ranked.front().fault, kStemFriction) << rest;
+    EXPECT_EQ(look.ranked.front().strength, 1.0) << rest;
+    EXPECT_GT(look.ranked[1].distance, kLookMargin) << rest;
+    EXPECT_LT(look.misfit, 2.0) << rest;
+  }
 }
 
 // Without the pressures, one that changed is seen in the flow alone.
