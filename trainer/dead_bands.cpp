@@ -33,7 +33,8 @@ double DeadBandOf(Signal signal, const std::vector<Stretch>& stretches) {
   return changes.empty() ? 0.0 : SortedQuantile(changes, kChangeQuantile);
 }
 
-// What a change of the position by `band` makes of F, nearly everywhere.
+// A change of the position by `band` changes F by at most this, nearly
+// everywhere.
 double FlowBand(double band, const std::vector<Stretch>& stretches,
                 const ModelSet& models) {
   std::vector<double> changes;

@@ -66,6 +66,19 @@ void AddIndistinguishable(const SecondLook& look, double nothing,
   }
 }
 
+// A seized rod is blocked both ways. Until the command has gone both ways, a
+// stop says enough; a later look may then narrow the set to f4.
+bool SaysMore(const LookAnswer& answer, const Explanation& e) {
+  return e.fault == kStemFriction && e.strength >= 1.0 &&
+         Explains(answer.faults, kTravelStop);
+}
+
+std::size_t CountNames(const LookAnswer& answer) {
+  return static_cast<std::size_t>(std::ranges::count_if(
+      answer.faults,
+      [&](const Explanation& e) { return !SaysMore(answer, e); }));
+}
+
 std::optional<LookAnswer> TakeGrowthLook(const LookSimulation& simulation,
                                          const LookTask& task,
                                          const std::stop_token& stop) {
@@ -138,7 +151,7 @@ LookAnswer AnswerOf(const SecondLook& look, bool early) {
   // record, neither health nor a fault can be concluded from it.
   answer.outcome = look.misfit > most ? LookOutcome::kNoneFits
                    : healthy          ? LookOutcome::kNothing
-                   : answer.faults.size() > kMaxNamedFaults
+                   : CountNames(answer) > kMaxNamedFaults
                        ? LookOutcome::kUnclear
                        : LookOutcome::kNamed;
   return answer;
@@ -159,7 +172,7 @@ void BindGroups(const FaultGroups& groups, LookAnswer& answer) {
     }
   }
   if (answer.outcome == LookOutcome::kNamed &&
-      answer.faults.size() > kMaxNamedFaults) {
+      CountNames(answer) > kMaxNamedFaults) {
     answer.outcome = LookOutcome::kUnclear;
   }
 }
@@ -232,7 +245,7 @@ std::optional<std::vector<int>> NamesOf(const LookAnswer& answer,
                                         bool observers_name) {
   const bool perhaps = answer.outcome == LookOutcome::kNothing && answer.late &&
                        !answer.faults.empty() &&
-                       answer.faults.size() <= kMaxNamedFaults;
+                       CountNames(answer) <= kMaxNamedFaults;
   if ((answer.outcome == LookOutcome::kNothing && !perhaps) ||
       (answer.early && observers_name)) {
     return std::nullopt;
@@ -240,7 +253,9 @@ std::optional<std::vector<int>> NamesOf(const LookAnswer& answer,
   std::vector<int> names;
   if (answer.outcome == LookOutcome::kNamed || perhaps) {
     for (const Explanation& e : answer.faults) {
-      names.push_back(e.fault);
+      if (!SaysMore(answer, e)) {
+        names.push_back(e.fault);
+      }
     }
     std::sort(names.begin(), names.end());
   }

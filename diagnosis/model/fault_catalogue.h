@@ -223,6 +223,7 @@ inline constexpr int kFirstFinding = 201;
 inline constexpr int kLastFinding =
     kFirstFinding + static_cast<int>(std::size(kFindingCatalogue)) - 1;
 
+inline constexpr int kTravelStop = 1;
 inline constexpr int kStemFriction = 4;
 inline constexpr int kDiaphragmPerforation = 10;
 inline constexpr int kSupplyDrop = 16;

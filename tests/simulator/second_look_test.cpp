@@ -602,6 +602,17 @@ TEST(LookAnswerTest, KeepsStopAndSupplyTogetherWhereTheBestFitsNotWell) {
   EXPECT_EQ(named(1.0), std::vector{1});
 }
 
+TEST(LookAnswerTest, AStopSaysEnoughUntilTheCommandHasGoneBothWays) {
+  SecondLook look = Looked({{4, 0.0}, {1, 3.0}, {12, 4.0}, {0, 900.0}});
+  look.complete = false;
+  EXPECT_EQ(NamesOf(AnswerOf(look), true), (std::vector{1, 4, 12}));
+  look.ranked[0].strength = 1.0;
+  EXPECT_EQ(NamesOf(AnswerOf(look), true), (std::vector{1, 12}));
+  EXPECT_EQ(AnswerOf(look).faults.size(), 3U) << "a later look may narrow it";
+  look.ranked[1].distance = kLookMargin + 1.0;
+  EXPECT_EQ(NamesOf(AnswerOf(look), true), (std::vector{4, 12}));
+}
+
 TEST(LookAnswerTest, KeepsPerforationBesideASupplyDropWhereSupplyDecides) {
   SecondLook look = Looked({{16, 0.0}, {10, 40.0}, {0, 900.0}});
   look.perforation = look.ranked[1];

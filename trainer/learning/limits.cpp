@@ -140,8 +140,8 @@ WindowLimits* WindowOf(ChannelSpec& channel, int length) {
   return found == channel.windows.end() ? nullptr : &*found;
 }
 
-// What a dead band hides is in the limits of the parent (CoverDeadBands()) and
-// in no residual.
+// The limits of the parent cover the dead bands (CoverDeadBands()), which no
+// residual shows.
 void KeepWide(const ModelSet& parent, ModelSet& fitted) {
   for (std::size_t c = 0; c < parent.channels.size(); ++c) {
     const ChannelSpec& before = parent.channels[c];
