@@ -4,9 +4,9 @@
 #
 #     [KINDS="held 0.5 0"] bench/by_exception.sh build/release/bin [KEY=VALUE...]
 #
-# For each kind, dead band and least time: what onboarding says, episodes in a healthy day, and for each
-# fault whether and when it is detected, how it is named at the end and how
-# surely. The keys are those of by_exception.py.
+# For each kind, dead band and least time: what onboarding says, episodes in a
+# healthy day, and for each fault whether and when it is detected, how it is
+# named at the end and how surely. The keys are those of by_exception.py.
 set -euo pipefail
 bin=$(realpath "$1")
 here=$(realpath "$(dirname "$0")")

@@ -42,9 +42,7 @@ double FlowBand(double band, const std::vector<Stretch>& stretches,
     for (const Sample& sample : stretch.samples) {
       const double x =
           sample[sample.Has(Signal::kX) ? Signal::kX : Signal::kCv];
-      const double dp = sample.Has(Signal::kP1) && sample.Has(Signal::kP2)
-                            ? sample[Signal::kP1] - sample[Signal::kP2]
-                            : models.floor->dp_level;
+      const double dp = DpOf(*models.floor, sample);
       changes.push_back(0.5 * (FlowAt(*models.floor, x - band, dp) -
                                FlowAt(*models.floor, x + band, dp)));
     }
@@ -68,9 +66,11 @@ void Cover(double band, ChannelSpec& channel) {
 void CoverDeadBands(const Condition& normal, ModelSet& models) {
   const bool x_told = models.every.x == ReadEvery::kOnChange;
   const bool f_told = models.every.f == ReadEvery::kOnChange;
+  if (!x_told && !f_told) {
+    return;
+  }
   const std::vector<Stretch> stretches = WholeStretches(normal);
-  if (!(x_told || f_told) ||
-      !stretches.front().samples.front().Has(Signal::kCv)) {
+  if (!stretches.front().samples.front().Has(Signal::kCv)) {
     return;
   }
   const double of_cv =

@@ -188,11 +188,6 @@ bool HasDp(const Sample& sample) {
   return sample.Has(Signal::kP1) && sample.Has(Signal::kP2);
 }
 
-double DpOf(const Sample& sample, const FloorLimits& floor) {
-  return HasDp(sample) ? sample[Signal::kP1] - sample[Signal::kP2]
-                       : floor.dp_level;
-}
-
 void FitLevels(const std::vector<Stretch>& stretches, FloorLimits& floor) {
   double sum = 0.0;
   double count = 0.0;
@@ -231,7 +226,7 @@ bool FitFlowCurve(const std::vector<Stretch>& stretches, FloorLimits& floor) {
   for (const Stretch& stretch : stretches) {
     for (const Sample& sample : stretch.samples) {
       const double flow = sample[Signal::kF];
-      const double dp = DpOf(sample, floor);
+      const double dp = DpOf(floor, sample);
       const double at = sample[Position(sample)];
       const double shape = shaped ? FlowShapeAt(floor, at) : 1.0;
       if (flow <= floor.flow_margin * floor.flow_high ||
@@ -284,7 +279,7 @@ void FitFlowFactors(const std::vector<Stretch>& stretches, FloorLimits& floor) {
       const double x = has_x ? sample[Signal::kX] : rod.most_open();
       const double least_open = has_x ? x : rod.least_open();
       const double least =
-          FlowAt(floor, x - 0.5 * floor.deviation, DpOf(sample, floor));
+          FlowAt(floor, x - 0.5 * floor.deviation, DpOf(floor, sample));
       const double flow =
           sample[Signal::kF] - floor.flow_margin * floor.flow_high;
       ratios.push_back(least > 0.0 ? flow / least : 0.0);
@@ -292,7 +287,7 @@ void FitFlowFactors(const std::vector<Stretch>& stretches, FloorLimits& floor) {
       shortfalls.push_back(
           IsShut(x, sample[Signal::kCv])
               ? 0.0
-              : LeastFlowAt(floor, least_open, DpOf(sample, floor)) /
+              : LeastFlowAt(floor, least_open, DpOf(floor, sample)) /
                     (std::max(sample[Signal::kF], 0.0) +
                      floor.flow_margin * floor.flow_high));
     }

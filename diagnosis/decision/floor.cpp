@@ -11,15 +11,23 @@
 namespace fdi {
 namespace {
 
-constexpr double kShut = 98.0;        // of CV and X [%]
-constexpr double kStop = 2.0;         // from an end of the travel [%]
-constexpr int kBreakaway = 5;         // samples that a rod may stay at rest
-constexpr int kStuckSamples = 10;     // for the position; twice as many for F,
-constexpr int kSilentSamples = 60;    // or so many without any reading of F,
-constexpr int kSilentPolls = 2;       // which are two polls at least
+constexpr double kShut = 98.0;     // of CV and X [%]
+constexpr double kStop = 2.0;      // from an end of the travel [%]
+constexpr int kBreakaway = 5;      // samples that a rod may stay at rest
+constexpr int kStuckSamples = 10;  // for the position; twice as many for F
+// Without any reading of F: as long as nothing may be known of a valve, and two
+// polls at least.
+constexpr int kSilentSamples = 60;
+constexpr int kSilentPolls = 2;
 constexpr int kMaxRepeats = 1 << 20;  // counted
 constexpr double kLeastDp = 0.5;      // of the usual pressure drop
 constexpr double kFlowBorder = 0.9;   // of the largest flow: not saturated
+
+int SilenceOf(int every) {
+  return every == ReadEvery::kOnChange
+             ? kSilentSamples
+             : std::max(kSilentSamples, kSilentPolls * every);
+}
 
 }  // namespace
 
@@ -78,6 +86,12 @@ double FlowAt(const FloorLimits& floor, double x, double dp) {
   return floor.flow_gain * FlowShapeAt(floor, x) * std::sqrt(std::max(dp, 0.0));
 }
 
+double DpOf(const FloorLimits& floor, const Sample& sample) {
+  return sample.Has(Signal::kP1) && sample.Has(Signal::kP2)
+             ? sample[Signal::kP1] - sample[Signal::kP2]
+             : floor.dp_level;
+}
+
 double LeastFlowAt(const FloorLimits& floor, double x, double dp) {
   const double share = std::clamp(dp / floor.dp_level, 0.0, 1.0);
   return std::min(FlowAt(floor, x + 0.5 * floor.deviation, dp),
@@ -87,16 +101,6 @@ double LeastFlowAt(const FloorLimits& floor, double x, double dp) {
 bool IsShut(double x, double cv) {
   return x >= kShut && cv >= kShut;
 }
-
-namespace {
-
-int SilenceOf(int every) {
-  return every == ReadEvery::kOnChange
-             ? kSilentSamples
-             : std::max(kSilentSamples, kSilentPolls * every);
-}
-
-}  // namespace
 
 Floor::Floor(const ModelSet& models)
     : limits_(models.floor ? &*models.floor : nullptr),
@@ -237,19 +241,14 @@ void Floor::WatchPosition(const Sample& sample, bool silent) {
         sample.stamp_ns, position_);
 }
 
-double Floor::DpOf(const Sample& sample) const {
-  return sample.Has(Signal::kP1) && sample.Has(Signal::kP2)
-             ? sample[Signal::kP1] - sample[Signal::kP2]
-             : limits_->dp_level;
-}
-
 // A valve in control that has lost its pressure has lost its flow with it, and
 // that is a finding. One that stands wide open without pressure is parked.
 double Floor::LeastFlow(double x, const Sample& sample) const {
   const double least_dp =
       sample[Signal::kCv] > kStop ? kLeastDp * limits_->dp_level : 0.0;
   return limits_->flow_share *
-             LeastFlowAt(*limits_, x, std::max(DpOf(sample), least_dp)) -
+             LeastFlowAt(*limits_, x,
+                         std::max(DpOf(*limits_, sample), least_dp)) -
          limits_->flow_margin * limits_->flow_high;
 }
 
@@ -259,7 +258,7 @@ void Floor::PushFlow(const Sample& sample) {
   const double x = has_x ? sample[Signal::kX] : rod_->most_open();
   const double least_open = has_x ? x : rod_->least_open();
   const double flow = sample[Signal::kF];
-  const double dp = DpOf(sample);
+  const double dp = DpOf(*limits_, sample);
   const double margin = limits_->flow_margin * limits_->flow_high;
   const bool shut = IsShut(x, sample[Signal::kCv]);
   // The trim still passes a share of its rangeability, which ends at the seat.
@@ -293,7 +292,7 @@ void Floor::WatchFlow(const Sample& sample, bool silent) {
   const double most_open = has_x ? sample[Signal::kX] : rod_->most_open();
   const double least_open = has_x ? sample[Signal::kX] : rod_->least_open();
   const double flow = sample[Signal::kF];
-  const double dp = DpOf(sample);
+  const double dp = DpOf(*limits_, sample);
   const double margin = limits_->flow_margin * limits_->flow_high;
   const double opened = FlowAt(*limits_, most_open, dp);
   Watch(

@@ -51,6 +51,9 @@ double FlowShapeAt(const FloorLimits& floor, double x);
 /// F(X, P1 − P2) of the floor; `dp` may be negative.
 double FlowAt(const FloorLimits& floor, double x, double dp);
 
+/// P1 − P2, or the usual one where they are not measured [kPa].
+double DpOf(const FloorLimits& floor, const Sample& sample);
+
 /// The least flow through the opening, before the share of the floor: F(X +
 /// deviation/2, dp), but no more than the record has shown, and less with less
 /// pressure. An opening beyond the record counts as the widest one there.
@@ -137,7 +140,6 @@ class Floor {
     Expectations highest{};
   };
 
-  double DpOf(const Sample& sample) const;
   double LeastFlow(double x, const Sample& sample) const;
   void Count(int finding, bool beyond, double share, double size, int needed,
              std::int64_t stamp_ns);

@@ -412,17 +412,17 @@ void ValveEngine::Impl::ReadResiduals() {
 
 Quality ValveEngine::Impl::Judge(const Sample& sample) {
   verdict_.uncovered = 0;
-  const bool found = diagnosis_->floor.findings() != 0;
+  const Floor& floor = diagnosis_->floor;
   if (diagnosis_->bank.active_channels() == 0 ||
-      (uncertain_ > kMaxUncertainRun && !found)) {
+      (uncertain_ > kMaxUncertainRun && floor.stuck() == 0)) {
     return Quality::kBadInput;
   }
   // A fault moves the command, so whether the valve is abnormal has to be known
   // before its command may disarm it (docs/method.md): the floor has taken
   // this sample, and pending() is that of the last judged one.
-  const Quality quality =
-      diagnosis_->coverage.Judge(sample, diagnosis_->bank, episode_open(),
-                                 found, diagnosis_->detection.pending());
+  const Quality quality = diagnosis_->coverage.Judge(
+      sample, diagnosis_->bank, episode_open(), floor.findings() != 0,
+      diagnosis_->detection.pending());
   verdict_.uncovered = diagnosis_->coverage.reasons();
   return quality;
 }
@@ -434,8 +434,9 @@ void ValveEngine::Impl::Decide(const Sample& sample) {
   if (diagnosis_->coverage.armed_now()) {
     detection.Restart();
   }
-  // Nothing is measured, so all stays as it is but for what silence shows.
-  if (uncertain_ > 0 && floor.findings() == 0) {
+  // Nothing is measured, so all stays as it is. Silence opens an episode, and
+  // is a reading from the next sample on (TakeSilence()).
+  if (uncertain_ > 0 && (floor.stuck() == 0 || episode_open())) {
     return;
   }
   Findings findings;

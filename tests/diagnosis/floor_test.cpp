@@ -397,6 +397,28 @@ TEST(FloorTest, ARodThatIsSilentOpensAnEpisode) {
   EXPECT_EQ(FaultSetName(engine.models(), name), "x_stuck");
 }
 
+// The silence is that of a valve at rest: whatever was found before, nothing is
+// known of it by now.
+TEST(FloorTest, AnEarlierFindingIsNoReading) {
+  ModelSet models = FlooredPlant();
+  models.floor->flow_gain = 0.0;
+  ValveEngine engine(std::make_shared<const ModelSet>(models));
+  for (int k = 0; k < 300; ++k) {
+    Sample sample =
+        tests::PlantSample(static_cast<std::uint64_t>(k), k < 200 ? 2.0 : 0.0);
+    if (k >= 150) {
+      sample.Set(Signal::kX, sample[Signal::kX] + 30.0);
+    }
+    if (k >= 200) {
+      sample.quality[Index(Signal::kX)] = SignalQuality::kUncertain;
+      sample.quality[Index(Signal::kF)] = SignalQuality::kUncertain;
+    }
+    const Verdict& verdict = engine.Step(sample);
+    EXPECT_EQ(verdict.quality == Quality::kBadInput, k >= 260) << k;
+  }
+  EXPECT_TRUE(engine.episode_open());
+}
+
 // A valve without a position transmitter: its rod is somewhere in the range
 // that it may have.
 TEST(FloorTest, TestsTheFlowWithoutAPosition) {
