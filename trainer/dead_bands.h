@@ -11,9 +11,10 @@ namespace fdi::trainer {
 /// moves. So no limit on X is closer than the dead band of CV, none on F closer
 /// than what those of CV and X make of the flow (FlowAt()).
 ///
-/// A dead band is the 10 % quantile of the changes of the record: what is told
-/// after a time limit although it hardly changed is below. That of CV, which
-/// may be moved in steps by whom it likes, is at most Floor::kDeadBand.
+/// A dead band is the 10 % quantile of the changes in the record: values that
+/// are reported after a time limit, though they have hardly changed, lie below.
+/// That of CV, which an operator may move in steps, is at most
+/// Floor::kDeadBand.
 void CoverDeadBands(const Condition& normal, ModelSet& models);
 
 }  // namespace fdi::trainer

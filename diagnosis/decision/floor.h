@@ -91,14 +91,13 @@ class Floor {
   void Restart();
 
   /// Takes every accepted sample. Modes other than AUTO restart it; UNCERTAIN
-  /// readings are not tested, but that there are no other ones is.
-  /// @param silent signals of which the source has no new reading; what else is
-  ///   UNCERTAIN stands for one that is missing or was held out.
+  /// readings are not tested, except for silence where a reading was due.
+  /// @param silent signals of which the source has no new reading; any other
+  ///   UNCERTAIN value stands for a reading that is missing or was held out.
   void Push(const Sample& sample, SignalMask silent);
   void Push(const Sample& sample) { Push(sample, sample.uncertain()); }
 
-  /// Signals that were silent although they should have moved: that they did
-  /// not is a reading.
+  /// Signals that repeat, or are silent, although they should have moved.
   SignalMask stuck() const;
 
   /// The current findings; always empty without a floor.
