@@ -881,7 +881,7 @@ void TableReader::MarkRepeats() {
   for (std::size_t i = 0; i < kSignalCount; ++i) {
     const auto signal = static_cast<Signal>(i);
     const int* samples = EveryOf(every, signal);
-    if (samples != nullptr && *samples > 0) {
+    if (samples != nullptr && *samples > ReadEvery::kNoRepeats) {
       const std::string when =
           *samples == ReadEvery::kOnChange
               ? "when it changes"

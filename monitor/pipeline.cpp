@@ -437,6 +437,13 @@ void Pipeline::Count(Valve& valve, const Sample& sample,
                " missing=" + SignalNames(outcome.missing);
       });
     }
+    const SignalMask held = std::exchange(valve.held, outcome.held);
+    if ((outcome.held & ~held) != 0) {
+      log_.Report(LogId::kHeld, "readings_held", [&] {
+        return "valve=" + LogValue(valve.monitor.id()) +
+               " signals=" + SignalNames(outcome.held);
+      });
+    }
     return;
   }
   log_.Report(

@@ -164,6 +164,7 @@ class Pipeline {
     ValveMonitor monitor;
     bool known;             // Never evicted.
     SignalMask missing{0};  // In an accepted sample; logged when it changes.
+    SignalMask held{0};     // Logged when there are more.
   };
   struct Hash {
     using is_transparent = void;

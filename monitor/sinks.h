@@ -169,6 +169,7 @@ struct ValveOutcome {
   bool found_normal{
       false};          ///< With this sample, as EpisodeOutlet::OnNormal().
   bool notice{false};  ///< Its open episode is no alarm (AlarmBudget).
+  SignalMask held{0};  ///< See Decision::held().
 };
 
 /// Why a valve sends nothing.

@@ -34,6 +34,7 @@ enum class LogId : std::uint8_t {
   kOverShare = 117,      ///< sample_rejected reason=over_share
   kTwoPublishers = 118,  ///< two_publishers
   kPartlyJudged = 119,   ///< valve_partly_judged
+  kHeld = 120,           ///< readings_held
   kUnsent = 121,         ///< publication_failed
   kUnpersisted = 122,    ///< event_unpersisted
   kPersistence = 123,    ///< persistence_degraded

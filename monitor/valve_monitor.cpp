@@ -153,7 +153,8 @@ ValveOutcome ValveMonitor::Step(const Sample& sample, std::uint64_t writer,
           .period_s = period_s(),
           .unjudged_ns = unjudged_since_ns(),
           .found_normal = std::exchange(found_normal_, false),
-          .notice = tracker_.notice()};
+          .notice = tracker_.notice(),
+          .held = decision_->held()};
 }
 
 // A superseded publisher that goes on sending must neither end the stream of

@@ -74,7 +74,7 @@ void CoverDeadBands(const Condition& normal, ModelSet& models) {
     return;
   }
   const double of_cv =
-      std::min(DeadBandOf(Signal::kCv, stretches), Floor::kDeadBand);
+      std::min(DeadBandOf(Signal::kCv, stretches), kWidestDeadBand);
   const double of_x = x_told ? DeadBandOf(Signal::kX, stretches) : 0.0;
   for (ChannelSpec& channel : models.channels) {
     if (channel.output == Signal::kX && of_cv > 0.0) {

@@ -154,7 +154,7 @@ void FitDeviation(const std::vector<Stretch>& stretches, FloorLimits& floor) {
       rod.Step(stretch.samples[k][Signal::kCv]);
       const bool silent =
           (stretch.samples[k].uncertain() & MaskOf(Signal::kX)) != 0;
-      const double slack = silent ? Floor::kDeadBand : 0.0;
+      const double slack = silent ? kWidestDeadBand : 0.0;
       if (std::abs(x - last) > slack || k < kSettling) {
         lowest = highest = rod.slow();
         last = x;

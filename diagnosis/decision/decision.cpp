@@ -16,6 +16,7 @@ Decision::Decision(EngineParts parts,
 const Verdict& Decision::Step(const Sample& measured) {
   Sample sample = measured;
   held_readings_.Mark(sample);
+  engine_.Allow(held_readings_.unseen());
   engine_.Suspect(names_->suspects());
   engine_.TakeName(names_->beside());
   const Verdict& verdict = engine_.Step(sample);

@@ -19,7 +19,9 @@ namespace fdi {
 /// floor or a look have found. The monitor and `fdi-trainer evaluate` run this
 /// very class. Each sample is handled in this order:
 ///
-/// 0. repeats of a transmitter that is polled are marked (HeldReadings);
+/// 0. repeats of a transmitter that is polled, or tells of changes alone, are
+///    marked, and what it does not tell meanwhile is allowed for
+///    (HeldReadings);
 /// 1. the engine judges it, with the name and the suspicion of the sample
 ///    before it (ValveEngine);
 /// 2. the looks that are due at it are noted (ValveLooks);
@@ -79,6 +81,9 @@ class Decision {
   /// The verdict of the engine on the last sample, by itself.
   const Verdict& engine() const { return engine_.verdict(); }
   const EpisodeNames& names() const { return *names_; }
+  /// Transmitters that are not read for each sample, although the model set
+  /// knows them to be.
+  SignalMask held() const { return held_readings_.held(); }
   bool episode_open() const { return engine_.episode_open(); }
   const std::shared_ptr<const LookSimulation>& simulation() const {
     return simulation_;

@@ -104,6 +104,9 @@ bool IsShut(double x, double cv) {
 
 Floor::Floor(const ModelSet& models)
     : limits_(models.floor ? &*models.floor : nullptr),
+      position_silence_(models.every.x > ReadEvery::kNoRepeats
+                            ? kStuckSamples
+                            : kSilentSamples),
       flow_silence_(SilenceOf(models.every.f)),
       first_(static_cast<std::size_t>(
           std::max(FaultIndex(models, kFirstFinding), 0))),
@@ -234,8 +237,8 @@ void Floor::WatchPosition(const Sample& sample, bool silent) {
   };
   Watch({.finding = kPositionStuck,
          .reading = sample[Signal::kX],
-         .slack = silent ? kDeadBand : 0.0,
-         .needed = kStuckSamples,
+         .slack = silent ? kWidestDeadBand : 0.0,
+         .needed = silent ? position_silence_ : kStuckSamples,
          .expected = {within(rod_->quick()), within(rod_->slow())},
          .most = limits_->stuck_travel},
         sample.stamp_ns, position_);
@@ -298,7 +301,7 @@ void Floor::WatchFlow(const Sample& sample, bool silent) {
   Watch(
       {.finding = kFlowStuck,
        .reading = flow,
-       .slack = silent ? 0.01 * kDeadBand * limits_->flow_high : 0.0,
+       .slack = silent ? 0.01 * kWidestDeadBand * limits_->flow_high : 0.0,
        .needed = silent ? flow_silence_ : 2 * kStuckSamples,
        .expected = {opened, has_x ? opened : FlowAt(*limits_, least_open, dp)},
        .most = margin,

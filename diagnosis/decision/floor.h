@@ -80,10 +80,6 @@ bool IsShut(double x, double cv);
 /// a fault is isolated.
 class Floor {
  public:
-  /// The widest dead band [%] within which historians keep a value to
-  /// themselves.
-  static constexpr double kDeadBand = 1.0;
-
   /// `models` must outlive it.
   explicit Floor(const ModelSet& models);
 
@@ -149,7 +145,8 @@ class Floor {
   void WatchFlow(const Sample& sample, bool silent);
 
   const FloorLimits* limits_;  // null: no floor
-  int flow_silence_;           // samples without a reading of F
+  int position_silence_;       // samples without a reading of X
+  int flow_silence_;           // and of F
   std::size_t first_;          // fault index of the first finding
   std::optional<RodBand> rod_;
   bool follows_{false};

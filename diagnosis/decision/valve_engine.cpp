@@ -173,6 +173,7 @@ class ValveEngine::Impl {
   void ForgetSuperseded() { order_.ForgetSuperseded(); }
   void Suspect(bool suspected) { suspected_ = suspected; }
   void TakeName(const NameBeside& name) { beside_ = name; }
+  void Allow(const Unseen& unseen) { unseen_ = unseen; }
   std::vector<std::byte> Save() const;
   bool Restore(std::span<const std::byte> bytes);
 
@@ -187,6 +188,7 @@ class ValveEngine::Impl {
   void ClearVerdict();
   Checked CheckSample(const Sample& measured, bool begins);
   void TakeSilence(SignalMask silent, Sample& trained) const;
+  void AllowUnseen(const Sample& trained);
   bool Mend(const Checked& checked, bool begins, Sample& trained);
   SignalMask Single(const Checked& checked) const;
   void TakeSource(const Sample& sample);
@@ -205,6 +207,7 @@ class ValveEngine::Impl {
   bool isolation_held_{false};
   bool suspected_{false};
   NameBeside beside_;
+  Unseen unseen_{};
   bool has_source_{false};
   bool judged_{false};  // The last sample has reached the observers.
   bool needs_initialisation_{true};
@@ -259,6 +262,7 @@ const Verdict& ValveEngine::Impl::Step(const Sample& measured) {
   if (begins || trained.present != present_) {
     Initialise(trained);
   }
+  AllowUnseen(trained);
   const Sample& sample = diagnosis_->lone.Step(diagnosis_->bank, trained);
   judged_ = true;
   verdict_.single = Single(checked);
@@ -316,6 +320,36 @@ void ValveEngine::Impl::TakeSilence(SignalMask silent, Sample& trained) const {
        left &= left - 1) {
     trained.quality[static_cast<std::size_t>(std::countr_zero(left))] =
         SignalQuality::kGood;
+  }
+}
+
+// A rod follows its command, and the flow what the observers read of both.
+void ValveEngine::Impl::AllowUnseen(const Sample& trained) {
+  const bool any = unseen_.any();
+  if (!any && !diagnosis_->bank.allows()) {
+    return;
+  }
+  const auto of = [&](Signal signal) { return unseen_.changes[Index(signal)]; };
+  for (std::size_t c = 0; c < models().channels.size(); ++c) {
+    double error = 0.0;
+    const Signal output = models().channels[c].output;
+    if (any && output == Signal::kX) {
+      error = of(Signal::kCv);
+    } else if (any && output == Signal::kF && models().floor) {
+      const TsModel& model = models().observers[0].channels[c].model;
+      const Signal at = (RequiredSignals(model) & MaskOf(Signal::kX)) != 0
+                            ? Signal::kX
+                            : Signal::kCv;
+      const double dp = DpOf(*models().floor, trained);
+      const double dp_error = of(Signal::kP1) + of(Signal::kP2);
+      error =
+          0.5 * (FlowAt(*models().floor, trained[at] - of(at), dp + dp_error) -
+                 FlowAt(*models().floor, trained[at] + of(at), dp - dp_error));
+    }
+    if ((unseen_.within & MaskOf(output)) != 0) {
+      error += of(output);
+    }
+    diagnosis_->bank.Allow(static_cast<int>(c), error);
   }
 }
 
@@ -424,7 +458,8 @@ Quality ValveEngine::Impl::Judge(const Sample& sample) {
       sample, diagnosis_->bank, episode_open(), floor.findings() != 0,
       diagnosis_->detection.pending());
   verdict_.uncovered = diagnosis_->coverage.reasons();
-  return quality;
+  return quality == Quality::kLive && unseen_.unknown ? Quality::kSettling
+                                                      : quality;
 }
 
 void ValveEngine::Impl::Decide(const Sample& sample) {
@@ -440,7 +475,8 @@ void ValveEngine::Impl::Decide(const Sample& sample) {
     return;
   }
   Findings findings;
-  findings.settled = diagnosis_->coverage.settled() && uncertain_ == 0;
+  findings.settled =
+      diagnosis_->coverage.settled() && uncertain_ == 0 && !unseen_.unknown;
   findings.floor = floor.findings();
   findings.beginning = floor.beginning();
   findings.abnormal = findings.floor != 0;
@@ -629,6 +665,10 @@ void ValveEngine::HoldIsolation(bool hold) {
 
 void ValveEngine::ForgetSuperseded() {
   impl_->ForgetSuperseded();
+}
+
+void ValveEngine::Allow(const Unseen& unseen) {
+  impl_->Allow(unseen);
 }
 
 void ValveEngine::TakeName(const NameBeside& name) {

@@ -8,6 +8,7 @@
 
 #include "diagnosis/decision/engine_plan.h"
 #include "diagnosis/decision/name_beside.h"
+#include "diagnosis/model/held_readings.h"
 #include "diagnosis/model/model_set.h"
 #include "diagnosis/model/sample.h"
 #include "diagnosis/model/verdict.h"
@@ -33,6 +34,10 @@ class ValveEngine {
   ValveEngine& operator=(ValveEngine&&) noexcept;
   ValveEngine(const ValveEngine&) = delete;
   ValveEngine& operator=(const ValveEngine&) = delete;
+
+  /// From the next sample on, values may be wrong by so much, and observers count
+  /// as that much less certain.
+  void Allow(const Unseen& unseen);
 
   /// Takes the next sample in order of arrival. The result stands until the
   /// next call.

@@ -10,10 +10,12 @@ namespace fdi {
 
 /// Samples from one new reading of a transmitter to the next, where it is read
 /// less often than samples are taken: a position that is polled by HART every
-/// 30 s and stands in the rows between. 0: each sample has a new reading;
-/// kOnChange: a value is new when it changes, as by exception.
+/// 30 s and stands in the rows between. 1: each sample had another reading; 0:
+/// each had one, which may repeat the last; kOnChange: a value is new when it
+/// changes, as by exception.
 struct ReadEvery {
   static constexpr int kOnChange = std::numeric_limits<int>::max();
+  static constexpr int kNoRepeats = 1;
 
   int p1{0};
   int p2{0};
@@ -27,6 +29,23 @@ struct ReadEvery {
 /// The member of `signal`; null for those that are no transmitters. A command
 /// that stands is the command.
 int* EveryOf(ReadEvery& every, Signal signal);
+/// Its value; 0 for those.
+int SamplesOf(const ReadEvery& every, Signal signal);
+
+/// The widest dead band within which historians keep a value to themselves, in
+/// % of the span.
+inline constexpr double kWidestDeadBand = 1.0;
+
+/// Changes that a source does not tell.
+struct Unseen {
+  /// How far a value may be from the last one that came, by signal [unit].
+  std::array<double, kSignalCount> changes{};
+  SignalMask within{0};  ///< Those that would have been told of a larger one.
+  /// It is not known yet whether values that repeat are readings.
+  bool unknown{false};
+
+  bool any() const { return changes != decltype(changes){}; }
+};
 
 /// Tells new readings from repeats. A polled transmitter changes only at
 /// multiples of a fixed number of samples, whatever it measures. One that tells
@@ -35,7 +54,9 @@ int* EveryOf(ReadEvery& every, Signal signal);
 /// process are never the same to the bit. The repeats of both become UNCERTAIN:
 /// they stay in the past of the observers and are no evidence of anything.
 /// After the time of a poll an unchanged value is a new reading, and so it is
-/// after rows that are UNCERTAIN already. O(1) a sample.
+/// after rows that are UNCERTAIN already. Where none ever repeated itself in
+/// the record, one that does is none from the first sample on, until this is
+/// known. O(1) a sample.
 class HeldReadings {
  public:
   /// @param known what is known of the transmitters, before any reading.
@@ -43,7 +64,16 @@ class HeldReadings {
 
   void Mark(Sample& sample);
 
+  /// More than every tenth reading so far was the last one again.
+  bool Repeats(Signal signal) const;
+
   const ReadEvery& every() const { return every_; }
+
+  /// Counts transmitters that are not read for each sample, and were not `known`
+  /// not to be.
+  Unseen unseen() const;
+  /// These transmitters.
+  SignalMask held() const;
 
  private:
   /// Fifteen of them at multiples by chance: below 1e-3 for every second
@@ -60,15 +90,24 @@ class HeldReadings {
     std::array<double, kChanges> steps{};  // between changes [samples]
     std::array<double, kChanges> sizes{};  // of the changes
     std::size_t changes{0};
+    std::size_t quick{0};  // changes from one sample to the next
+    std::size_t repeats{0};
+    bool has_dead_band{false};
   };
 
   static int Poll(const Watch& watch);
   static bool IsToldOnChange(const Watch& watch);
-  void TakeChange(double step, double size, Watch& watch, int& every) const;
+  bool IsWithin(Signal signal, const Sample& sample) const;
+  void UpdateUnseen(Signal signal);
+  static double DeadBandOf(const Watch& watch);
+  void TakeChange(Signal signal, double step, double size);
+  bool IsUnknown(Signal signal) const;
 
   double period_ns_;
+  ReadEvery known_;
   ReadEvery every_;
   std::array<Watch, kSignalCount> watches_{};
+  std::array<double, kSignalCount> unseen_{};
 };
 
 /// Marks a whole record from its first sample on. `at(k)` is sample k. @returns
@@ -91,9 +130,13 @@ ReadEvery MarkHeld(double period_s, std::size_t samples, At at) {
   ReadEvery every = search.every();
   bool any = false;
   for (std::size_t i = 0; i < kSignalCount; ++i) {
-    if (int* found = EveryOf(every, static_cast<Signal>(i))) {
+    const auto signal = static_cast<Signal>(i);
+    if (int* found = EveryOf(every, signal)) {
       *found = 4 * held[i] > samples ? *found : 0;
       any = any || *found > 0;
+      if (*found == 0 && !search.Repeats(signal)) {
+        *found = ReadEvery::kNoRepeats;
+      }
     }
   }
   HeldReadings marks(period_s, every);

@@ -90,6 +90,23 @@ void ObserverBank::Step(const Sample& sample) {
         state_.active[c] != 0 && reading >= model.saturation ? 1 : 0;
   }
   kernels_->predict(*plan_, state_);
+  if (allows_) {
+    AddAllowed();
+  }
+}
+
+void ObserverBank::AddAllowed() {
+  allows_ = false;
+  for (std::size_t c = 0; c < state_.active.size(); ++c) {
+    const double extrapolation = allowed_[c] / kExtrapolationError;
+    allows_ = allows_ || extrapolation > 0.0;
+    for (std::size_t b = plan_->first_block(c);
+         state_.active[c] != 0 && b < plan_->first_block(c + 1); ++b) {
+      for (double& of_observer : state_.outputs->extrapolations[b].lane) {
+        of_observer += extrapolation;
+      }
+    }
+  }
 }
 
 void ObserverBank::StepAgain(const Sample& sample) {

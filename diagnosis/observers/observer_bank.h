@@ -43,6 +43,14 @@ class ObserverBank {
   /// Initialise(); the signals of active channels must be present.
   void Step(const Sample& sample);
 
+  /// From the next sample on, the predictions of `channel` are so uncertain
+  /// besides, which counts as extrapolation does [unit of the output].
+  void Allow(int channel, double error) {
+    allowed_[static_cast<std::size_t>(channel)] = error;
+    allows_ = allows_ || error > 0.0;
+  }
+  bool allows() const { return allows_; }
+
   /// Puts `sample` in the place of the last one.
   void StepAgain(const Sample& sample);
   /// Replaces the measured past `lag` samples ago; what parallel observers
@@ -105,6 +113,8 @@ class ObserverBank {
     return quads[slot / kLanes].lane[slot % kLanes];
   }
 
+  void AddAllowed();
+
   /// @param all_certain no reading in the whole past is UNCERTAIN.
   bool IsMeasured(std::size_t channel, bool all_certain);
 
@@ -113,6 +123,8 @@ class ObserverBank {
   ObserverState state_;
   int active_count_{0};
   int measured_count_{0};
+  std::array<double, kMaxChannels> allowed_{};
+  bool allows_{false};
   std::vector<double> whole_share_;  // Share of complete readings, by channel.
 };
 

@@ -332,8 +332,9 @@ TEST(FloorTest, ReadingsThatRepeatWhileTheyShouldMove) {
 // stands there for one that is missing is not the silence of a transmitter.
 TEST(FloorTest, SilenceWhileItShouldMoveIsARepeat) {
   const auto first = [](int finding, double x_moves, double f_moves,
-                        bool bridged) {
-    const ModelSet models = FlooredPlant();
+                        bool bridged, int every = ReadEvery::kOnChange) {
+    ModelSet models = FlooredPlant();
+    models.every.x = every;
     Floor floor(models);
     for (int k = 0; k < 200; ++k) {
       const double cv = k < 40 ? 50.0 : 70.0;
@@ -355,6 +356,9 @@ TEST(FloorTest, SilenceWhileItShouldMoveIsARepeat) {
   };
   EXPECT_GT(first(kPositionStuck, 0.0, 0.0, false), 40);
   EXPECT_LE(first(kPositionStuck, 0.0, 0.0, false), 50);
+  const int new_to_it = first(kPositionStuck, 0.0, 0.0, false, 0);
+  EXPECT_GE(new_to_it, 59) << "the record has not shown how long is usual";
+  EXPECT_LE(new_to_it, 60);
   EXPECT_GT(first(kPositionStuck, 0.9, 0.0, false), 40) << "drawn as a line";
   EXPECT_EQ(first(kPositionStuck, 20.0, 20.0, false), -1);
   EXPECT_EQ(first(kPositionStuck, 0.0, 0.0, true), -1);

@@ -161,6 +161,126 @@ TEST(HeldReadingsTest, AnUnchangedValueAfterHeldOnesIsAReading) {
   }
 }
 
+// A set of each reading meets data told on change: nobody knows which of the
+// first values are readings.
+TEST(HeldReadingsTest, WhereNoneRepeatedItselfARepeatIsNoReading) {
+  HeldReadings held(1.0, {.x = ReadEvery::kNoRepeats});
+  OnChange source(0.01);
+  int news = 0;
+  for (int k = 0; k < 4000; ++k) {
+    Sample sample = source.Next();
+    held.Mark(sample);
+    news += source.is_new() ? 1 : 0;
+    const bool first = k == 0;
+    EXPECT_EQ(IsHeld(sample, Signal::kX), !first && !source.is_new()) << k;
+    EXPECT_EQ(held.unseen().unknown, !first && news < 16) << k;
+  }
+  EXPECT_EQ(held.every().x, ReadEvery::kOnChange);
+  EXPECT_EQ(held.held(), MaskOf(Signal::kX));
+  // No change came at once, so it is not known that 0.4 is a dead band.
+  EXPECT_GT(held.unseen().changes[Index(Signal::kX)], 0.4);
+  EXPECT_LT(held.unseen().changes[Index(Signal::kX)], 0.75);
+  EXPECT_EQ(held.unseen().changes[Index(Signal::kF)], 0.0);
+  EXPECT_EQ(held.unseen().changes[Index(Signal::kCv)], 0.0);
+}
+
+// A source that tells of a change at once says by its silence where the value
+// is, whether it marks what it holds or not. Lines between readings say
+// nothing.
+TEST(HeldReadingsTest, WithinItsDeadBandAnUnchangedValueIsAReading) {
+  for (const bool marks : {false, true}) {
+    HeldReadings held(1.0, {.x = ReadEvery::kNoRepeats});
+    OnChange source(0.001, 1.5);
+    double last = -1.0;
+    int unusual = 0;
+    for (int k = 0; k < 4000; ++k) {
+      Sample sample = source.Next();
+      if (sample[Signal::kX] == last && marks) {
+        sample.quality[Index(Signal::kX)] = SignalQuality::kUncertain;
+      }
+      last = sample[Signal::kX];
+      held.Mark(sample);
+      if (k > 200) {
+        EXPECT_EQ(held.unseen().within, MaskOf(Signal::kX)) << k;
+        unusual += IsHeld(sample, Signal::kX) ? 1 : 0;
+      }
+    }
+    EXPECT_LT(unusual, 400) << "silent for longer than lately";
+    EXPECT_GT(held.unseen().changes[Index(Signal::kX)], 0.4);
+    EXPECT_LT(held.unseen().changes[Index(Signal::kX)], 0.75);
+    int silent = 0;
+    Sample sample = source.Next();
+    for (; silent < 100 && !IsHeld(sample, Signal::kX); ++silent) {
+      sample = source.Next();
+      sample.Set(Signal::kX, last);
+      held.Mark(sample);
+    }
+    EXPECT_GT(silent, 1);
+    EXPECT_LT(silent, 30);
+    sample = source.Next();
+    sample.Set(Signal::kX, last + 0.1);
+    sample.quality[Index(Signal::kX)] = SignalQuality::kUncertain;
+    held.Mark(sample);
+    EXPECT_TRUE(IsHeld(sample, Signal::kX));
+  }
+}
+
+TEST(HeldReadingsTest, ReadingsThatDoNotRepeatLeaveNothingUnseen) {
+  HeldReadings held(1.0, {.x = ReadEvery::kNoRepeats});
+  tests::Noise noise(3);
+  for (std::uint64_t k = 0; k < 1000; ++k) {
+    Sample sample = tests::PlantSample(k);
+    noise.Add(sample);
+    held.Mark(sample);
+    EXPECT_EQ(sample.uncertain(), 0);
+    EXPECT_FALSE(held.unseen().unknown);
+  }
+  EXPECT_FALSE(held.unseen().any());
+}
+
+TEST(HeldReadingsTest, WhatWasKnownIsNotUnseen) {
+  for (const int known : {ReadEvery::kOnChange, 0}) {
+    HeldReadings held(1.0, {.x = known});
+    OnChange source(0.01);
+    for (int k = 0; k < 4000; ++k) {
+      Sample sample = source.Next();
+      held.Mark(sample);
+      EXPECT_FALSE(held.unseen().unknown);
+    }
+    EXPECT_EQ(held.unseen().any(), known == 0);
+  }
+}
+
+// A transmitter may be frozen from the first sample on.
+TEST(HeldReadingsTest, NothingIsUnknownForLongerThanAnHour) {
+  HeldReadings held(1.0, {.x = ReadEvery::kNoRepeats});
+  for (std::uint64_t k = 0; k < 4000; ++k) {
+    Sample sample = tests::PlantSample(k);
+    sample.Set(Signal::kX, 40.0);
+    held.Mark(sample);
+    EXPECT_EQ(held.unseen().unknown, k > 0 && k < 3600) << k;
+  }
+}
+
+TEST(HeldReadingsTest, ARecordSaysWhetherReadingsRepeatThemselves) {
+  for (const double resolution : {0.001, 0.5}) {
+    tests::Noise noise(4);
+    std::vector<Sample> record;
+    for (std::uint64_t k = 0; k < 2000; ++k) {
+      Sample& sample = record.emplace_back(tests::PlantSample(k, 2.0));
+      noise.Add(sample);
+      const double x = sample[Signal::kX];
+      sample.Set(Signal::kX, resolution * std::round(x / resolution));
+    }
+    const ReadEvery every =
+        MarkHeld(1.0, record.size(),
+                 [&](std::size_t k) -> Sample& { return record[k]; });
+    EXPECT_EQ(every.x, resolution < 0.1 ? ReadEvery::kNoRepeats : 0);
+    EXPECT_EQ(every.f, ReadEvery::kNoRepeats);
+    EXPECT_EQ(every.p1, 0) << "not measured";
+  }
+}
+
 TEST(HeldReadingsTest, ARecordIsMarkedFromItsFirstSampleOn) {
   std::vector<Sample> record;
   for (int k = 0; k < 2000; ++k) {
@@ -168,7 +288,7 @@ TEST(HeldReadingsTest, ARecordIsMarkedFromItsFirstSampleOn) {
   }
   const ReadEvery every = MarkHeld(
       1.0, record.size(), [&](std::size_t k) -> Sample& { return record[k]; });
-  EXPECT_EQ(every, (ReadEvery{.x = kPoll}));
+  EXPECT_EQ(every, (ReadEvery{.x = kPoll, .f = ReadEvery::kNoRepeats}));
   for (std::size_t k = 0; k < record.size(); ++k) {
     EXPECT_EQ(IsHeld(record[k], Signal::kX), k % kPoll != 0) << k;
   }
@@ -176,9 +296,9 @@ TEST(HeldReadingsTest, ARecordIsMarkedFromItsFirstSampleOn) {
 
 // The command goes on between two polls, so each repeat is far from it.
 TEST(HeldReadingsDecisionTest, APolledPositionIsNoFault) {
-  for (const bool known : {false, true}) {
+  for (const int known : {0, ReadEvery::kNoRepeats, kPoll}) {
     auto models = std::make_shared<ModelSet>(tests::LinearPlant());
-    models->every.x = known ? kPoll : 0;
+    models->every.x = known;
     Decision decision{EngineParts(models), nullptr};
     int transitions = 0;
     for (int k = 0; k < 1200; ++k) {
@@ -186,8 +306,86 @@ TEST(HeldReadingsDecisionTest, APolledPositionIsNoFault) {
       sample.Set(Signal::kX, Polled(k, 0.01)[Signal::kX]);
       transitions += decision.Step(sample).transition_count;
     }
-    EXPECT_EQ(transitions > 0, !known);
+    EXPECT_EQ(transitions > 0, known == 0);
   }
+}
+
+// A plant whose floor knows that F changes by some 1 to 2 for each % of X, and
+// finds nothing itself.
+std::shared_ptr<ModelSet> PlantOfEveryReading(int known) {
+  auto models = std::make_shared<ModelSet>(tests::LinearPlant());
+  models->every.x = models->every.f = known;
+  models->floor.emplace();
+  models->floor->flow_gain = 200.0;
+  models->floor->flow_exponent = 2.0;
+  models->floor->dp_level = 1.0;
+  models->floor->deviation = 50.0;
+  models->floor->flow_factor = 10.0;
+  AddFindings(*models);
+  return models;
+}
+
+struct Detected {
+  int before{0};  // a fault [samples]
+  int after{0};
+  int settling{0};
+};
+
+// CV and X are told when they have changed by more than 4 %, where no residual
+// is beyond 2 %. The flow is read for each sample.
+Detected Replay(double fault, Decision& decision) {
+  std::mt19937 random(11);
+  Sample last = tests::PlantSample(0);
+  Detected detected;
+  for (int k = 0; k < 3000; ++k) {
+    Sample sample = tests::PlantSample(static_cast<std::uint64_t>(k));
+    const double at =
+        sample[Signal::kCv] + 0.001 * static_cast<double>(random() % 1000);
+    for (const Signal signal : {Signal::kCv, Signal::kX}) {
+      sample.Set(signal, std::abs(at - last[signal]) > 4.0 ? at : last[signal]);
+    }
+    sample.Set(Signal::kF, 100.0 - at);
+    tests::AddF6(sample, k < 2000 ? 0.0 : fault);
+    last = sample;
+    const Verdict& verdict = decision.Step(sample);
+    detected.settling += verdict.quality == Quality::kSettling ? 1 : 0;
+    (k < 2000 ? detected.before : detected.after) += verdict.detected ? 1 : 0;
+  }
+  return detected;
+}
+
+TEST(HeldReadingsDecisionTest, AllowsForTheDeadBandsThatASetDoesNotKnow) {
+  for (const double fault : {0.0, 1.0}) {
+    for (const int known : {0, ReadEvery::kNoRepeats}) {
+      Decision decision{EngineParts(PlantOfEveryReading(known)), nullptr};
+      const Detected detected = Replay(fault, decision);
+      EXPECT_EQ(detected.before > 0, known == 0);
+      EXPECT_EQ(detected.after > 900, fault > 0.0) << "it also clears";
+      EXPECT_EQ(detected.settling > 50, known == ReadEvery::kNoRepeats);
+      EXPECT_EQ(decision.held(), MaskOf(Signal::kX));
+    }
+  }
+}
+
+// An unchanged flow is a reading of what is within 4 of it.
+TEST(HeldReadingsDecisionTest, AnUnchangedValueIsOffByItsDeadBandAtMost) {
+  const auto detects = [](double off, SignalMask within) {
+    ValveEngine engine(PlantOfEveryReading(ReadEvery::kNoRepeats));
+    Unseen unseen;
+    unseen.changes[Index(Signal::kF)] = 4.0;
+    unseen.within = within;
+    bool detected = false;
+    for (std::uint64_t k = 0; k < 200; ++k) {
+      Sample sample = tests::PlantSample(k);
+      sample.values[Index(Signal::kF)] += k < 100 ? 0.0 : off;
+      engine.Allow(unseen);
+      detected = engine.Step(sample).detected || detected;
+    }
+    return detected;
+  };
+  EXPECT_FALSE(detects(5.0, MaskOf(Signal::kF)));
+  EXPECT_TRUE(detects(7.0, MaskOf(Signal::kF)));
+  EXPECT_TRUE(detects(5.0, 0)) << "new each time";
 }
 
 }  // namespace

@@ -1,11 +1,14 @@
 #include "diagnosis/observers/observer_bank.h"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 
 #include <gtest/gtest.h>
 
 #include "diagnosis/model/fault_catalogue.h"
 #include "diagnosis/model/verdict.h"
+#include "diagnosis/observers/detection.h"
 #include "tests/diagnosis/linear_plant.h"
 
 namespace fdi {
@@ -142,6 +145,28 @@ TEST(ObserverBankTest, ExtrapolationIsWhatTheRangeWouldHaveKept) {
   bank.Step(sample);
   EXPECT_NEAR(bank.extrapolation(0, 1), 15.0, 1e-12);
   EXPECT_EQ(bank.extrapolation(1, 1), 0.0);
+}
+
+TEST(ObserverBankTest, WhatIsAllowedCountsAsExtrapolation) {
+  const ModelSet models = tests::LinearPlant();
+  ObserverBank bank(models);
+  std::array<double, 7> factors{};
+  Sample sample = Reading(50.0, 50.0 + 3.0 * tests::kNoise);
+  sample.Set(Signal::kF, 50.0);
+  bank.Initialise(sample);
+  const auto normal = [&](double allowed) {
+    bank.Allow(0, allowed);
+    bank.Step(sample);
+    bank.Score(factors);
+    EXPECT_EQ(CertainResidual(bank, 0),
+              std::max(3.0 * tests::kNoise - allowed, 0.0));
+    EXPECT_EQ(CertainResidual(bank, 1), 0.0);
+    return factors[0];
+  };
+  const double without = normal(0.0);
+  EXPECT_GT(normal(0.25 * tests::kNoise), without);
+  EXPECT_EQ(normal(3.0 * tests::kNoise), 1.0);
+  EXPECT_EQ(normal(0.0), without);
 }
 
 TEST(FaultCatalogueTest, NamesAreReadInAnyCaseAndPaperNamesMapToTheFive) {

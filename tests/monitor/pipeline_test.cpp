@@ -1,6 +1,10 @@
 #include "monitor/pipeline.h"
 
+#include <algorithm>
+#include <cmath>
 #include <filesystem>
+#include <random>
+#include <string>
 #include <thread>
 
 #include <gmock/gmock.h>
@@ -58,6 +62,30 @@ TEST_F(PipelineTest, UnusableSamplesAreCountedByReasonAndTheServiceGoesOn) {
   EXPECT_EQ(bus_.decisions.size(), 20U);
   EXPECT_THAT(lines_, testing::Contains(testing::HasSubstr(
                           "sample_rejected id=M102 reason=not_finite")));
+}
+
+TEST_F(PipelineTest, SaysOnceWhichReadingsCameOnChange) {
+  Start();
+  std::mt19937 random(11);
+  double at = 50.0;
+  double x = at;
+  for (std::uint64_t k = 0; k < 600; ++k) {
+    at += 0.002 * static_cast<double>(random() % 1000) - 1.0;
+    x = std::abs(at - x) > 0.5 ? at : x;
+    Sample sample = PlantSample(k);
+    sample.Set(Signal::kX, x);
+    pipeline_->OnSample("V1", sample, 1);
+    pipeline_->OnSample("V2", PlantSample(k), 1);
+  }
+  pipeline_->Stop();
+  EXPECT_EQ(std::ranges::count_if(lines_,
+                                  [](const std::string& line) {
+                                    return line.find("readings_held") !=
+                                           std::string::npos;
+                                  }),
+            1);
+  EXPECT_THAT(lines_, testing::Contains(testing::HasSubstr(
+                          "readings_held id=M120 valve=V1 signals=X")));
 }
 
 TEST_F(PipelineTest, ValvesBeyondTheLimitAreCountedNotServed) {
