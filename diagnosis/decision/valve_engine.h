@@ -35,8 +35,8 @@ class ValveEngine {
   ValveEngine(const ValveEngine&) = delete;
   ValveEngine& operator=(const ValveEngine&) = delete;
 
-  /// From the next sample on, values may be wrong by so much, and observers count
-  /// as that much less certain.
+  /// From the next sample on, values may be wrong by so much, and observers
+  /// count as that much less certain.
   void Allow(const Unseen& unseen);
 
   /// Takes the next sample in order of arrival. The result stands until the

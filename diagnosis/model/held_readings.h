@@ -69,8 +69,8 @@ class HeldReadings {
 
   const ReadEvery& every() const { return every_; }
 
-  /// Counts transmitters that are not read for each sample, and were not `known`
-  /// not to be.
+  /// Counts transmitters that are not read for each sample, and were not
+  /// `known` not to be.
   Unseen unseen() const;
   /// These transmitters.
   SignalMask held() const;
