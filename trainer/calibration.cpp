@@ -488,9 +488,13 @@ void FitThresholds(const std::vector<ResidualSeries>& residuals,
   models.false_alarms_per_hour = rate_per_hour;
 }
 
-void BalanceThresholds(ModelSet& models) {
+void BalanceThresholds(const std::vector<ResidualSeries>& residuals,
+                       ModelSet& models) {
   for (std::size_t c = 0; c < models.channels.size(); ++c) {
-    if (IsFreeRunning(models.observers.front().channels[c].model)) {
+    const double minutes = static_cast<double>(Joined(residuals[c]).size()) *
+                           models.sample_period_s / 60.0;
+    if (minutes < kLeastMinutes ||
+        IsFreeRunning(models.observers.front().channels[c].model)) {
       ChannelSpec& channel = models.channels[c];
       channel.upper_threshold =
           std::max(channel.upper_threshold, -channel.lower_threshold);

@@ -88,9 +88,16 @@ void FitThresholds(const std::vector<ResidualSeries>& residuals,
                    double rate_per_hour, ModelSet& models,
                    const std::vector<ResidualSeries>& commands = {});
 
-/// Gives both thresholds of channels that run on their own past the wider of
-/// the two: such a model errs after a large move of the command, one way or the
-/// other, and some hours may hold the largest errors of one way alone.
-void BalanceThresholds(ModelSet& models);
+/// Less than this is thin: a record, or the readings of a signal in it [min].
+inline constexpr double kLeastMinutes = 25.0;
+
+/// Gives both thresholds of a channel the wider of the two if it runs on its
+/// own past, or has thin readings: such a model errs after a large move of the
+/// command, one way or the other, and some hours, or a few readings, may hold
+/// the largest errors of one way alone.
+///
+/// @param residuals by channel, as for FitThresholds().
+void BalanceThresholds(const std::vector<ResidualSeries>& residuals,
+                       ModelSet& models);
 
 }  // namespace fdi::trainer

@@ -419,7 +419,7 @@ void FitLimits(const Healthy& healthy, const NormalResiduals& held_out,
   FitThresholds(held_out.residuals, windows, options.false_alarms_per_hour,
                 models, held_out.commands);
   CoverDeadBands(healthy.normal, models);
-  BalanceThresholds(models);
+  BalanceThresholds(held_out.residuals, models);
 }
 
 // Healthy::stretches with a fault in force, given by its index.

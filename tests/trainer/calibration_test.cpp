@@ -275,6 +275,21 @@ TEST(ThresholdsTest, WindowThatTheSeriesAreTooShortForGetsNoLimits) {
 
 // Four days of a sample a minute: what varies over hours is in the allowance
 // for another day, and not once more in the limits on means.
+// A few readings may hold the largest errors of one way alone.
+TEST(ThresholdsTest, OfThinReadingsTheWiderIsThatOfBothSides) {
+  for (const bool thin : {false, true}) {
+    ModelSet models;
+    models.channels = {{"F", Signal::kF, -1.0, 3.0}};
+    models.observers.resize(1);
+    models.observers[0].channels.resize(1);
+    models.observers[0].channels[0].model.output = Signal::kF;
+    const std::size_t samples = thin ? 1499 : 1500;
+    BalanceThresholds({{GaussianSeries(samples, 3)}}, models);
+    EXPECT_EQ(models.channels[0].lower_threshold, thin ? -3.0 : -1.0);
+    EXPECT_EQ(models.channels[0].upper_threshold, 3.0);
+  }
+}
+
 TEST(ThresholdsTest, WhatVariesSlowlyCountsOnce) {
   constexpr int kRows = 5760;
   const std::vector<double> white = GaussianSeries(kRows, 16);

@@ -188,7 +188,7 @@ ModelSet FitToData(const ModelSet& parent, const HealthyResiduals& data) {
     }
     fitted.channels[c].windows = std::move(windows);
   }
-  BalanceThresholds(fitted);
+  BalanceThresholds(residuals, fitted);
   if (parent.every.x == ReadEvery::kOnChange ||
       parent.every.f == ReadEvery::kOnChange) {
     KeepWide(parent, fitted);

@@ -6,12 +6,12 @@
 #include <iterator>
 
 #include "base/text.h"
+#include "trainer/calibration.h"
 #include "trainer/statistics.h"
 
 namespace fdi::trainer {
 namespace {
 
-constexpr double kLeastMinutes = 25.0;
 constexpr double kLeastSpan = 5.0;    // Span of the command [%].
 constexpr double kLeastJudged = 0.5;  // Share of a part of the record.
 constexpr double kMostlyRead = 0.9;   // Below it, the readings are told.
