@@ -50,6 +50,12 @@ HeldReadings::HeldReadings(double period_s, const ReadEvery& known)
     : period_ns_(1e9 * period_s), known_(known), every_(known) {}
 
 void HeldReadings::Mark(Sample& sample) {
+  // Between the stamps of two publishers nothing is held.
+  if (std::exchange(source_id_, sample.source_id) != sample.source_id) {
+    every_ = known_;
+    watches_ = {};
+    unseen_ = {};
+  }
   for (std::size_t i = 0; i < kSignalCount; ++i) {
     const auto signal = static_cast<Signal>(i);
     if (!sample.Has(signal) || sample.quality[i] == SignalQuality::kBad) {

@@ -104,6 +104,7 @@ class HeldReadings {
   bool IsUnknown(Signal signal) const;
 
   double period_ns_;
+  std::uint64_t source_id_{0};
   ReadEvery known_;
   ReadEvery every_;
   std::array<Watch, kSignalCount> watches_{};

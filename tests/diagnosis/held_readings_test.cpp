@@ -251,6 +251,24 @@ TEST(HeldReadingsTest, WhatWasKnownIsNotUnseen) {
   }
 }
 
+// Two publishers in turn, an hour apart, as while one takes over.
+TEST(HeldReadingsTest, TwoPublishersAreNoReportsOnChange) {
+  HeldReadings held(1.0, {.x = ReadEvery::kNoRepeats});
+  tests::Noise noise(3);
+  for (std::uint64_t k = 0; k < 1000; ++k) {
+    for (const std::uint64_t source : {1, 2}) {
+      Sample sample = tests::PlantSample(k + 3600 * source);
+      noise.Add(sample);
+      sample.source_id = source;
+      held.Mark(sample);
+      EXPECT_EQ(sample.uncertain(), 0);
+    }
+    EXPECT_FALSE(held.unseen().any());
+    EXPECT_FALSE(held.unseen().unknown);
+  }
+  EXPECT_EQ(held.every().x, ReadEvery::kNoRepeats);
+}
+
 // A transmitter may be frozen from the first sample on.
 TEST(HeldReadingsTest, NothingIsUnknownForLongerThanAnHour) {
   HeldReadings held(1.0, {.x = ReadEvery::kNoRepeats});
