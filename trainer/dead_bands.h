@@ -13,8 +13,7 @@ namespace fdi::trainer {
 ///
 /// A dead band is the 10 % quantile of the changes in the record: values that
 /// are reported after a time limit, though they have hardly changed, lie below.
-/// That of CV, which an operator may move in steps, is at most
-/// kWidestDeadBand.
+/// An operator may move CV in steps: its dead band is at most kWidestDeadBand.
 void CoverDeadBands(const Condition& normal, ModelSet& models);
 
 }  // namespace fdi::trainer

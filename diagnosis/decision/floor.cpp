@@ -15,8 +15,8 @@ constexpr double kShut = 98.0;     // of CV and X [%]
 constexpr double kStop = 2.0;      // from an end of the travel [%]
 constexpr int kBreakaway = 5;      // samples that a rod may stay at rest
 constexpr int kStuckSamples = 10;  // for the position; twice as many for F
-// Without any reading of F: as long as nothing may be known of a valve, and two
-// polls at least.
+// Without any reading of F, or of an X that the record was never without: as
+// long as nothing may be known of a valve, and of F two polls at least.
 constexpr int kSilentSamples = 60;
 constexpr int kSilentPolls = 2;
 constexpr int kMaxRepeats = 1 << 20;  // counted

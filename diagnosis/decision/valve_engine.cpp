@@ -189,6 +189,7 @@ class ValveEngine::Impl {
   Checked CheckSample(const Sample& measured, bool begins);
   void TakeSilence(SignalMask silent, Sample& trained) const;
   void AllowUnseen(const Sample& trained);
+  bool IsUnknown() const;
   bool Mend(const Checked& checked, bool begins, Sample& trained);
   SignalMask Single(const Checked& checked) const;
   void TakeSource(const Sample& sample);
@@ -353,6 +354,11 @@ void ValveEngine::Impl::AllowUnseen(const Sample& trained) {
   }
 }
 
+// A reading that stands while it should have moved is known to.
+bool ValveEngine::Impl::IsUnknown() const {
+  return unseen_.unknown && diagnosis_->floor.stuck() == 0;
+}
+
 // @returns whether the sample can be judged; what is unusable is then bridged.
 bool ValveEngine::Impl::Mend(const Checked& checked, bool begins,
                              Sample& trained) {
@@ -458,8 +464,8 @@ Quality ValveEngine::Impl::Judge(const Sample& sample) {
       sample, diagnosis_->bank, episode_open(), floor.findings() != 0,
       diagnosis_->detection.pending());
   verdict_.uncovered = diagnosis_->coverage.reasons();
-  return quality == Quality::kLive && unseen_.unknown ? Quality::kSettling
-                                                      : quality;
+  return quality == Quality::kLive && IsUnknown() ? Quality::kSettling
+                                                  : quality;
 }
 
 void ValveEngine::Impl::Decide(const Sample& sample) {
@@ -476,7 +482,7 @@ void ValveEngine::Impl::Decide(const Sample& sample) {
   }
   Findings findings;
   findings.settled =
-      diagnosis_->coverage.settled() && uncertain_ == 0 && !unseen_.unknown;
+      diagnosis_->coverage.settled() && uncertain_ == 0 && !IsUnknown();
   findings.floor = floor.findings();
   findings.beginning = floor.beginning();
   findings.abnormal = findings.floor != 0;

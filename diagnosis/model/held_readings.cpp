@@ -63,7 +63,7 @@ void HeldReadings::Mark(Sample& sample) {
     }
     Watch& watch = watches_[i];
     if (sample.quality[i] == SignalQuality::kUncertain) {
-      watch.told = true;
+      watch.told = watch.stood = true;
       ++watch.repeats;
       if (IsWithin(signal, sample)) {
         sample.quality[i] = SignalQuality::kGood;
@@ -78,10 +78,13 @@ void HeldReadings::Mark(Sample& sample) {
     const double age = since(watch.new_ns);
     if (!watch.begun || value != watch.value) {
       if (watch.begun) {
-        TakeChange(signal, std::round(since(watch.changed_ns)),
+        // A sample that is lost says nothing of a value that stood.
+        TakeChange(signal,
+                   watch.stood ? std::round(since(watch.changed_ns)) : 1.0,
                    std::abs(value - watch.value));
       }
       watch.begun = true;
+      watch.stood = false;
       watch.value = value;
       watch.changed_ns = watch.new_ns = sample.stamp_ns;
     } else if (IsEnd(signal, value) && (every <= ReadEvery::kNoRepeats ||
@@ -91,9 +94,11 @@ void HeldReadings::Mark(Sample& sample) {
                (age < every - 0.5 || every == ReadEvery::kNoRepeats)) {
       sample.quality[i] = IsWithin(signal, sample) ? SignalQuality::kGood
                                                    : SignalQuality::kUncertain;
+      watch.stood = true;
       ++watch.repeats;
     } else {
       watch.new_ns = sample.stamp_ns;
+      watch.stood = true;
       ++watch.repeats;
     }
     watch.told = false;

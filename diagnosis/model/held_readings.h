@@ -10,9 +10,9 @@ namespace fdi {
 
 /// Samples from one new reading of a transmitter to the next, where it is read
 /// less often than samples are taken: a position that is polled by HART every
-/// 30 s and stands in the rows between. 1: each sample had another reading; 0:
-/// each had one, which may repeat the last; kOnChange: a value is new when it
-/// changes, as by exception.
+/// 30 s and stands in the rows between. 1: each sample had another reading, of
+/// X and F alone; 0: each had one, which may repeat the last; kOnChange: a
+/// value is new when it changes, as by exception.
 struct ReadEvery {
   static constexpr int kOnChange = std::numeric_limits<int>::max();
   static constexpr int kNoRepeats = 1;
@@ -83,7 +83,8 @@ class HeldReadings {
 
   struct Watch {
     bool begun{false};
-    bool told{false};  // the source has said that it held since
+    bool told{false};   // the source has said that it held since
+    bool stood{false};  // in some sample since it changed
     double value{0.0};
     std::int64_t changed_ns{0};
     std::int64_t new_ns{0};
@@ -135,7 +136,9 @@ ReadEvery MarkHeld(double period_s, std::size_t samples, At at) {
     if (int* found = EveryOf(every, signal)) {
       *found = 4 * held[i] > samples ? *found : 0;
       any = any || *found > 0;
-      if (*found == 0 && !search.Repeats(signal)) {
+      // A pressure or T1 that repeats is one for StuckReadings.
+      if ((signal == Signal::kX || signal == Signal::kF) && *found == 0 &&
+          !search.Repeats(signal)) {
         *found = ReadEvery::kNoRepeats;
       }
     }

@@ -401,6 +401,28 @@ TEST(FloorTest, ARodThatIsSilentOpensAnEpisode) {
   EXPECT_EQ(FaultSetName(engine.models(), name), "x_stuck");
 }
 
+// Nobody knows yet whether values that repeat are readings. One that stands
+// while the rod should travel is.
+TEST(FloorTest, WhatShouldHaveMovedIsKnown) {
+  ModelSet models = FlooredPlant();
+  models.floor->flow_gain = 0.0;
+  ValveEngine engine(std::make_shared<const ModelSet>(models));
+  Unseen unseen;
+  unseen.unknown = true;
+  int found = 0;
+  for (int k = 0; k < 300; ++k) {
+    Sample sample =
+        tests::PlantSample(static_cast<std::uint64_t>(k), k < 200 ? 2.0 : 20.0);
+    sample.Set(Signal::kX, 50.0);
+    engine.Allow(unseen);
+    const Verdict& verdict = engine.Step(sample);
+    found += engine.episode_open() ? 1 : 0;
+    EXPECT_EQ(verdict.quality, found > 0 ? Quality::kLive : Quality::kSettling)
+        << k;
+  }
+  EXPECT_GT(found, 50);
+}
+
 // The silence is that of a valve at rest: whatever was found before, nothing is
 // known of it by now.
 TEST(FloorTest, AnEarlierFindingIsNoReading) {

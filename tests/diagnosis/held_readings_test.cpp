@@ -251,6 +251,24 @@ TEST(HeldReadingsTest, WhatWasKnownIsNotUnseen) {
   }
 }
 
+// What is lost on the way did not stand.
+TEST(HeldReadingsTest, LostSamplesAreNoReportsOnChange) {
+  for (const int known : {0, ReadEvery::kNoRepeats}) {
+    HeldReadings held(1.0, {.x = known});
+    tests::Noise noise(3);
+    std::mt19937 random(2);
+    for (std::uint64_t k = 0; k < 3000; ++k) {
+      Sample sample = tests::PlantSample(k);
+      noise.Add(sample);
+      if (random() % 2 == 0) {
+        held.Mark(sample);
+      }
+      EXPECT_FALSE(held.unseen().any());
+    }
+    EXPECT_NE(held.every().x, ReadEvery::kOnChange);
+  }
+}
+
 // Two publishers in turn, an hour apart, as while one takes over.
 TEST(HeldReadingsTest, TwoPublishersAreNoReportsOnChange) {
   HeldReadings held(1.0, {.x = ReadEvery::kNoRepeats});
@@ -287,6 +305,7 @@ TEST(HeldReadingsTest, ARecordSaysWhetherReadingsRepeatThemselves) {
     for (std::uint64_t k = 0; k < 2000; ++k) {
       Sample& sample = record.emplace_back(tests::PlantSample(k, 2.0));
       noise.Add(sample);
+      sample.Set(Signal::kT1, sample[Signal::kF]);
       const double x = sample[Signal::kX];
       sample.Set(Signal::kX, resolution * std::round(x / resolution));
     }
@@ -296,6 +315,7 @@ TEST(HeldReadingsTest, ARecordSaysWhetherReadingsRepeatThemselves) {
     EXPECT_EQ(every.x, resolution < 0.1 ? ReadEvery::kNoRepeats : 0);
     EXPECT_EQ(every.f, ReadEvery::kNoRepeats);
     EXPECT_EQ(every.p1, 0) << "not measured";
+    EXPECT_EQ(every.t1, 0) << "that of X and F alone";
   }
 }
 
